@@ -1,0 +1,34 @@
+# `make demo` and `make test` each do their whole set-up: Python >= 3.11, a C compiler and make are all they need.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+.PHONY: demo test slow lint types figures clean
+
+demo: $(STAMP)
+	$(BIN)/msfp-gen demo -o out
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -q -m "not slow"
+
+slow: $(STAMP)
+	$(BIN)/python -m pytest -q -m slow
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+figures: $(STAMP)
+	$(BIN)/python benchmarks/report_figures.py
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "msfp-gen needs Python 3.11 or newer: make PYTHON=python3.11 test")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[test]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) build/models out
