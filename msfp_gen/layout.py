@@ -1,0 +1,114 @@
+"""What changes equations: the layout of a stack and the effects that are modelled.
+
+`ModelSpec = Layout + Effects` names one set of equations, so one compiled model. Radii, friction, motions and loads are
+values and live elsewhere: changing them never recompiles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Literal, get_args, get_type_hints
+
+from msfp_gen.errors import InputError
+
+
+@dataclass(frozen=True)
+class Layout:
+    """`n` bodies of which the first `m` surfaces are concave up and the next `p` concave down (report section 3.1).
+
+    Raises InputError unless n = m + p + 1 and n >= 2.
+    """
+
+    n: int
+    m: int
+    p: int
+
+    def __post_init__(self) -> None:
+        for name in ("n", "m", "p"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise InputError(f"layout.{name} = {value!r}: give a whole number")
+            if value < 0:
+                raise InputError(f"layout.{name} = {value}: give a number that is not negative")
+        if self.n < 2:
+            raise InputError(f"layout.n = {self.n}: a bearing needs at least 2 bodies, a base and a top plate")
+        if self.n != self.m + self.p + 1:
+            raise InputError(
+                f"layout.n = {self.n}: {self.m} concave-up and {self.p} concave-down surfaces lie between "
+                f"{self.m + self.p + 1} bodies; give n = m + p + 1"
+            )
+
+    @classmethod
+    def tfp(cls) -> Layout:
+        """The triple friction pendulum of chapter 2: five bodies, two surfaces up and two down."""
+        return cls(5, 2, 2)
+
+    @classmethod
+    def dfp(cls) -> Layout:
+        """The double friction pendulum: three bodies, one surface up and one down."""
+        return cls(3, 1, 1)
+
+    @property
+    def surfaces(self) -> int:
+        """Number of sliding surfaces, n - 1."""
+        return self.n - 1
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """For each surface, bottom first: +1 where it is concave up, -1 where it is concave down."""
+        return (1,) * self.m + (-1,) * self.p
+
+    @property
+    def name(self) -> str:
+        """`n_m_p`, as in the name of a generated module."""
+        return f"{self.n}_{self.m}_{self.p}"
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What the equations take into account; every field is one of a few words.
+
+    dimension: three translations and rotations, or motion in one vertical plane.
+    spin: how bodies turn about their own axis: locked to the body below, resisted over a patch, or free (the report).
+    sliders: with their inertia, or massless (quasi-static).
+    rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
+    bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
+    friction: the law of the friction coefficient.
+    """
+
+    dimension: Literal["spatial", "planar"] = "spatial"
+    spin: Literal["locked", "patch", "free"] = "locked"
+    sliders: Literal["inertial", "massless"] = "inertial"
+    rims: bool = True
+    bouc_wen: Literal["report", "isotropic"] = "report"
+    friction: Literal["constant"] = "constant"
+
+    def __post_init__(self) -> None:
+        hints = get_type_hints(type(self))
+        for field in fields(self):
+            value = getattr(self, field.name)
+            choices = get_args(hints[field.name]) or (True, False)
+            if not any(value is choice or (isinstance(value, str) and value == choice) for choice in choices):
+                words = ", ".join(repr(choice) for choice in choices)
+                raise InputError(f"effects.{field.name} = {value!r}: give one of {words}")
+        if self.sliders == "massless" and self.spin == "free":
+            raise InputError(
+                "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
+                "without inertia; give spin = 'locked' or 'patch'"
+            )
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """Everything that determines one set of equations, and so one compiled model."""
+
+    layout: Layout
+    effects: Effects = Effects()
+
+    @property
+    def key(self) -> str:
+        """A stable name, such as `5_2_2-spatial-locked-inertial-rims-report-constant`."""
+        effects = self.effects
+        rims = "rims" if effects.rims else "norims"
+        words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, effects.friction)
+        return "-".join((self.layout.name, *words))
