@@ -69,7 +69,7 @@ class Effects:
     """What the equations take into account; every field is one of a few words.
 
     dimension: three translations and rotations, or motion in one vertical plane.
-    spin: how bodies turn about their own axis: locked to the body below, resisted over a patch, or free (the report).
+    spin: whether bodies turn about their own axis: locked (they do not), resisted over a patch, or free (the report).
     sliders: with their inertia, or massless (quasi-static).
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
