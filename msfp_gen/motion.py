@@ -1,0 +1,387 @@
+"""The prescribed motion of the base: piecewise polynomials, so that displacement, velocity and acceleration agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen import piecewise, waveforms
+from msfp_gen.errors import InputError
+from msfp_gen.motion_checks import checked_pieces, positive, series
+from msfp_gen.piecewise import Array
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from msfp_gen.records import Record
+
+Metadata = Mapping[str, str | float]
+CHANNELS = ("u_g1", "u_g2", "u_g3", "psi_1", "theta_1", "phi_1")
+_REST = 1e-3  # a sampled end slower than this share of the peak velocity is taken to be at rest
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of the ground and of the base plate, twice continuously differentiable but for declared `jumps`.
+
+    Attributes:
+        knots: ndarray, shape (k+1,), [s]: ends of the pieces, rising from zero.
+        coefficients: ndarray, shape (k, 6, 6): piece, channel (u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad]),
+            ascending power of (t - knots[piece]).
+        jumps: ndarray, shape (j,), [s]: knots at which the acceleration alone may jump.
+        max_step: longest step [s] that still sees what the motion's own sampling resolves; None: no limit.
+        name: a label for figures and files.
+        metadata: where the motion came from and what was done to it.
+
+    Raises:
+        InputError: shapes, order or finiteness are wrong; the displacement or velocity jumps (an impulse), or the
+            acceleration jumps at a time that `jumps` does not name.
+    """
+
+    knots: Array
+    coefficients: Array
+    jumps: Array = field(default_factory=lambda: np.zeros(0))
+    max_step: float | None = None
+    name: str = ""
+    metadata: Metadata = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        knots, coefficients, jumps = checked_pieces(self.knots, self.coefficients, self.jumps, CHANNELS)
+        for key, value in (("knots", knots), ("coefficients", coefficients), ("jumps", jumps)):
+            object.__setattr__(self, key, value)
+        object.__setattr__(self, "metadata", dict(self.metadata))
+        if self.max_step is not None:
+            positive("max_step", self.max_step)
+
+    def _key(self) -> tuple[object, ...]:
+        arrays = (self.knots, self.coefficients, self.jumps)
+        return (*(a.shape for a in arrays), *((a + 0.0).tobytes() for a in arrays), self.max_step, self.name)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Motion):
+            return NotImplemented
+        return self._key() == other._key() and self.metadata == other.metadata
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Motion, (self.knots, self.coefficients, self.jumps, self.max_step, self.name, self.metadata)
+
+    @property
+    def duration(self) -> float:
+        """Length [s]; a motion starts at time zero."""
+        return float(self.knots[-1])
+
+    def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
+        """All six channels, or their time derivative: ndarray, shape (..., 6), [m, rad, per s**derivative].
+
+        At a declared jump the acceleration is the one after it. Times outside [0, duration] raise InputError.
+        """
+        time = np.asarray(t, dtype=float)
+        inside = (time >= 0) & (time <= self.knots[-1])
+        if not np.all(inside):
+            raise InputError(
+                f"time: {time[~inside].flat[0]:g} s lies outside the motion, which has [0, {self.duration:g}] s; "
+                "shorten the run or use motion.held(duration)"
+            )
+        if derivative < 0:
+            raise InputError(f"derivative: {derivative}; give 0 (displacement), 1 (velocity) or 2 (acceleration)")
+        return piecewise.evaluate(self.knots, self.coefficients, time, derivative)
+
+    def displacement(self, t: ArrayLike) -> Array:
+        """(u_g1, u_g2, u_g3): ndarray, shape (..., 3), [m]."""
+        return self.evaluate(t)[..., :3]
+
+    def velocity(self, t: ArrayLike) -> Array:
+        """ndarray, shape (..., 3), [m/s]."""
+        return self.evaluate(t, 1)[..., :3]
+
+    def acceleration(self, t: ArrayLike) -> Array:
+        """ndarray, shape (..., 3), [m/s^2]."""
+        return self.evaluate(t, 2)[..., :3]
+
+    def rotation(self, t: ArrayLike) -> Array:
+        """Euler angles (psi_1, theta_1, phi_1) of the base: ndarray, shape (..., 3), [rad]."""
+        return self.evaluate(t)[..., 3:]
+
+    def plane(self) -> float | None:
+        """Azimuth [rad], in (-pi/2, pi/2], of the vertical plane that holds the whole motion, or None.
+
+        Vertical motion alone lies in every plane and gives 0. A rocking base stays in a plane only when it turns
+        about E2 (plane 0) or about E1 (plane pi/2) and about nothing else.
+        """
+        scaled = self.coefficients * np.diff(self.knots)[:, None, None] ** np.arange(piecewise.ORDER)
+        scaled[:, :, 0] -= self.coefficients[0, :, 0]
+        east, north = scaled[:, 0].ravel(), scaled[:, 1].ravel()
+        psi, theta, phi = (bool(np.any(self.coefficients[:, c])) for c in (3, 4, 5))
+        if phi or (psi and theta):
+            return None
+        if psi or theta:
+            return (np.pi / 2 if psi else 0.0) if not np.any(east if psi else north) else None
+        _, sizes, directions = np.linalg.svd(np.stack([east, north], axis=1), full_matrices=False)
+        if sizes[0] == 0:
+            return 0.0
+        if sizes[1] > 1e-12 * sizes[0]:
+            return None
+        azimuth = float(np.arctan2(directions[0, 1], directions[0, 0]))
+        azimuth -= np.pi * round(azimuth / np.pi)
+        return azimuth if azimuth > -np.pi / 2 + 1e-12 else azimuth + np.pi
+
+    def rotated(self, angle: float) -> Motion:
+        """The motion with its horizontal channels turned by `angle` [rad] about E3, from E1 towards E2.
+
+        Raises InputError for a rocking base: its Euler angles do not turn like a vector.
+        """
+        if np.any(self.coefficients[:, 3:5]):
+            raise InputError(
+                f"rotated: angle {angle:g} on a motion that rocks the base (psi_1 or theta_1 not zero); "
+                "build the motion in the turned axes"
+            )
+        c, s = np.cos(angle), np.sin(angle)
+        coefficients = self.coefficients.copy()
+        coefficients[:, 0] = c * self.coefficients[:, 0] - s * self.coefficients[:, 1]
+        coefficients[:, 1] = s * self.coefficients[:, 0] + c * self.coefficients[:, 1]
+        return self._with(coefficients=coefficients)
+
+    def held(self, duration: float) -> Motion:
+        """The motion, then a rest of `duration` [s] where it ended, for free vibration.
+
+        Raises InputError if the motion does not end at rest. An acceleration at its end becomes a declared jump.
+        """
+        positive("duration", duration)
+        end = self.evaluate(self.duration)
+        speed = self.evaluate(self.duration, 1)
+        peak = np.max(np.abs(self.coefficients[:, :, 1]), axis=0)
+        if np.any(np.abs(speed) > 1e-9 * peak):
+            worst = int(np.argmax(np.abs(speed)))
+            raise InputError(
+                f"held: the motion ends with {CHANNELS[worst]} moving at {speed[worst]:.3g} per second; "
+                "end it at rest (whole half cycles, a taper) before holding it"
+            )
+        rest = np.zeros((1, 6, piecewise.ORDER))
+        rest[0, :, 0] = end
+        return self._with(
+            knots=np.append(self.knots, self.duration + duration),
+            coefficients=np.concatenate([self.coefficients, rest]),
+            jumps=np.append(self.jumps, self.duration) if np.any(self.evaluate(self.duration, 2)) else self.jumps,
+        )
+
+    def __add__(self, other: Motion) -> Motion:
+        """Both motions at once, on their merged knots. They must be equally long: lengthen one with `held`."""
+        if not isinstance(other, Motion):
+            return NotImplemented
+        if self.duration != other.duration:
+            raise InputError(
+                f"motion: durations {self.duration:g} s and {other.duration:g} s differ; "
+                "lengthen the shorter one with motion.held(duration)"
+            )
+        knots = np.union1d(self.knots, other.knots)
+        limits = [m.max_step for m in (self, other) if m.max_step is not None]
+        return Motion(
+            knots,
+            piecewise.shifted(self.knots, self.coefficients, knots)
+            + piecewise.shifted(other.knots, other.coefficients, knots),
+            np.union1d(self.jumps, other.jumps),
+            min(limits, default=None),
+            " + ".join(n for n in (self.name, other.name) if n),
+            {**other.metadata, **self.metadata},
+        )
+
+    def _with(self, **changes: Any) -> Motion:
+        from dataclasses import replace
+
+        return replace(self, **changes)
+
+    @classmethod
+    def from_arrays(
+        cls, time: ArrayLike, displacement: ArrayLike, rotation: ArrayLike | None = None, *, name: str = ""
+    ) -> Motion:
+        """Sampled displacement, interpolated by a cubic spline (C2).
+
+        An end at which a channel moves slower than a thousandth of its peak velocity is taken to be at rest and
+        clamped. Any other end keeps the velocity of the data: a run then starts with the base already moving and the
+        bearing moving along with it, without an impulse; metadata `initial_speed` [m/s] says how fast.
+
+        Args:
+            time: shape (k,), [s], rising, k >= 4; a first time other than zero is moved to zero and kept in metadata.
+            displacement: shape (k, 3), [m].
+            rotation: shape (k, 3), [rad], or None for a base that does not turn.
+            name: a label.
+        """
+        from scipy.interpolate import CubicSpline
+
+        moved, start = series("time", time), {}
+        columns = [series("displacement", displacement, (len(moved), 3))]
+        columns.append(np.zeros_like(columns[0]) if rotation is None else series("rotation", rotation, (len(moved), 3)))
+        values = np.concatenate(columns, axis=1)
+        if moved[0] != 0:
+            start = {"start_time": float(moved[0])}
+            moved = moved - moved[0]
+        free = CubicSpline(moved, values)
+        slopes, peak = free(moved[[0, -1]], 1), np.max(np.abs(free(moved, 1)), axis=0)
+        pieces = np.zeros((len(moved) - 1, 6, piecewise.ORDER))
+        for channel in range(6):
+            rest = np.abs(slopes[:, channel]) <= _REST * peak[channel]
+            ends = tuple((1, 0.0) if r else "not-a-knot" for r in rest)
+            spline = CubicSpline(moved, values[:, channel], bc_type=ends)
+            pieces[:, channel, :4] = spline.c[::-1].T
+        speed = float(np.linalg.norm(pieces[0, :3, 1]))
+        metadata = {"source": "displacement samples, cubic spline", "initial_speed": speed, **start}
+        return cls(moved, pieces, max_step=2 * float(np.median(np.diff(moved))), name=name, metadata=metadata)
+
+    @classmethod
+    def from_acceleration(cls, time: ArrayLike, acceleration: ArrayLike, *, name: str = "") -> Motion:
+        """Piecewise linear acceleration, integrated twice exactly from rest at zero.
+
+        Args:
+            time: shape (k,), [s], rising, k >= 4; a first time other than zero is moved to zero and kept in metadata.
+            acceleration: shape (k, 3), [m/s^2]; a first value other than zero is a jump at the start of the run.
+            name: a label.
+        """
+        times = series("time", time)
+        values = series("acceleration", acceleration, (len(times), 3))
+        rate = np.zeros((len(times), 6))
+        rate[:, :3] = values
+        steps = np.diff(times)[:, None] * (rate[1:] + rate[:-1]) / 2
+        velocity = np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
+        moved = times - times[0]
+        metadata: dict[str, str | float] = {"source": "piecewise linear acceleration"}
+        if times[0] != 0:
+            metadata["start_time"] = float(times[0])
+        pieces = piecewise.from_rates(moved, velocity, rate)
+        return cls(moved, pieces, max_step=2 * float(np.median(np.diff(moved))), name=name, metadata=metadata)
+
+    @classmethod
+    def harmonic(
+        cls,
+        amplitude: float,
+        frequency: float,
+        *,
+        direction: float = 0.0,
+        cycles: float = 2.0,
+        lead_in: float | None = None,
+        name: str = "",
+    ) -> Motion:
+        """A S(t/lead_in) sin(2 pi f t): the unidirectional tests of section 4.1, from rest at zero.
+
+        With the default lead-in, a quarter period, the motion reaches A at rest at its end and goes on as the report's
+        A cos(2 pi f (t - lead_in)) for `cycles` cycles.
+
+        Args:
+            amplitude: A [m].
+            frequency: f [Hz].
+            direction: azimuth from E1 towards E2 [rad].
+            cycles: number of full cycles after the lead-in.
+            lead_in: length of the smooth start [s].
+            name: a label.
+        """
+        period = 1 / positive("frequency", frequency)
+        rise = period / 4 if lead_in is None else lead_in
+        unit = (np.cos(direction), np.sin(direction))
+        return cls._enveloped(
+            amplitude, [(unit[0], 1.0, 0.0), (unit[1], 1.0, 0.0)], period, cycles, rise, name, "harmonic"
+        )
+
+    @classmethod
+    def circle(
+        cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
+    ) -> Motion:
+        """The circular orbit of section 4.4: A S cos(Omega t), A S sin(Omega t), [m], [rad/s]; S over `lead_in` [s]."""
+        period = 2 * np.pi / positive("angular_frequency", angular_frequency)
+        return cls._enveloped(
+            amplitude, [(1.0, 1.0, np.pi / 2), (1.0, 1.0, 0.0)], period, cycles, lead_in, name, "circle"
+        )
+
+    @classmethod
+    def figure_eight(
+        cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
+    ) -> Motion:
+        """The figure-eight of section 4.4: A S cos(Omega t), A S sin(2 Omega t), [m], [rad/s]; S over `lead_in` [s]."""
+        period = 2 * np.pi / positive("angular_frequency", angular_frequency)
+        return cls._enveloped(
+            amplitude, [(1.0, 1.0, np.pi / 2), (1.0, 2.0, 0.0)], period, cycles, lead_in, name, "figure-eight"
+        )
+
+    @classmethod
+    def _enveloped(
+        cls,
+        amplitude: float,
+        waves: list[tuple[float, float, float]],
+        period: float,
+        cycles: float,
+        lead_in: float,
+        name: str,
+        source: str,
+    ) -> Motion:
+        """Sines under the smooth start: for u_g1 and u_g2 (share of the amplitude, multiple of 1/period, phase)."""
+        amplitude = positive("amplitude", amplitude)
+        rise = positive("lead_in", lead_in)
+        duration = rise + positive("cycles", cycles) * period
+        shortest = period / max(multiple for _, multiple, _ in waves)
+        knots = waveforms.sampling(rise, duration, shortest)
+        envelope = waveforms.smoothstep(knots, rise)
+        rows = np.zeros((3, len(knots), 6))
+        for channel, (share, multiple, phase) in enumerate(waves):
+            sine = waveforms.sine(knots, 2 * np.pi * multiple / period, phase)
+            rows[:, :, channel] = amplitude * share * np.array(waveforms.product(envelope, sine))
+        metadata = {"source": source, "amplitude": amplitude, "period": period, "lead_in": rise, "cycles": cycles}
+        return cls(knots, piecewise.hermite5(knots, *rows), max_step=shortest / 40, name=name, metadata=metadata)
+
+    @classmethod
+    def ramp(cls, acceleration: float, duration: float, *, direction: float = 0.0, name: str = "") -> Motion:
+        """Constant acceleration [m/s^2] for `duration` [s] from rest: u = acceleration t^2/2 (section 4.1: 0.1).
+
+        The acceleration jumps at the start, where every run begins anyway, and ends moving: it cannot be `held`.
+        """
+        knots = np.array([0.0, positive("duration", duration)])
+        pieces = np.zeros((1, 6, piecewise.ORDER))
+        half = positive("acceleration", acceleration) / 2
+        pieces[0, :2, 2] = half * np.cos(direction), half * np.sin(direction)
+        return cls(knots, pieces, name=name, metadata={"source": "ramp", "acceleration": acceleration})
+
+    @classmethod
+    def from_record(
+        cls,
+        record: Record,
+        *,
+        scale: float = 1.0,
+        start: float | None = None,
+        duration: float | None = None,
+        name: str | None = None,
+    ) -> Motion:
+        """A recorded acceleration, baseline corrected (`records.baseline_corrected`), as displacement from rest.
+
+        Args:
+            record: from `records.read_record` or `records.bundled`.
+            scale: multiplies the motion.
+            start: first time kept [s]; None with a duration: its strongest part by Arias intensity.
+            duration: length kept [s]; None: to the end.
+            name: a label; None: the record's.
+        """
+        from msfp_gen.records import baseline_corrected
+
+        corrected = baseline_corrected(record, start=start, duration=duration)
+        rates = np.zeros((2, len(corrected.time), 6))
+        rates[:, :, :3] = positive("scale", scale) * np.array([corrected.velocity, corrected.acceleration])
+        pieces = piecewise.from_rates(corrected.time, *rates)
+        return cls(
+            corrected.time,
+            pieces,
+            max_step=2 * record.time_step,
+            name=record.name if name is None else name,
+            metadata={**corrected.metadata, "scale": scale},
+        )
+
+    @classmethod
+    def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:
+        """A table of time with displacements or accelerations and units in its header: see `records.read_table`."""
+        from msfp_gen.records import read_table
+
+        table = read_table(path)
+        build: Callable[..., Motion] = cls.from_arrays if table.quantity == "displacement" else cls.from_acceleration
+        return build(table.time, table.values, name=name or table.name)
