@@ -6,10 +6,13 @@ values and live elsewhere: changing them never recompiles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Literal, get_args, get_type_hints
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from msfp_gen.errors import InputError
+from msfp_gen.fields import Quantity, check_fields
+
+_COUNT = Quantity("", least=0, whole=True)
 
 
 @dataclass(frozen=True)
@@ -19,17 +22,12 @@ class Layout:
     Raises InputError unless n = m + p + 1 and n >= 2.
     """
 
-    n: int
-    m: int
-    p: int
+    n: Annotated[int, _COUNT]
+    m: Annotated[int, _COUNT]
+    p: Annotated[int, _COUNT]
 
     def __post_init__(self) -> None:
-        for name in ("n", "m", "p"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int):
-                raise InputError(f"layout.{name} = {value!r}: give a whole number")
-            if value < 0:
-                raise InputError(f"layout.{name} = {value}: give a number that is not negative")
+        check_fields(self, "layout")
         if self.n < 2:
             raise InputError(f"layout.n = {self.n}: a bearing needs at least 2 bodies, a base and a top plate")
         if self.n != self.m + self.p + 1:
@@ -84,13 +82,7 @@ class Effects:
     friction: Literal["constant"] = "constant"
 
     def __post_init__(self) -> None:
-        hints = get_type_hints(type(self))
-        for field in fields(self):
-            value = getattr(self, field.name)
-            choices = get_args(hints[field.name]) or (True, False)
-            if not any(value is choice or (isinstance(value, str) and value == choice) for choice in choices):
-                words = ", ".join(repr(choice) for choice in choices)
-                raise InputError(f"effects.{field.name} = {value!r}: give one of {words}")
+        check_fields(self, "effects")
         if self.sliders == "massless" and self.spin == "free":
             raise InputError(
                 "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
