@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen import piecewise, waveforms
+from msfp_gen import piecewise, samples, waveforms
 from msfp_gen.errors import InputError
-from msfp_gen.motion_checks import checked_pieces, positive, series
-from msfp_gen.piecewise import Array
+from msfp_gen.motion_checks import checked_pieces, positive
+from msfp_gen.piecewise import Array, Metadata, Pieces
 
 if TYPE_CHECKING:
     from os import PathLike
 
     from msfp_gen.records import Record
 
-Metadata = Mapping[str, str | float]
 CHANNELS = ("u_g1", "u_g2", "u_g3", "psi_1", "theta_1", "phi_1")
-_REST = 1e-3  # a sampled end slower than this share of the peak velocity is taken to be at rest
+# Which of psi_1, theta_1, phi_1 turn -> the only plane such rocking stays in, and the channel across that plane.
+_ROCKING_PLANES: dict[tuple[bool, ...], tuple[float, int]] = {(False, True, False): (0.0, 1), (True, False, False): (np.pi / 2, 0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,22 +115,15 @@ class Motion:
         Vertical motion alone lies in every plane and gives 0. A rocking base stays in a plane only when it turns
         about E2 (plane 0) or about E1 (plane pi/2) and about nothing else.
         """
-        scaled = self.coefficients * np.diff(self.knots)[:, None, None] ** np.arange(piecewise.ORDER)
-        scaled[:, :, 0] -= self.coefficients[0, :, 0]
-        east, north = scaled[:, 0].ravel(), scaled[:, 1].ravel()
-        psi, theta, phi = (bool(np.any(self.coefficients[:, c])) for c in (3, 4, 5))
-        if phi or (psi and theta):
+        moving = self.coefficients.copy()
+        moving[:, :, 0] -= moving[0, :, 0]
+        turning = tuple(bool(t) for t in np.any(self.coefficients[:, 3:], axis=(0, 2)))
+        if not any(turning):
+            return piecewise.azimuth(self.knots, moving[:, :2])
+        if turning not in _ROCKING_PLANES:
             return None
-        if psi or theta:
-            return (np.pi / 2 if psi else 0.0) if not np.any(east if psi else north) else None
-        _, sizes, directions = np.linalg.svd(np.stack([east, north], axis=1), full_matrices=False)
-        if sizes[0] == 0:
-            return 0.0
-        if sizes[1] > 1e-12 * sizes[0]:
-            return None
-        azimuth = float(np.arctan2(directions[0, 1], directions[0, 0]))
-        azimuth -= np.pi * round(azimuth / np.pi)
-        return azimuth if azimuth > -np.pi / 2 + 1e-12 else azimuth + np.pi
+        azimuth, across = _ROCKING_PLANES[turning]
+        return None if np.any(moving[:, across]) else azimuth
 
     def rotated(self, angle: float) -> Motion:
         """The motion with its horizontal channels turned by `angle` [rad] about E3, from E1 towards E2.
@@ -146,7 +139,7 @@ class Motion:
         coefficients = self.coefficients.copy()
         coefficients[:, 0] = c * self.coefficients[:, 0] - s * self.coefficients[:, 1]
         coefficients[:, 1] = s * self.coefficients[:, 0] + c * self.coefficients[:, 1]
-        return self._with(coefficients=coefficients)
+        return replace(self, coefficients=coefficients)
 
     def held(self, duration: float) -> Motion:
         """The motion, then a rest of `duration` [s] where it ended, for free vibration.
@@ -165,7 +158,8 @@ class Motion:
             )
         rest = np.zeros((1, 6, piecewise.ORDER))
         rest[0, :, 0] = end
-        return self._with(
+        return replace(
+            self,
             knots=np.append(self.knots, self.duration + duration),
             coefficients=np.concatenate([self.coefficients, rest]),
             jumps=np.append(self.jumps, self.duration) if np.any(self.evaluate(self.duration, 2)) else self.jumps,
@@ -192,10 +186,9 @@ class Motion:
             {**other.metadata, **self.metadata},
         )
 
-    def _with(self, **changes: Any) -> Motion:
-        from dataclasses import replace
-
-        return replace(self, **changes)
+    @classmethod
+    def _of(cls, pieces: Pieces, name: str) -> Motion:
+        return cls(pieces.knots, pieces.coefficients, max_step=pieces.max_step, name=name, metadata=pieces.metadata)
 
     @classmethod
     def from_arrays(
@@ -213,26 +206,7 @@ class Motion:
             rotation: shape (k, 3), [rad], or None for a base that does not turn.
             name: a label.
         """
-        from scipy.interpolate import CubicSpline
-
-        moved, start = series("time", time), {}
-        columns = [series("displacement", displacement, (len(moved), 3))]
-        columns.append(np.zeros_like(columns[0]) if rotation is None else series("rotation", rotation, (len(moved), 3)))
-        values = np.concatenate(columns, axis=1)
-        if moved[0] != 0:
-            start = {"start_time": float(moved[0])}
-            moved = moved - moved[0]
-        free = CubicSpline(moved, values)
-        slopes, peak = free(moved[[0, -1]], 1), np.max(np.abs(free(moved, 1)), axis=0)
-        pieces = np.zeros((len(moved) - 1, 6, piecewise.ORDER))
-        for channel in range(6):
-            rest = np.abs(slopes[:, channel]) <= _REST * peak[channel]
-            ends = tuple((1, 0.0) if r else "not-a-knot" for r in rest)
-            spline = CubicSpline(moved, values[:, channel], bc_type=ends)
-            pieces[:, channel, :4] = spline.c[::-1].T
-        speed = float(np.linalg.norm(pieces[0, :3, 1]))
-        metadata = {"source": "displacement samples, cubic spline", "initial_speed": speed, **start}
-        return cls(moved, pieces, max_step=2 * float(np.median(np.diff(moved))), name=name, metadata=metadata)
+        return cls._of(samples.spline(time, displacement, rotation), name)
 
     @classmethod
     def from_acceleration(cls, time: ArrayLike, acceleration: ArrayLike, *, name: str = "") -> Motion:
@@ -243,18 +217,7 @@ class Motion:
             acceleration: shape (k, 3), [m/s^2]; a first value other than zero is a jump at the start of the run.
             name: a label.
         """
-        times = series("time", time)
-        values = series("acceleration", acceleration, (len(times), 3))
-        rate = np.zeros((len(times), 6))
-        rate[:, :3] = values
-        steps = np.diff(times)[:, None] * (rate[1:] + rate[:-1]) / 2
-        velocity = np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
-        moved = times - times[0]
-        metadata: dict[str, str | float] = {"source": "piecewise linear acceleration"}
-        if times[0] != 0:
-            metadata["start_time"] = float(times[0])
-        pieces = piecewise.from_rates(moved, velocity, rate)
-        return cls(moved, pieces, max_step=2 * float(np.median(np.diff(moved))), name=name, metadata=metadata)
+        return cls._of(samples.integrated(time, acceleration), name)
 
     @classmethod
     def harmonic(
@@ -282,10 +245,8 @@ class Motion:
         """
         period = 1 / positive("frequency", frequency)
         rise = period / 4 if lead_in is None else lead_in
-        unit = (np.cos(direction), np.sin(direction))
-        return cls._enveloped(
-            amplitude, [(unit[0], 1.0, 0.0), (unit[1], 1.0, 0.0)], period, cycles, rise, name, "harmonic"
-        )
+        sines = [(np.cos(direction), 1.0, 0.0), (np.sin(direction), 1.0, 0.0)]
+        return cls._of(waveforms.enveloped(amplitude, sines, period, cycles, rise), name)
 
     @classmethod
     def circle(
@@ -293,9 +254,8 @@ class Motion:
     ) -> Motion:
         """The circular orbit of section 4.4: A S cos(Omega t), A S sin(Omega t), [m], [rad/s]; S over `lead_in` [s]."""
         period = 2 * np.pi / positive("angular_frequency", angular_frequency)
-        return cls._enveloped(
-            amplitude, [(1.0, 1.0, np.pi / 2), (1.0, 1.0, 0.0)], period, cycles, lead_in, name, "circle"
-        )
+        sines = [(1.0, 1.0, np.pi / 2), (1.0, 1.0, 0.0)]
+        return cls._of(waveforms.enveloped(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
     def figure_eight(
@@ -303,34 +263,8 @@ class Motion:
     ) -> Motion:
         """The figure-eight of section 4.4: A S cos(Omega t), A S sin(2 Omega t), [m], [rad/s]; S over `lead_in` [s]."""
         period = 2 * np.pi / positive("angular_frequency", angular_frequency)
-        return cls._enveloped(
-            amplitude, [(1.0, 1.0, np.pi / 2), (1.0, 2.0, 0.0)], period, cycles, lead_in, name, "figure-eight"
-        )
-
-    @classmethod
-    def _enveloped(
-        cls,
-        amplitude: float,
-        waves: list[tuple[float, float, float]],
-        period: float,
-        cycles: float,
-        lead_in: float,
-        name: str,
-        source: str,
-    ) -> Motion:
-        """Sines under the smooth start: for u_g1 and u_g2 (share of the amplitude, multiple of 1/period, phase)."""
-        amplitude = positive("amplitude", amplitude)
-        rise = positive("lead_in", lead_in)
-        duration = rise + positive("cycles", cycles) * period
-        shortest = period / max(multiple for _, multiple, _ in waves)
-        knots = waveforms.sampling(rise, duration, shortest)
-        envelope = waveforms.smoothstep(knots, rise)
-        rows = np.zeros((3, len(knots), 6))
-        for channel, (share, multiple, phase) in enumerate(waves):
-            sine = waveforms.sine(knots, 2 * np.pi * multiple / period, phase)
-            rows[:, :, channel] = amplitude * share * np.array(waveforms.product(envelope, sine))
-        metadata = {"source": source, "amplitude": amplitude, "period": period, "lead_in": rise, "cycles": cycles}
-        return cls(knots, piecewise.hermite5(knots, *rows), max_step=shortest / 40, name=name, metadata=metadata)
+        sines = [(1.0, 1.0, np.pi / 2), (1.0, 2.0, 0.0)]
+        return cls._of(waveforms.enveloped(amplitude, sines, period, cycles, lead_in), name)
 
     @classmethod
     def ramp(cls, acceleration: float, duration: float, *, direction: float = 0.0, name: str = "") -> Motion:
@@ -366,16 +300,7 @@ class Motion:
         from msfp_gen.records import baseline_corrected
 
         corrected = baseline_corrected(record, start=start, duration=duration)
-        rates = np.zeros((2, len(corrected.time), 6))
-        rates[:, :, :3] = positive("scale", scale) * np.array([corrected.velocity, corrected.acceleration])
-        pieces = piecewise.from_rates(corrected.time, *rates)
-        return cls(
-            corrected.time,
-            pieces,
-            max_step=2 * record.time_step,
-            name=record.name if name is None else name,
-            metadata={**corrected.metadata, "scale": scale},
-        )
+        return cls._of(samples.recorded(corrected, scale), record.name if name is None else name)
 
     @classmethod
     def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:

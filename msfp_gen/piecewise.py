@@ -6,13 +6,26 @@ channel, ascending power of (t - knots[piece]).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import factorial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Metadata = Mapping[str, str | float]
 ORDER = 6  # coefficients of a quintic
+
+
+class Pieces(NamedTuple):
+    """What a constructor of a motion works out: pieces, the longest step [s] that resolves them, and their origin."""
+
+    knots: Array
+    coefficients: Array
+    max_step: float | None
+    metadata: Metadata
+
 
 # (power choose derivative) * derivative!: the factor that differentiation leaves on each power.
 _FALLING = np.array([[factorial(j) / factorial(j - d) if j >= d else 0.0 for j in range(ORDER)] for d in range(ORDER)])
@@ -82,3 +95,19 @@ def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Arra
     short = np.minimum(h[:-1], h[1:])[:, None]
     allowance = 1e-9 * largest + 64 * np.finfo(float).eps * level / short**derivative
     return right - left, allowance
+
+
+def azimuth(knots: Array, horizontal: Array) -> float | None:
+    """Direction [rad], in (-pi/2, pi/2], of a straight horizontal motion; 0 if it stands still, None if not straight.
+
+    `horizontal` has shape (k, 2, 6), with displacements counted from the start of the motion.
+    """
+    scaled = horizontal * np.diff(knots)[:, None, None] ** np.arange(ORDER)
+    _, sizes, directions = np.linalg.svd(scaled.transpose(0, 2, 1).reshape(-1, 2), full_matrices=False)
+    if sizes[1] > 1e-12 * sizes[0]:
+        return None
+    if sizes[0] == 0:
+        return 0.0
+    angle = float(np.arctan2(directions[0, 1], directions[0, 0]))
+    angle -= np.pi * round(angle / np.pi)
+    return angle if angle > -np.pi / 2 + 1e-12 else angle + np.pi

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from msfp_gen.piecewise import Array
+from msfp_gen.motion_checks import positive
+from msfp_gen.piecewise import Array, Pieces, hermite5
 
 Wave = tuple[Array, Array, Array]
 
@@ -44,3 +45,22 @@ def sampling(rise: float, duration: float, shortest_period: float) -> Array:
     start = np.linspace(0.0, rise, 1 + max(128, int(np.ceil(rise / step))))
     rest = np.linspace(rise, duration, 1 + max(1, int(np.ceil((duration - rise) / step))))
     return np.concatenate([start, rest[1:]])
+
+
+def enveloped(
+    amplitude: float, sines: list[tuple[float, float, float]], period: float, cycles: float, lead_in: float
+) -> Pieces:
+    """Sines under the smooth start; for u_g1, u_g2: (share of the amplitude, frequency times period, phase [rad])."""
+    amplitude = positive("amplitude", amplitude)
+    rise = positive("lead_in", lead_in)
+    duration = rise + positive("cycles", cycles) * period
+    shortest = period / max(multiple for _, multiple, _ in sines)
+    knots = sampling(rise, duration, shortest)
+    envelope = smoothstep(knots, rise)
+    rows = np.zeros((3, len(knots), 6))
+    for channel, (share, multiple, phase) in enumerate(sines):
+        wave = sine(knots, 2 * np.pi * multiple / period, phase)
+        rows[:, :, channel] = amplitude * share * np.array(product(envelope, wave))
+    metadata: dict[str, str | float] = {"source": "smooth start and sines", "amplitude": amplitude, "period": period}
+    metadata |= {"lead_in": rise, "cycles": float(cycles)}
+    return Pieces(knots, hermite5(knots, *rows), shortest / 40, metadata)
