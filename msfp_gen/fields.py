@@ -58,7 +58,7 @@ class Quantity:
         low = (self.above is not None and number <= self.above) or (self.least is not None and number < self.least)
         if low or not math.isfinite(number):
             raise ValueError(self._remedy())
-        return number  # type: ignore[no-any-return]
+        return number
 
     def _remedy(self) -> str:
         counts = ["any number of" if count is None else str(count) for count in self.shape]

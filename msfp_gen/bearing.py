@@ -1,0 +1,214 @@
+"""The numbers of one bearing: lengths, masses, friction. Values, so changing them never recompiles a model.
+
+Everything is SI. Paths in messages count surfaces and bodies from zero as the lists do; the report's number follows in
+brackets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
+from dataclasses import replace as dataclass_replace
+from math import asin, pi
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.errors import InputError
+from msfp_gen.fields import Quantity, check_fields, require_type
+from msfp_gen.layout import Layout
+
+_LENGTH = Quantity("m", above=0.0)
+_OFFSET = Quantity("m", least=0.0)
+_INERTIA = Quantity("kg m^2", above=0.0, shape=(2,), pair=True)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One sliding surface gamma; all numbers are finite.
+
+    radius: R, of the sphere [m]. capacity: s_c, the arc at which the rim is met (2.101) [m]. friction: mu.
+    yield_displacement: d_y of the Bouc-Wen law [m]; the report's R_gamma/R_0 (2.94) with its numbers in SI is 1/d_y.
+    rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103). Raises InputError.
+    """
+
+    radius: Annotated[float, _LENGTH]
+    capacity: Annotated[float, _LENGTH]
+    friction: Annotated[float, Quantity("", least=0.0)]
+    yield_displacement: Annotated[float, _LENGTH]
+    rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
+    rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, "surface")
+
+
+@dataclass(frozen=True)
+class Body:
+    """One moving body k = 2..n, axisymmetric; all numbers are finite.
+
+    height: l, between the middles of its faces [m]. centroid: z, of the centre of mass, measured from the bottom where
+    the lower face is concave up (3.6) and from the top where it is concave down (3.10) [m]. mass [kg].
+    inertia: J, (transverse, axial) about the centre of mass, or one number for both [kg m^2].
+    rim_radius, rim_offset: r and p, where the body meets the rim of a surface (3.25) [m]. Raises InputError.
+    """
+
+    height: Annotated[float, _LENGTH]
+    centroid: Annotated[float, _OFFSET]
+    mass: Annotated[float, Quantity("kg", above=0.0)]
+    inertia: Annotated[tuple[float, float] | float, _INERTIA]
+    rim_radius: Annotated[float, _OFFSET] = 0.0
+    rim_offset: Annotated[float, _OFFSET] = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, "body")
+        if self.centroid > self.height:
+            raise InputError(f"body.centroid = {self.centroid}: give at most the height of the body, {self.height} [m]")
+        if self.rim_offset > self.height:
+            raise InputError(
+                f"body.rim_offset = {self.rim_offset}: give at most the height of the body, {self.height} [m]"
+            )
+        transverse, axial = self.moments
+        if axial > 2 * transverse:
+            raise InputError(
+                f"body.inertia = {self.inertia}: no mass has an axial moment above twice its transverse one; "
+                "give (transverse, axial) [kg m^2]"
+            )
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """(transverse, axial) moments of inertia [kg m^2]."""
+        assert isinstance(self.inertia, tuple)  # check_fields spread a single number
+        return self.inertia
+
+
+_LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A stack of `layout`: n - 1 surfaces, and the bodies 2..n above the base (body 1), bottom first.
+
+    base_height: l_1 [m]. gravity: g [m/s^2]. base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface
+    is concave down [m]. base_centroid: z_1, only names the point r_1 (3.2); None: half the height [m].
+    Raises InputError: a wrong count, a number out of range, or a geometry that cannot be built.
+    """
+
+    layout: Layout
+    base_height: Annotated[float, _LENGTH]
+    surfaces: Sequence[Surface]
+    bodies: Sequence[Body]
+    gravity: Annotated[float, Quantity("m/s^2", least=0.0)] = 9.8
+    base_rim_radius: Annotated[float, _OFFSET] = 0.0
+    base_rim_offset: Annotated[float, _OFFSET] = 0.0
+    base_centroid: Annotated[float | None, _OFFSET] = None
+
+    def __post_init__(self) -> None:
+        require_type(self.layout, Layout, "bearing.layout")
+        check_fields(self, "bearing")
+        for name, kind in _LISTS.items():
+            self._check_list(name, kind)
+        for name in ("base_centroid", "base_rim_offset"):
+            value = getattr(self, name)
+            if value is not None and value > self.base_height:
+                raise InputError(f"bearing.{name} = {value}: give at most base_height = {self.base_height} [m]")
+        for index in range(self.layout.surfaces):
+            self._check_geometry(index)
+
+    def _check_list(self, name: str, kind: type) -> None:
+        items = getattr(self, name)
+        path = f"bearing.{name}"
+        if isinstance(items, str) or not isinstance(items, Iterable):
+            raise InputError(f"{path} = {items!r}: give a list of {kind.__name__}")
+        items = tuple(items)
+        for index, item in enumerate(items):
+            require_type(item, kind, f"{path}[{index}]")
+        count = self.layout.surfaces
+        if len(items) != count:
+            meaning = "one per sliding surface" if kind is Surface else "bodies 2..n; the base is base_height"
+            raise InputError(f"{path} has {len(items)} entries: layout {self.layout.name} needs {count}, {meaning}")
+        object.__setattr__(self, name, items)
+
+    def slider(self, surface: int) -> int:
+        """Index 0..n-1, base first, of the body whose convex face slides in a surface (index from 0) and meets its rim.
+
+        The body above a concave-up surface, the body below a concave-down one (3.25).
+        """
+        return surface + 1 if self.layout.signs[surface] > 0 else surface
+
+    def slider_rim_radius(self, surface: int) -> float:
+        """Rim radius r [m] of the slider of a surface (index from 0)."""
+        body = self.slider(surface)
+        return self.bodies[body - 1].rim_radius if body else self.base_rim_radius
+
+    def _check_geometry(self, index: int) -> None:
+        surface, rim, body = self.surfaces[index], self.slider_rim_radius(index), self.slider(index)
+        radius, path = surface.radius, f"bearing.surfaces[{index}]"
+        if surface.capacity >= pi / 2 * radius:
+            raise InputError(
+                f"{path}.capacity = {surface.capacity} (surface {index + 1}): a sphere of radius {radius} m allows "
+                f"less than a quarter turn, {pi / 2 * radius:.6g} [m]"
+            )
+        if rim >= radius:
+            field = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
+            raise InputError(
+                f"{field} = {rim} (body {body + 1}): give less than the radius of the surface it slides in, "
+                f"{path}.radius = {radius} [m]"
+            )
+        if asin(rim / radius) + surface.capacity / radius >= pi / 2:
+            raise InputError(
+                f"{path}.capacity = {surface.capacity} (surface {index + 1}): the rim of body {body + 1}, of radius "
+                f"{rim} m, would leave the hemisphere; give less than {radius * (pi / 2 - asin(rim / radius)):.6g} [m]"
+            )
+
+    def replace(self, **changes: Any) -> Bearing:
+        """A copy with some values changed: fields of the bearing, or of all surfaces or bodies by column.
+
+        A column is a list, bottom first (`friction=[0.064, 0.168, 0.168, 0.064]`), or one value for all. Raises
+        InputError: an unknown name, a list of the wrong length, or a value that is refused.
+        """
+        owner = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
+        whole = {name: value for name, value in changes.items() if name in _names(Bearing)}
+        rows = {name: list(whole.get(name, getattr(self, name))) for name in _LISTS}
+        for column, value in changes.items():
+            if column in whole:
+                continue
+            if column not in owner:
+                known = ", ".join([*_names(Bearing), *owner])
+                raise InputError(f"bearing.{column}: unknown name; give one of {known}")
+            items = rows[owner[column]]
+            values = _spread(column, value, len(items))
+            items[:] = [dataclass_replace(item, **{column: each}) for item, each in zip(items, values, strict=True)]
+        return dataclass_replace(self, **{**whole, **rows})
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """All numbers as float64 arrays.
+
+        Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping. Per body,
+        shape (n,), base first with mass and inertia 0: height, centroid, mass, inertia_transverse, inertia_axial,
+        rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
+        """
+        base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
+        base = (self.base_height, base_centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
+        rows = [(b.height, b.centroid, b.mass, *b.moments, b.rim_radius, b.rim_offset) for b in self.bodies]
+        names = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
+        arrays = dict(zip(names, np.array([base, *rows]).T.copy(), strict=True))
+        for name in _names(Surface):
+            arrays[name] = np.array([getattr(surface, name) for surface in self.surfaces])
+        return {**arrays, "gravity": np.array(self.gravity)}
+
+
+def _names(kind: type) -> list[str]:
+    return [field.name for field in dataclass_fields(kind)]
+
+
+def _spread(column: str, value: Any, count: int) -> list[Any]:
+    """One entry per row; a number stands for all rows, and so does one (transverse, axial) pair."""
+    many = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    if not many or (column == "inertia" and isinstance(value[0], int | float)):
+        return [value] * count
+    if len(value) != count:
+        raise InputError(f"bearing.{column} has {len(value)} entries: give {count}, or one value for all")
+    return list(value)

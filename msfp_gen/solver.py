@@ -1,0 +1,41 @@
+"""How a run is integrated: the method and its tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msfp_gen.errors import InputError
+from msfp_gen.fields import Quantity, check_fields
+
+_TIME = Quantity("s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Settings of the integrator.
+
+    method: "implicit" (L-stable, states and unknowns together) or "dopri5" (the report's Dormand-Prince).
+    rtol: relative tolerance, below 1. atol_angle: absolute tolerance of angles [rad]; None: a hundredth of rtol.
+    max_step, first_step [s]; None: what the motion resolves, and what the method finds. max_steps: give up beyond.
+    Raises InputError.
+    """
+
+    method: Literal["implicit", "dopri5"] = "implicit"
+    rtol: Annotated[float, Quantity("", above=0.0)] = 1e-4
+    atol_angle: Annotated[float | None, Quantity("rad", above=0.0)] = None
+    max_step: Annotated[float | None, _TIME] = None
+    first_step: Annotated[float | None, _TIME] = None
+    max_steps: Annotated[int, Quantity("", above=0, whole=True)] = 10_000_000
+
+    def __post_init__(self) -> None:
+        check_fields(self, "solver")
+        if self.rtol >= 1:
+            raise InputError(f"solver.rtol = {self.rtol}: give a number below 1, such as 1e-4")
+        if self.max_step is not None and self.first_step is not None and self.first_step > self.max_step:
+            raise InputError(f"solver.first_step = {self.first_step}: give at most max_step = {self.max_step} [s]")
+
+    @property
+    def angle_tolerance(self) -> float:
+        """Absolute tolerance of angles in force [rad]."""
+        return 1e-2 * self.rtol if self.atol_angle is None else self.atol_angle
