@@ -170,18 +170,17 @@ class Bearing:
         InputError: an unknown name, a list of the wrong length, or a value that is refused.
         """
         owner = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
-        whole = {name: value for name, value in changes.items() if name in _names(Bearing)}
-        rows = {name: list(whole.get(name, getattr(self, name))) for name in _LISTS}
+        whole = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
+        base = dataclass_replace(self, **whole)
+        rows = {name: list(getattr(base, name)) for name in _LISTS}
         for column, value in changes.items():
-            if column in whole:
-                continue
             if column not in owner:
                 known = ", ".join([*_names(Bearing), *owner])
                 raise InputError(f"bearing.{column}: unknown name; give one of {known}")
             items = rows[owner[column]]
             values = _spread(column, value, len(items))
             items[:] = [dataclass_replace(item, **{column: each}) for item, each in zip(items, values, strict=True)]
-        return dataclass_replace(self, **{**whole, **rows})
+        return dataclass_replace(base, **rows)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All numbers as float64 arrays.

@@ -1,0 +1,162 @@
+"""One run, complete: a bearing, the motion of its base, what stands on it, what is modelled and how it is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import cos, isclose, sin
+from typing import Annotated, Any
+
+from msfp_gen.bearing import Bearing
+from msfp_gen.errors import InputError
+from msfp_gen.fields import Quantity, check_fields, require_type
+from msfp_gen.layout import Effects, ModelSpec
+from msfp_gen.motion import Motion
+from msfp_gen.solver import Solver
+from msfp_gen.top import PrescribedTop, Top
+
+_TIME = Quantity("s", above=0.0)
+Triples = tuple[tuple[float, float, float], ...]
+Pairs = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """Where a run starts, as nested tuples; arrays and lists are taken too.
+
+    q: angles psi, theta, phi of bodies 2..n, shape (n-1, 3) [rad]. v: their rates [rad/s].
+    h: Bouc-Wen Y, Z of each surface, shape (n-1, 2), within the unit disc. Raises InputError.
+    """
+
+    q: Annotated[Triples, Quantity("rad", shape=(None, 3))]
+    v: Annotated[Triples, Quantity("rad/s", shape=(None, 3))]
+    h: Annotated[Pairs, Quantity("", shape=(None, 2))]
+
+    def __post_init__(self) -> None:
+        check_fields(self, "initial_state")
+        for index, (first, second) in enumerate(self.h):
+            if first**2 + second**2 > 1 + 1e-9:
+                raise InputError(
+                    f"initial_state.h[{index}] = {(first, second)}: friction cannot exceed mu N; give Y^2 + Z^2 <= 1"
+                )
+
+
+@dataclass(frozen=True)
+class Stop:
+    """What ends a run before its duration.
+
+    displacement: across the bearing, horizontally [m]. all_rims: every rim is in contact. Raises InputError.
+    """
+
+    displacement: Annotated[float | None, Quantity("m", above=0.0)] = None
+    all_rims: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(self, "stop")
+        if self.displacement is None and not self.all_rims:
+            raise InputError("stop: nothing to stop at; give displacement [m] or all_rims = true")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything `simulate` needs.
+
+    duration [s]; None: as long as the motion. initial_state; None: centred and at rest. output_step [s]; None: the
+    solver's own steps. stop: what ends the run early. motion_table: the motion as a scene file writes it, kept so that
+    the scene can be written back. Raises InputError: a part of the wrong kind, or parts that do not fit together.
+    """
+
+    bearing: Bearing
+    motion: Motion
+    top: Top
+    effects: Effects = Effects()
+    solver: Solver = Solver()
+    duration: Annotated[float | None, _TIME] = None
+    initial_state: InitialState | None = None
+    output_step: Annotated[float | None, _TIME] = None
+    stop: Stop | None = None
+    name: str = ""
+    motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, kind in _KINDS.items():
+            require_type(getattr(self, name), kind, f"scene.{name}")
+        check_fields(self, "scene")
+        self._check_times()
+        self._check_sizes()
+        if self.effects.rims:
+            self._check_rims()
+        elif self.stop is not None and self.stop.all_rims:
+            raise InputError("stop.all_rims = True: effects.rims = False models no rims; give rims = true")
+        if self.effects.dimension == "planar":
+            self._check_plane()
+
+    @property
+    def spec(self) -> ModelSpec:
+        """Which model the run needs."""
+        return ModelSpec(self.bearing.layout, self.effects)
+
+    @property
+    def end(self) -> float:
+        """Time at which the run ends at the latest [s]."""
+        return self.motion.duration if self.duration is None else self.duration
+
+    def _check_times(self) -> None:
+        if self.end > self.motion.duration * (1 + 1e-12):
+            raise InputError(
+                f"duration = {self.end}: the motion lasts {self.motion.duration:.12g} s; give at most that, or hold "
+                "the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
+            )
+        if self.output_step is not None and self.output_step > self.end:
+            raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")
+
+    def _check_sizes(self) -> None:
+        state, count = self.initial_state, self.bearing.layout.surfaces
+        for name in ("q", "v", "h") if state is not None else ():
+            rows = len(getattr(state, name))
+            if rows != count:
+                layout = self.bearing.layout.name
+                raise InputError(f"initial_state.{name} has {rows} rows: layout {layout} needs {count}")
+
+    def _check_rims(self) -> None:
+        for index, surface in enumerate(self.bearing.surfaces):
+            body = self.bearing.slider(index)
+            if self.bearing.slider_rim_radius(index) == 0:
+                field = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
+                raise InputError(
+                    f"{field} = 0 (body {body + 1}): this body meets the rim of surface {index + 1}; give the radius "
+                    "of its rim [m], or effects.rims = false"
+                )
+            if surface.rim_stiffness == 0:
+                raise InputError(
+                    f"bearing.surfaces[{index}].rim_stiffness = 0 (surface {index + 1}): such a rim stops nothing; "
+                    "give a stiffness [N/m], or effects.rims = false"
+                )
+
+    def _check_plane(self) -> None:
+        plane = self.motion.plane()
+        remedy = "give effects.dimension = 'spatial'"
+        if plane is None:
+            raise InputError(f"effects.dimension = 'planar': the motion lies in no vertical plane; {remedy}")
+        if not isinstance(self.top, PrescribedTop):
+            return
+        (f1, f2, _), (m1, m2, m3) = self.top.force, self.top.moment
+        out_of_plane = (f2 * cos(plane) - f1 * sin(plane), m1 * cos(plane) + m2 * sin(plane), m3)
+        scales = (abs(f1) + abs(f2), abs(m1) + abs(m2), 0.0)
+        if not all(isclose(part, 0.0, abs_tol=1e-12 * scale) for part, scale in zip(out_of_plane, scales, strict=True)):
+            raise InputError(
+                f"top.force = {self.top.force}, top.moment = {self.top.moment}: they leave the vertical plane of the "
+                f"motion, at azimuth {plane:.6g} rad; {remedy}"
+            )
+
+
+_KINDS: dict[str, type | tuple[type, ...]] = {
+    "bearing": Bearing,
+    "motion": Motion,
+    "top": Top,
+    "effects": Effects,
+    "solver": Solver,
+    "initial_state": (InitialState, type(None)),
+    "stop": (Stop, type(None)),
+    "name": str,
+}
