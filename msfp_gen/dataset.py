@@ -1,0 +1,107 @@
+"""A result as an xarray.Dataset, and that as a netCDF-4 file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.history import ENERGY, LABELS, History, quantities
+from msfp_gen.output import DATASET_SUFFIXES, check_output, replacing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.result import Result
+
+Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
+
+
+def to_dataset(result: Result) -> xr.Dataset:
+    """The rows of `result` along `time`, its events along `event`, and where they came from in the attributes."""
+    import xarray as xr
+
+    history = result.history
+    coordinates = {
+        "time": ("time", history.time, {"units": "s", "long_name": "time t"}),
+        "body": ("body", np.arange(2, history.surfaces + 2), {"long_name": "moving body k, base is 1"}),
+        "surface": ("surface", np.arange(1, history.surfaces + 1), {"long_name": "sliding surface, bottom first"}),
+        **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
+    }
+    variables = dict([*_rows(history), *_energies(history), *_events(result)])
+    return xr.Dataset(variables, coordinates, attrs=_attributes(result))
+
+
+def write_netcdf(result: Result, path: str | Path) -> Path:
+    """Write the dataset of `result` to `path`, whole or not at all. Raises InputError for a path that cannot be."""
+    path = check_output(path, DATASET_SUFFIXES)
+    dataset = result.dataset
+    # Light compression: histories of stuck surfaces and closed rims are mostly repeats.
+    encoding = {
+        name: {"zlib": True, "complevel": 1}
+        for name, variable in dataset.data_vars.items()
+        if "time" in variable.dims and variable.size
+    }
+    with replacing(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    return path
+
+
+def read_netcdf(path: str | Path) -> xr.Dataset:
+    """The dataset that `Result.to_netcdf` wrote, in memory. Raises InputError where `path` is not such a file."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            return dataset.load()
+    except OSError as error:
+        raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
+
+
+def _rows(history: History) -> Variables:
+    for field, rows in quantities().items():
+        if field == "time":
+            continue
+        values, dims, names = getattr(history, field), ("time", *rows.dims), rows.names or (field,)
+        split = len(names) > 1  # one variable a component
+        for column, name in enumerate(names):
+            about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
+            yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+
+
+def _energies(history: History) -> Variables:
+    for name, meaning in ENERGY.items():
+        yield f"energy_{name}", (("time",), history.energy[name], {"units": "J", "long_name": meaning})
+
+
+def _events(result: Result) -> Variables:
+    events = result.events
+    vectors = (len(events), 3)
+    columns: dict[str, tuple[tuple[str, ...], Any, str, str]] = {
+        "event_time": ((), np.array([event.time for event in events], float), "s", "time of the event"),
+        "event_surface": ((), np.array([event.surface for event in events], np.int64), "1", "surface, 0 for a stop"),
+        "event_kind": ((), np.array([event.kind for event in events], dtype="<U16"), "", "what happened"),
+        "event_displacement": (
+            ("axis",), np.reshape([event.displacement for event in events], vectors), "m", "displacement u then"
+        ),
+        "event_top_force": (("axis",), np.reshape([event.top_force for event in events], vectors), "N", "F_top then"),
+    }  # fmt: skip
+    for name, (dims, values, unit, meaning) in columns.items():
+        attributes = {"long_name": meaning} | ({"units": unit} if unit else {})
+        yield name, (("event", *dims), values, attributes)
+
+
+def _attributes(result: Result) -> dict[str, str | int | float]:
+    scene = result.scene
+    return {
+        "title": scene.name or "unnamed",
+        "source": "msfp-gen",
+        "status": result.status,
+        "message": result.message,
+        **{f"counter_{name}": value for name, value in asdict(result.counters).items()},
+        **result.provenance,
+    }

@@ -1,0 +1,149 @@
+"""What a run leaves behind, as plain numpy arrays: rows of quantities, events and counters.
+
+The annotations of `History` say for every quantity its dimensions, unit and meaning; the check of shapes here and the
+dataset in `dataset.py` both read them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Literal, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.errors import InputError
+
+Array = NDArray[np.float64]
+
+# Dimensions of fixed length, and the labels along them. `body` and `surface` are as long as the stack is high.
+LABELS: dict[str, tuple[str, ...]] = {
+    "axis": ("E1", "E2", "E3"),
+    "angle": ("psi", "theta", "phi"),
+    "contact_angle": ("psi~", "theta~"),
+    "direction": ("t~1", "t~2"),
+}
+STACK = ("body", "surface")
+
+ENERGY: dict[str, str] = {
+    "input": "work done on the bearing and its top by the base motion and the loads",
+    "kinetic": "kinetic energy relative to the base",
+    "potential": "potential energy of weights and vertical loads",
+    "restraint": "energy stored in the springs of the top",
+    "friction_stored": "recoverable energy stored in friction while stuck",
+    "friction_dissipated": "energy dissipated by friction",
+    "rim_stored": "energy stored in the rims",
+    "rim_dissipated": "energy dissipated at the rims",
+    "top_dissipated": "energy dissipated by the dampers of the top",
+    "numerical": "input less everything else: what the method adds or loses",
+}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A quantity of `History`: dimensions after time, unit, meaning ({} is the name), and names in the dataset.
+
+    Without a name it is the field's own; with several, each is one component of the last dimension.
+    """
+
+    dims: tuple[str, ...]
+    unit: str
+    meaning: str
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Rows of a run, T of them. NB = n - 1 is the number of surfaces and of moving bodies (2..n).
+
+    Dimensions: `body` and `surface` have NB entries, `axis` E1, E2, E3, `angle` psi, theta, phi; see `LABELS`.
+    Raises InputError where an array has another shape or an entry that is not finite.
+    """
+
+    time: Annotated[Array, Rows((), "s", "time t")]
+    tilt_angles: Annotated[Array, Rows(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
+    tilt_rates: Annotated[Array, Rows(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
+    tilt_accelerations: Annotated[
+        Array, Rows(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
+    ]
+    friction_state: Annotated[Array, Rows(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
+    normal_force: Annotated[Array, Rows(("surface",), "N", "normal force N on the surface")]
+    contact_angles: Annotated[Array, Rows(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")]
+    sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
+    gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
+    rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
+    interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
+    slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
+    base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
+    top_displacement: Annotated[Array, Rows(("axis",), "m", "displacement of the top plate at r_nn")]
+    displacement: Annotated[
+        Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
+    ]
+    top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
+    top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
+    energy: dict[str, Array]
+
+    def __post_init__(self) -> None:
+        if not len(self.time):
+            raise InputError("history.time has no rows: give at least the start of the run")
+        surfaces = self.normal_force.shape[-1]
+        for name, rows in quantities().items():
+            self._check(name, getattr(self, name), self._shape(rows.dims, surfaces))
+        if set(self.energy) != set(ENERGY):
+            raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(ENERGY)}")
+        for name, values in self.energy.items():
+            self._check(f"energy[{name!r}]", values, (len(self.time),))
+
+    @property
+    def surfaces(self) -> int:
+        """Number of surfaces, n - 1."""
+        return int(self.normal_force.shape[1])
+
+    @property
+    def horizontal(self) -> Array:
+        """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
+        return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
+
+    def _shape(self, dims: tuple[str, ...], surfaces: int) -> tuple[int, ...]:
+        return (len(self.time), *(surfaces if dim in STACK else len(LABELS[dim]) for dim in dims))
+
+    @staticmethod
+    def _check(name: str, values: Array, shape: tuple[int, ...]) -> None:
+        if values.shape != shape:
+            raise InputError(f"history.{name} has shape {values.shape}: give {shape}")
+        if not np.isfinite(values).all():
+            row = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise InputError(f"history.{name} is not finite in row {row}: leave out rows that were not computed")
+
+
+@cache
+def quantities() -> dict[str, Rows]:
+    """What each array of `History` holds, by field."""
+    hints = get_type_hints(History, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happened at one instant: a rim met or left, or the stop asked for (surface 0)."""
+
+    time: float  # [s]
+    surface: int  # 1..n-1, bottom first
+    kind: Literal["rim_contact", "rim_release", "stop"]
+    displacement: Array  # shape (3,), [m]
+    top_force: Array  # shape (3,), [N]
+
+
+@dataclass(frozen=True)
+class Counters:
+    """The work of one run; `wall_time` in seconds."""
+
+    steps: int = 0
+    rejected_steps: int = 0
+    newton_iterations: int = 0
+    evaluations: int = 0
+    factorisations: int = 0
+    newton_failures: int = 0
+    events: int = 0
+    wall_time: float = 0.0

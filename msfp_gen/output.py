@@ -1,0 +1,44 @@
+"""Writing files: the path is judged before the work, and a file appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from secrets import token_hex
+
+from msfp_gen.errors import InputError
+
+FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
+DATASET_SUFFIXES = (".nc",)
+
+
+def check_output(path: str | Path, suffixes: Collection[str], name: str = "output") -> Path:
+    """`path` if a file of one of `suffixes` can be put there; InputError that begins with `name` otherwise."""
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{name} = {str(path)!r}: give a name that ends in {' or '.join(suffixes)}")
+    if path.is_dir():
+        raise InputError(f"{name} = {str(path)!r}: this is a folder; give a file name")
+    check_folder(path.parent, name)
+    return path
+
+
+def check_folder(folder: Path, name: str = "output") -> None:
+    """InputError unless `folder` exists and can be written to."""
+    if not folder.is_dir():
+        raise InputError(f"{name}: folder {str(folder)!r} does not exist; create it or give another")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{name}: folder {str(folder)!r} cannot be written to; give another")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path`, renamed to `path` when the block succeeds and removed when it fails."""
+    temporary = path.with_name(f".{path.stem}-{token_hex(4)}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,62 @@
+"""The result of a run: its rows, its events, and the views people ask for (dataset, summary, file)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.history import Counters, Event, History
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.scene import Scene
+
+__all__ = ["Counters", "Event", "History", "Result"]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What `simulate` gives, and what a RunError carries of a run that failed.
+
+    status: "ok", "stopped" (the scene's stop was met) or the name of a failure; message: one line in words.
+    provenance: versions and keys that say how the numbers came about.
+    """
+
+    scene: Scene
+    history: History
+    events: tuple[Event, ...] = ()
+    counters: Counters = field(default_factory=Counters)
+    status: str = "ok"
+    message: str = ""
+    provenance: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the run reached its end or the stop it was asked for."""
+        return self.status in ("ok", "stopped")
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Every row and event as an xarray.Dataset, units and meaning in the attributes; built when first asked for."""
+        from msfp_gen.dataset import to_dataset
+
+        return to_dataset(self)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The run in a few numbers, plain and JSON-able, SI units; `summary.summarise` names the keys."""
+        from msfp_gen.summary import summarise
+
+        return summarise(self)
+
+    def to_netcdf(self, path: str | Path) -> Path:
+        """Write the dataset as netCDF-4, whole or not at all; a run that failed is saved with its status.
+
+        Raises InputError where the suffix is not .nc or the folder does not exist.
+        """
+        from msfp_gen.dataset import write_netcdf
+
+        return write_netcdf(self, path)
