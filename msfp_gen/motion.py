@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 CHANNELS = ("u_g1", "u_g2", "u_g3", "psi_1", "theta_1", "phi_1")
 # Which of psi_1, theta_1, phi_1 turn -> the only plane such rocking stays in, and the channel across that plane.
-_ROCKING_PLANES: dict[tuple[bool, ...], tuple[float, int]] = {(False, True, False): (0.0, 1), (True, False, False): (np.pi / 2, 0)}
+_ROCKING_PLANES: dict[tuple[bool, ...], tuple[float, int]] = {
+    (False, True, False): (0.0, 1),
+    (True, False, False): (np.pi / 2, 0),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +150,9 @@ class Motion:
         Raises InputError if the motion does not end at rest. An acceleration at its end becomes a declared jump.
         """
         positive("duration", duration)
-        end = self.evaluate(self.duration)
-        speed = self.evaluate(self.duration, 1)
-        peak = np.max(np.abs(self.coefficients[:, :, 1]), axis=0)
-        if np.any(np.abs(speed) > 1e-9 * peak):
+        end, speed, acceleration = (self.evaluate(self.duration, d) for d in range(3))
+        peaks = np.max(np.abs(self.coefficients), axis=0)
+        if np.any(np.abs(speed) > 1e-9 * peaks[:, 1]):
             worst = int(np.argmax(np.abs(speed)))
             raise InputError(
                 f"held: the motion ends with {CHANNELS[worst]} moving at {speed[worst]:.3g} per second; "
@@ -158,11 +160,12 @@ class Motion:
             )
         rest = np.zeros((1, 6, piecewise.ORDER))
         rest[0, :, 0] = end
+        jumps = bool(np.any(np.abs(acceleration) > 2e-9 * peaks[:, 2]))
         return replace(
             self,
             knots=np.append(self.knots, self.duration + duration),
             coefficients=np.concatenate([self.coefficients, rest]),
-            jumps=np.append(self.jumps, self.duration) if np.any(self.evaluate(self.duration, 2)) else self.jumps,
+            jumps=np.append(self.jumps, self.duration) if jumps else self.jumps,
         )
 
     def __add__(self, other: Motion) -> Motion:

@@ -1,0 +1,84 @@
+"""Lines and numbers of a text file, with errors that name file, line and reason."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import zlib
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.piecewise import Array
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_GZIP = b"\x1f\x8b"
+
+
+class Lines:
+    """The lines of one file; `fail` raises an InputError that says where."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path = path
+        self.lines = text.splitlines()
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __getitem__(self, index: int) -> str:
+        """The line at `index`, counted from zero; a file that ends too early fails."""
+        if index >= len(self.lines):
+            self.fail(len(self.lines) - 1, "the file ends here, truncated; fetch it again")
+        return self.lines[index]
+
+    def fail(self, index: int, reason: str) -> NoReturn:
+        """Raise InputError for the line at `index` (counted from zero; people count from one)."""
+        raise InputError(f"{self.path.name}, line {index + 1}: {reason}")
+
+    def number(self, index: int, field: str) -> float:
+        """`field`, text of the line at `index`, as a finite number."""
+        text = field.strip()
+        value = float(text) if _NUMBER.fullmatch(text) else np.nan
+        if not np.isfinite(value):
+            self.fail(index, f"{text[:24]!r} is not a finite number; repair or cut the data")
+        return value
+
+    def numbers(self, index: int, fields: list[str]) -> list[float]:
+        """Several fields of one line as finite numbers."""
+        return [self.number(index, field) for field in fields]
+
+    def positive(self, index: int, what: str, field: str) -> float:
+        """`field` as a number above zero."""
+        value = self.number(index, field)
+        if value <= 0:
+            self.fail(index, f"{what} is {field.strip()}; it must be positive")
+        return value
+
+
+def read_lines(path: Path) -> Lines:
+    """The lines of a text file, unpacked if it is gzip, in UTF-8 or Latin-1."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path.name}: cannot be read ({error.strerror}); check the path") from None
+    if content.startswith(_GZIP):
+        try:
+            content = gzip.decompress(content)
+        except (OSError, EOFError, zlib.error):
+            raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None
+    if not content.strip():
+        raise InputError(f"{path.name}: the file is empty; give a record")
+    if b"\0" in content:
+        raise InputError(f"{path.name}: a binary file; give COSMOS/CSMIP V1, PEER .AT2 or CSV text")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return Lines(path, text)
+
+
+def column(values: list[float]) -> Array:
+    """Numbers as an array."""
+    return np.array(values, dtype=np.float64)
