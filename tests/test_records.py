@@ -163,6 +163,7 @@ AT2_FAULTS = {
     ),
     "centimetres": (AT2.replace("UNITS OF G", "UNITS OF CM/S/S"), "not acceleration in g"),
     "no unit": (AT2.replace("UNITS OF G", ""), "no line before this one"),
+    "endless count": (AT2.replace("NPTS=     9", "NPTS=" + "9" * 5000), "does not give NPTS and DT"),
     "no step": (AT2.replace("DT=   .01000 SEC", ""), "does not give NPTS and DT"),
     "zero step": (AT2.replace(".01000", "0.0000"), "DT is 0.0000"),
     "text": (AT2.replace(".2000E-02", "  missing"), "line 5: 'missing'"),

@@ -12,7 +12,8 @@ from msfp_gen.records.text import Lines, column
 TITLE = "uncorrected accelerogram data"
 _CHANNEL = re.compile(r"Chan\s+(\S+):\s+(?:(\d{1,3})\s+Deg|(Up))\s*$", re.I)
 _DATA = re.compile(
-    r"\s*(\d{1,9})\s+Accelerogram points at\s+(\S+)\s+pts/sec in units of\s+(\S+?)\.?\s+Format:\s*\((\d{1,3})f(\d{1,3})\.\d+\)",
+    r"\s*(\d{1,9})\s+Accelerogram points at\s+(\S+)\s+pts/sec in units of\s+(\S+?)\.?\s+"
+    r"Format:\s*\((\d{1,3})f(\d{1,3})\.\d+\)",
     re.I,
 )
 _COUNT = re.compile(r"No\. of Points\s*=\s*(\d{1,9})", re.I)
