@@ -42,3 +42,12 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def make_folder(folder: Path, name: str = "output") -> None:
+    """Make `folder` if it is not there; InputError that begins with `name` if that cannot be or it cannot be used."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{name} = {str(folder)!r}: {error.strerror}; give another folder") from error
+    check_folder(folder, name)

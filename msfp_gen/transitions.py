@@ -81,14 +81,16 @@ def _share(u: Array, sliding: Array, surface: int, centres: Array, window: float
         [np.abs(np.interp(centres + window / 2, u, s) - np.interp(centres - window / 2, u, s)) for s in sliding.T]
     )
     total = increments.sum(axis=0)
-    return np.divide(increments[surface - 1], total, out=np.zeros_like(total), where=total > 1e-6 * window)
+    share: Array = np.divide(increments[surface - 1], total, out=np.zeros_like(total), where=total > 1e-6 * window)
+    return share
 
 
 def _path(history: History) -> tuple[Array, Array]:
     """Horizontal displacement along and across the direction of its largest value, each shape (T,), [m]."""
     horizontal = history.displacement[:, :2]
     e1, e2 = _direction(history)
-    return horizontal @ np.array([e1, e2]), horizontal @ np.array([-e2, e1])
+    along: Array = horizontal @ np.array([e1, e2])
+    return along, horizontal @ np.array([-e2, e1])
 
 
 def _direction(history: History) -> Array:

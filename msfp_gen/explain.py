@@ -1,0 +1,142 @@
+"""A scene in plain words: what will be computed, with which numbers, and what each choice means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.tables import Table, vector, yes
+
+if TYPE_CHECKING:
+    from msfp_gen.bearing import Bearing
+    from msfp_gen.layout import Effects
+    from msfp_gen.motion import Motion
+    from msfp_gen.scene import Scene
+    from msfp_gen.solver import Solver
+    from msfp_gen.top import Top
+
+MEANINGS: dict[tuple[str, object], str] = {
+    ("dimension", "spatial"): "three translations and rotations of every body",
+    ("dimension", "planar"): "motion in one vertical plane",
+    ("spin", "locked"): "bodies do not turn about their own axis",
+    ("spin", "patch"): "a drilling moment over the contact patch resists spin",
+    ("spin", "free"): "nothing but friction at a point resists spin, the literal report",
+    ("sliders", "inertial"): "mass and rotary inertia of every body count",
+    ("sliders", "massless"): "quasi-static: weights count, inertia of the sliders does not",
+    ("rims", True): "sliders meet the rims of the surfaces (2.99)-(2.109)",
+    ("rims", False): "surfaces have no rims: sliders may pass their capacity",
+    ("bouc_wen", "report"): "switches for each axis (2.94)-(2.98)",
+    ("bouc_wen", "isotropic"): "one switch along the slip, the same in every direction",
+    ("friction", "constant"): "the friction coefficient does not change",
+}
+SURFACE_COLUMNS = {
+    "R [mm]": ("radius", 1e3),
+    "capacity [mm]": ("capacity", 1e3),
+    "friction": ("friction", 1.0),
+    "yield [mm]": ("yield_displacement", 1e3),
+    "rim [N/m]": ("rim_stiffness", 1.0),
+    "rim [N s/m]": ("rim_damping", 1.0),
+}
+BODY_COLUMNS = {
+    "height [mm]": ("height", 1e3),
+    "centroid [mm]": ("centroid", 1e3),
+    "mass [kg]": ("mass", 1.0),
+    "inertia [kg m^2]": ("inertia", 1.0),
+    "rim radius [mm]": ("rim_radius", 1e3),
+    "rim offset [mm]": ("rim_offset", 1e3),
+}
+METHODS = {
+    "implicit": "L-stable, states and unknowns solved together",
+    "dopri5": "explicit Dormand-Prince, the report's",
+}
+TOPS = {
+    "rig": "testing machine: constant axial load, springs that hold the top plate (chapter 4)",
+    "prescribed": "constant force and moment on the top plate",
+    "mass": "rigid supported mass fixed to the top plate",
+}
+
+
+def explain(scene: Scene) -> list[Table]:
+    """Tables that describe `scene`: bearing, motion, top, effects with their meaning, and solver."""
+    return [
+        _surfaces(scene.bearing), _bodies(scene.bearing), _motion(scene.motion), _top(scene.top),
+        _effects(scene.effects), _solver(scene),
+    ]  # fmt: skip
+
+
+def _surfaces(bearing: Bearing) -> Table:
+    layout, shapes = bearing.layout, {1: "up", -1: "down"}
+    rows = [
+        (str(number), shapes[sign], *_cells(surface, SURFACE_COLUMNS))
+        for number, (sign, surface) in enumerate(zip(layout.signs, bearing.surfaces, strict=True), start=1)
+    ]
+    title = (
+        f"bearing {layout.name}: {layout.n} bodies, {layout.surfaces} surfaces, bottom first; "
+        f"base {bearing.base_height * 1e3:g} mm high, g = {bearing.gravity:g} m/s^2"
+    )
+    return Table(title, ("surface", "concave", *SURFACE_COLUMNS), rows)
+
+
+def _bodies(bearing: Bearing) -> Table:
+    rows = [(str(number), *_cells(body, BODY_COLUMNS)) for number, body in enumerate(bearing.bodies, start=2)]
+    return Table("moving bodies, bottom first", ("body", *BODY_COLUMNS), rows)
+
+
+def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]:
+    return (vector(np.atleast_1d(getattr(part, name)), scale) for name, scale in columns.values())
+
+
+def _motion(motion: Motion) -> Table:
+    t = np.union1d(motion.knots, np.linspace(0, motion.duration, 4001))
+    peaks = [np.abs(of(t)).max(axis=0) for of in (motion.displacement, motion.velocity, motion.acceleration)]
+    sources = [(str(key).replace("_", " "), str(value)) for key, value in motion.metadata.items()]
+    return Table(f"motion of the base: {motion.name or 'unnamed'}", (), [
+        ("duration", f"{motion.duration:.6g} s, {len(motion.knots) - 1} pieces"),
+        ("peak displacement along E1, E2, E3", f"{vector(peaks[0], 1e3)} mm"),
+        ("peak velocity", f"{vector(peaks[1], 1e3)} mm/s"),
+        ("peak acceleration", f"{vector(peaks[2])} m/s^2"),
+        ("rocks", yes(np.any(motion.rotation(t)))),
+        *sources,
+    ])  # fmt: skip
+
+
+def _top(top: Top) -> Table:
+    rules = {field.name: field for field in fields(top)}
+    rows = [(name.replace("_", " "), f"{_value(getattr(top, name))}") for name in rules]
+    return Table(f"top: {top.kind}, {TOPS[top.kind]} (SI)", (), rows)
+
+
+def _effects(effects: Effects) -> Table:
+    chosen = {field.name: getattr(effects, field.name) for field in fields(effects)}
+    rows = [(name, _value(value), MEANINGS[name, value]) for name, value in chosen.items()]
+    return Table("effects", (), rows)
+
+
+def _solver(scene: Scene) -> Table:
+    solver: Solver = scene.solver
+    stop = scene.stop
+    ends = [f"{scene.end:.6g} s"]
+    if stop is not None and stop.displacement is not None:
+        ends.append(f"{stop.displacement * 1e3:.4g} mm across the bearing")
+    if stop is not None and stop.all_rims:
+        ends.append("every rim in contact")
+    return Table("solver", (), [
+        ("method", f"{solver.method}: {METHODS[solver.method]}"),
+        ("rtol", f"{solver.rtol:g}"),
+        ("tolerance of angles", f"{solver.angle_tolerance:g} rad"),
+        ("longest step", "what the motion resolves" if solver.max_step is None else f"{solver.max_step:g} s"),
+        ("rows", "every step" if scene.output_step is None else f"every {scene.output_step:g} s"),
+        ("start", "centred, at rest" if scene.initial_state is None else "given"),
+        ("ends at", " or ".join(ends)),
+    ])  # fmt: skip
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return yes(value)
+    if isinstance(value, tuple):
+        return vector(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,164 @@
+"""Tables as data, and the tables of a run: aligned text for pipes and logs, rich ones where a person looks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+    from msfp_gen.build import BuildInfo
+    from msfp_gen.doctor import Check
+    from msfp_gen.result import Result
+
+TRANSITIONS = {
+    "u_star": ("u*", "surface 2 stops"),
+    "u_star_star": ("u**", "surface 3 stops"),
+    "u_dr": ("u_dr{}", "rim {} met"),
+    "F_dr": ("F_dr{}/N", "force over axial load then"),
+    "resolution": ("resolution", "widest spacing of rows"),
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A heading, the names of columns (none: rows are name and value) and rows of text, ready to print."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    @property
+    def text(self) -> str:
+        """Aligned columns: the first to the left, numbers of the others to the right."""
+        lines = [row for row in (self.columns, *self.rows) if row]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        body = ["  " + "  ".join(self._cell(row, i, widths[i]) for i in range(len(row))).rstrip() for row in lines]
+        return "\n".join([self.title, *body])
+
+    def _cell(self, row: Sequence[str], column: int, width: int) -> str:
+        return row[column].rjust(width) if self.columns and column else row[column].ljust(width)
+
+    def rich(self) -> RichTable:
+        """The same for a terminal."""
+        from rich import box
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        width = len(self.rows[0]) if self.rows else len(self.columns)
+        table = RichTable(title=Text(self.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD,
+                          show_header=bool(self.columns))  # fmt: skip
+        for index in range(width):
+            right = bool(self.columns) and index > 0
+            table.add_column(Text(self.columns[index]) if self.columns else "", justify="right" if right else "left")
+        for row in self.rows:
+            table.add_row(*map(Text, row))
+        return table
+
+
+def summary_tables(result: Result) -> list[Table]:
+    """What a person wants to know of a run: peaks, every surface, and the stages of a monotonic run."""
+    summary = result.summary
+    tables = [_run_table(summary), _surface_table(result)]
+    if "transitions" in summary:
+        tables.append(_transition_table(summary["transitions"]))
+    return tables
+
+
+def build_table(info: BuildInfo) -> Table:
+    """What a build cost, what it holds and where it lies."""
+    stages = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in info.stages.items())
+    origin = "found in the cache" if info.cached else "built now"
+    return Table(info.spec, (), [
+        ("stages", stages),
+        ("this call", f"{info.seconds:.2f} s, {origin}"),
+        ("kernels", f"{info.statements} statements, {info.operations} operations"),
+        ("module", info.module),
+        ("folder", str(info.folder)),
+        ("extension", info.path.name),
+    ])  # fmt: skip
+
+
+def check_table(checks: Iterable[Check]) -> Table:
+    """What `doctor` found."""
+    rows = [
+        (check.name, *(("ok", check.detail) if check.ok else ("MISSING", f"{check.detail}; {check.remedy}")))
+        for check in checks
+    ]
+    return Table("msfp-gen doctor", (), rows)
+
+
+def yes(value: object) -> str:
+    """The word yes, or a dash."""
+    return "yes" if value else "-"
+
+
+def vector(values: Iterable[float], scale: float = 1.0) -> str:
+    """Components of a vector for a person."""
+    return ", ".join(f"{value * scale:.4g}" for value in values)
+
+
+def _run_table(summary: Mapping[str, Any]) -> Table:
+    displacement, force, energy = summary["peak_displacement"], summary["peak_top_force"], summary["energy"]
+    ratio, counters = summary["peak_force_ratio"], summary["counters"]
+    over = "" if ratio is None else f", radial over axial load {ratio:.4f}"
+    rows = [
+        ("status", " - ".join(filter(None, (summary["status"], summary["message"])))),
+        ("time simulated", _speed(summary)),
+        ("peak displacement", f"{_peaks(displacement, 1e3)} mm"),
+        ("peak force on the top", f"{_peaks(force, 1e-3)} kN{over}"),
+        ("energy", _energy(energy)),
+        ("work", ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counters.items() if count)),
+    ]
+    return Table(summary["name"] or "unnamed scene", (), rows)
+
+
+def _surface_table(result: Result) -> Table:
+    summary, surfaces = result.summary, result.scene.bearing.surfaces
+    columns = (
+        "surface",
+        "peak sliding [mm]",
+        "capacity [mm]",
+        "least gap [mm]",
+        "rim met",
+        "N least [kN]",
+        "N most [kN]",
+    )
+    values = zip(surfaces, summary["peak_sliding"], summary["minimum_gap"], summary["minimum_normal_force"],
+                 summary["maximum_normal_force"], strict=True)  # fmt: skip
+    rows = [
+        (str(number), f"{sliding * 1e3:.2f}", f"{surface.capacity * 1e3:.2f}", f"{gap * 1e3:.2f}",
+         yes(number in summary["rims_met"]), f"{least / 1e3:.3f}", f"{most / 1e3:.3f}")
+        for number, (surface, sliding, gap, least, most) in enumerate(values, start=1)
+    ]  # fmt: skip
+    return Table("surfaces, bottom first", columns, rows)
+
+
+def _transition_table(transitions: Mapping[str, float | None]) -> Table:
+    rows = []
+    for key, value in transitions.items():
+        surface = key[4:] if key[:4] in TRANSITIONS else ""
+        name, meaning = (text.format(surface) for text in TRANSITIONS[key[:4] if surface else key])
+        shown = "not met" if value is None else f"{value:.4f}" if key.startswith("F_") else f"{value * 1e3:.2f} mm"
+        rows.append((name, shown, meaning))
+    return Table("stages of motion (Table 4.2 of the report)", (), rows)
+
+
+def _peaks(peaks: Mapping[str, float], scale: float) -> str:
+    shown = {axis: value for axis, value in peaks.items() if axis != "E3"}
+    return ", ".join(f"{axis} {value * scale:.4g}" for axis, value in shown.items())
+
+
+def _speed(summary: Mapping[str, Any]) -> str:
+    factor = summary["real_time_factor"]
+    text = f"{summary['duration']:.6g} s in {summary['wall_time']:.3g} s"
+    return text if factor is None else f"{text}, {factor:.4g} times real time"
+
+
+def _energy(energy: Mapping[str, float | None]) -> str:
+    if energy["closure_error"] is None:
+        return "no work was done"
+    return (f"balance closes to {energy['closure_error']:.2g} of the peak input {energy['peak_input']:.4g} J, "
+            f"{energy['dissipated_share']:.1%} dissipated")  # fmt: skip
