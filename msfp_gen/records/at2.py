@@ -16,8 +16,8 @@ _HEADER_LINES = 10
 _NUMBER = r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
 # The line of counts "has changed multiple times": NPTS= 4000, DT= .0100 SEC and 4000 .0100 NPTS, DT are both common.
 _COUNTS = (
-    re.compile(rf"NPTS\s*[=:]?\s*(\d{1, 9})(?!\d)\s*,?\s*DT\s*[=:]?\s*{_NUMBER}(?![\w.])", re.I),
-    re.compile(rf"^\s*(\d{1, 9})(?!\d)\s*,?\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.I),
+    re.compile(rf"NPTS\s*[=:]?\s*(\d{{1,9}})(?!\d)\s*,?\s*DT\s*[=:]?\s*{_NUMBER}(?![\w.])", re.I),
+    re.compile(rf"^\s*(\d{{1,9}})(?!\d)\s*,?\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.I),
 )
 _UNIT = re.compile(r"UNITS\s+OF\s+(\S+)", re.I)
 _STUCK = re.compile(r"(?<=[\d.])(?=[+-])")  # between the numbers of 1.2-3.4, not inside 1.2E-3
