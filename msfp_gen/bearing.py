@@ -180,7 +180,7 @@ class Bearing:
             items = rows[owner[column]]
             values = _spread(column, value, len(items))
             items[:] = [dataclass_replace(item, **{column: each}) for item, each in zip(items, values, strict=True)]
-        return dataclass_replace(base, **rows)
+        return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All numbers as float64 arrays.

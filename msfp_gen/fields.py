@@ -7,7 +7,7 @@ scene reader builds its tables from the same annotations.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
 from functools import lru_cache
@@ -82,7 +82,33 @@ class Choice:
         return value
 
 
-Rule = Quantity | Choice
+@dataclass(frozen=True)
+class Text:
+    """Any text."""
+
+    def parse(self, value: object, *, text: bool = False) -> str:
+        """`value` itself; raises ValueError with the remedy alone."""
+        if not isinstance(value, str):
+            raise ValueError("give a text in quotes")
+        return value
+
+
+@dataclass(frozen=True)
+class Notes:
+    """A table of names with texts or finite numbers."""
+
+    def parse(self, value: object, *, text: bool = False) -> dict[str, str | float]:
+        """A copy of `value`; raises ValueError with the remedy alone."""
+        fine = isinstance(value, Mapping) and all(
+            isinstance(key, str) and (isinstance(item, str) or (isinstance(item, Real) and math.isfinite(item)))
+            for key, item in value.items()
+        )
+        if not fine:
+            raise ValueError("give a table of texts and finite numbers")
+        return dict(value)  # type: ignore[call-overload, no-any-return]
+
+
+Rule = Quantity | Choice | Text | Notes
 
 
 def check_fields(instance: Any, path: str) -> None:
@@ -113,6 +139,9 @@ def ruled_fields(kind: type) -> Iterator[tuple[str, Rule, object]]:
     return ((field.name, rules[field.name], field.default) for field in dataclass_fields(kind) if field.name in rules)
 
 
+_PLAIN: dict[Any, Rule] = {bool: Choice((True, False)), str: Text(), str | None: Text()}
+
+
 @lru_cache(maxsize=64)
 def _rules(kind: type) -> dict[str, Rule]:
     hints = get_type_hints(kind, include_extras=True)
@@ -121,11 +150,11 @@ def _rules(kind: type) -> dict[str, Rule]:
 
 
 def _rule(hint: Any) -> Rule | None:
-    if hint is bool:
-        return Choice((True, False))
+    if hint in _PLAIN:
+        return _PLAIN[hint]
     if get_origin(hint) is Literal:
         return Choice(get_args(hint))
-    return next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Quantity)), None)
+    return next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Rule)), None)
 
 
 def _is_sequence(value: object) -> bool:

@@ -69,8 +69,8 @@ class Scene:
     bearing: Bearing
     motion: Motion
     top: Top
-    effects: Effects = Effects()
-    solver: Solver = Solver()
+    effects: Effects = field(default_factory=Effects)
+    solver: Solver = field(default_factory=Solver)
     duration: Annotated[float | None, _TIME] = None
     initial_state: InitialState | None = None
     output_step: Annotated[float | None, _TIME] = None
@@ -122,9 +122,9 @@ class Scene:
         for index, surface in enumerate(self.bearing.surfaces):
             body = self.bearing.slider(index)
             if self.bearing.slider_rim_radius(index) == 0:
-                field = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
+                path = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
                 raise InputError(
-                    f"{field} = 0 (body {body + 1}): this body meets the rim of surface {index + 1}; give the radius "
+                    f"{path} = 0 (body {body + 1}): this body meets the rim of surface {index + 1}; give the radius "
                     "of its rim [m], or effects.rims = false"
                 )
             if surface.rim_stiffness == 0:
@@ -158,5 +158,4 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "solver": Solver,
     "initial_state": (InitialState, type(None)),
     "stop": (Stop, type(None)),
-    "name": str,
 }

@@ -1,0 +1,168 @@
+"""The kinds of `[motion]` in a scene file: what each may hold, and the motion it makes.
+
+Each class is the table of one kind; its rules serve the scene reader, and `build` calls the constructor of `Motion`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from msfp_gen.errors import InputError
+from msfp_gen.fields import Notes, Quantity
+from msfp_gen.motion import Motion
+
+_LENGTH = Quantity("m", above=0.0)
+_TIME = Quantity("s", above=0.0)
+_COUNT = Quantity("", above=0.0)
+_ANGULAR = Quantity("rad/s", above=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionTable:
+    """What every kind may hold: a name, and how long the base rests where the motion ends [s]."""
+
+    kind: ClassVar[str]
+    name: str = ""
+    hold: Annotated[float | None, _TIME] = None
+
+    def build(self) -> Motion:
+        """The motion; raises InputError with a message that starts with `motion`."""
+        try:
+            motion = self._motion()
+            return motion if self.hold is None else motion.held(self.hold)
+        except InputError as error:
+            text = str(error)
+            raise InputError(text if text.startswith("motion") else f"motion.{text}") from None
+
+    def _motion(self) -> Motion:
+        raise NotImplementedError
+
+    def _values(self, *without: str) -> dict[str, Any]:
+        skipped = {"hold", *without}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in skipped}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Harmonic(MotionTable):
+    """`Motion.harmonic`: A sin(2 pi f t) after a smooth start."""
+
+    kind: ClassVar[str] = "harmonic"
+    amplitude: Annotated[float, _LENGTH]
+    frequency: Annotated[float, Quantity("Hz", above=0.0)]
+    direction: Annotated[float, Quantity("rad")] = 0.0
+    cycles: Annotated[float, _COUNT] = 2.0
+    lead_in: Annotated[float | None, _TIME] = None
+
+    def _motion(self) -> Motion:
+        return Motion.harmonic(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle(MotionTable):
+    """`Motion.circle`."""
+
+    kind: ClassVar[str] = "circle"
+    amplitude: Annotated[float, _LENGTH]
+    angular_frequency: Annotated[float, _ANGULAR]
+    cycles: Annotated[float, _COUNT] = 2.0
+    lead_in: Annotated[float, _TIME] = 20.0
+
+    def _motion(self) -> Motion:
+        return Motion.circle(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureEight(Circle):
+    """`Motion.figure_eight`."""
+
+    kind: ClassVar[str] = "figure-eight"
+
+    def _motion(self) -> Motion:
+        return Motion.figure_eight(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(MotionTable):
+    """`Motion.ramp`: constant acceleration."""
+
+    kind: ClassVar[str] = "ramp"
+    acceleration: Annotated[float, Quantity("m/s^2", above=0.0)]
+    duration: Annotated[float, _TIME]
+    direction: Annotated[float, Quantity("rad")] = 0.0
+
+    def _motion(self) -> Motion:
+        return Motion.ramp(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordMotion(MotionTable):
+    """`Motion.from_record`: a file, or a record that comes with the package."""
+
+    kind: ClassVar[str] = "record"
+    file: str | None = None
+    bundled: str | None = None
+    scale: Annotated[float, Quantity("")] = 1.0
+    start: Annotated[float | None, Quantity("s", least=0.0)] = None
+    duration: Annotated[float | None, _TIME] = None
+
+    def _motion(self) -> Motion:
+        from msfp_gen import records
+
+        if (self.file is None) == (self.bundled is None):
+            both = "neither is" if self.file is None else "both are"
+            raise InputError(f"motion.file and motion.bundled: {both} given; give one, a path or a record's name")
+        if self.bundled is not None:
+            record = records.bundled(self.bundled)
+        else:
+            record = records.read_record(_existing(self.file))
+        values = self._values("file", "bundled")
+        return Motion.from_record(record, **values | {"name": self.name or None})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrays(MotionTable):
+    """`Motion.from_csv`: a table of time and displacement or acceleration with units in its header."""
+
+    kind: ClassVar[str] = "arrays"
+    file: str
+
+    def _motion(self) -> Motion:
+        return Motion.from_csv(_existing(self.file), name=self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces(MotionTable):
+    """`Motion` itself, polynomial by polynomial: how a motion made in Python is written so that nothing is lost."""
+
+    kind: ClassVar[str] = "pieces"
+    knots: Annotated[tuple[float, ...], Quantity("s", shape=(None,))]
+    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6))]
+    jumps: Annotated[tuple[float, ...], Quantity("s", shape=(None,))] = ()
+    max_step: Annotated[float | None, _TIME] = None
+    metadata: Annotated[Mapping[str, str | float] | None, Notes()] = None
+
+    def _motion(self) -> Motion:
+        return Motion(**self._values() | {"metadata": self.metadata or {}})
+
+    @classmethod
+    def of(cls, motion: Motion) -> dict[str, Any]:
+        """The table of any motion."""
+        names = ("knots", "coefficients", "jumps")
+        table = {"kind": cls.kind, **{name: getattr(motion, name).tolist() for name in names}}
+        rest = {"max_step": motion.max_step, "name": motion.name, "metadata": dict(motion.metadata)}
+        return table | {name: value for name, value in rest.items() if value is not None}
+
+
+def _existing(file: str | None) -> Path:
+    path = Path(str(file))
+    if not path.is_file():
+        raise InputError(f"motion.file = {str(path)!r}: no such file; paths are relative to the scene file")
+    return path
+
+
+KINDS: dict[str, type[MotionTable]] = {
+    kind.kind: kind for kind in (Harmonic, Circle, FigureEight, Ramp, RecordMotion, Arrays, Pieces)
+}

@@ -1,0 +1,133 @@
+"""Scene files: TOML in, a checked Scene out, and back. A file is data: nothing in it is evaluated."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from msfp_gen import catalogue, schema
+from msfp_gen.bearing import Bearing, Body, Surface
+from msfp_gen.errors import InputError
+from msfp_gen.fields import ruled_fields
+from msfp_gen.layout import Effects, Layout
+from msfp_gen.motion import Motion
+from msfp_gen.motion_tables import KINDS, Pieces
+from msfp_gen.scene import InitialState, Scene, Stop
+from msfp_gen.solver import Solver
+from msfp_gen.toml_text import dumps
+from msfp_gen.top import MassTop, PrescribedTop, RigTop, Top
+
+Table = dict[str, Any]
+_TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
+_PARTS = {"effects": Effects, "solver": Solver, "initial_state": InitialState, "stop": Stop}
+
+
+def load_scene(source: str | Path) -> Scene:
+    """The scene in a TOML file, or the preset of that name. Paths inside a file are relative to it.
+
+    Raises InputError of one line that names the file, the path of the field, the value and the remedy.
+    """
+    known = catalogue.descriptions("scene")
+    if str(source) in known:
+        return scene_from_table(catalogue.scene_table(str(source)))
+    path = Path(source)
+    if not path.is_file():
+        hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
+        raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        return scene_from_table(table, path.parent)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: no valid TOML: {error}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    """The scene that a plain table describes; paths in it are relative to `folder`. Raises InputError."""
+    given = schema.validate_scene(table)
+    motion = dict(given["motion"])
+    if "file" in motion:
+        motion["file"] = str(((folder or Path()) / motion["file"]).resolve())
+    top = dict(given["top"])
+    parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
+    parts["bearing"] = _bearing(given["bearing"])
+    parts["top"] = _TOPS[top.pop("kind")](**top)
+    parts["motion"] = _motion(motion)
+    return Scene(**{**given, **parts, "motion_table": motion})
+
+
+def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
+    """The bearing that a `[bearing]` table describes, in full or as a preset with changes. Raises InputError."""
+    return _bearing(schema.validate_bearing(table))
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene as TOML that `load_scene` reads back to an equal scene; everything in SI, bearing in full."""
+    own = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
+    tables = {name: getattr(scene, name) for name in _PARTS}
+    return dumps(
+        {
+            **own,
+            "bearing": {
+                "layout": _plain(scene.bearing.layout),
+                **_plain(scene.bearing),
+                "surfaces": [_plain(surface) for surface in scene.bearing.surfaces],
+                "bodies": [_plain(body) for body in scene.bearing.bodies],
+            },
+            "motion": _motion_table(scene),
+            "top": {"kind": scene.top.kind, **_plain(scene.top)},
+            **{name: _plain(value) for name, value in tables.items() if value is not None},
+        }
+    )
+
+
+def _bearing(given: Mapping[str, Any]) -> Bearing:
+    changes = dict(given)
+    if "preset" in changes:
+        preset = catalogue.bearing_table(changes.pop("preset"))
+        with _located("surface", "bearing.surfaces"), _located("body", "bearing.bodies"):
+            return bearing_from_table(preset).replace(**changes)
+    with _located("layout", "bearing.layout"):
+        changes["layout"] = Layout(**changes["layout"])
+    for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
+        changes[name] = [_row(kind, row, word, f"bearing.{name}[{index}]") for index, row in enumerate(changes[name])]
+    return Bearing(**changes)
+
+
+def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
+    with _located(word, path):
+        return kind(**row)
+
+
+@contextmanager
+def _located(word: str, path: str) -> Iterator[None]:
+    """Put the path in a file in front of a message that names its field `word.field`."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(path + text.removeprefix(word) if text.startswith(f"{word}.") else text) from None
+
+
+def _motion(table: Mapping[str, Any]) -> Motion:
+    values = dict(table)
+    return KINDS[values.pop("kind")](**values).build()
+
+
+def _motion_table(scene: Scene) -> Table:
+    """The recipe a file gave, if it still makes the scene's motion; otherwise the motion piece by piece."""
+    if scene.motion_table is not None and _motion(scene.motion_table) == scene.motion:
+        return {"kind": scene.motion_table["kind"], **scene.motion_table}
+    return Pieces.of(scene.motion)
+
+
+def _plain(value: Top | Bearing | Layout | Surface | Body | Effects | Solver | InitialState | Stop) -> Table:
+    names = [name for name, _, _ in ruled_fields(type(value))]
+    return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}

@@ -1,0 +1,199 @@
+"""What a scene file may hold, as pydantic models made from the rules of the package's own dataclasses.
+
+`validate` gives plain tables in SI, holding only what the file gave, or raises one InputError of one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING
+from functools import partial, reduce
+from operator import or_
+from types import GenericAlias
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    ValidationError,
+    create_model,
+)
+
+from msfp_gen import motion_tables
+from msfp_gen.bearing import Bearing, Body, Surface
+from msfp_gen.catalogue import suggestion
+from msfp_gen.errors import InputError
+from msfp_gen.fields import Quantity, Rule, Text, ruled_fields
+from msfp_gen.layout import Effects, Layout
+from msfp_gen.scene import InitialState, Scene, Stop
+from msfp_gen.solver import Solver
+from msfp_gen.top import MassTop, PrescribedTop, RigTop
+
+Table = dict[str, Any]
+Model = type[BaseModel]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+def _model(kind: type, /, **more: Any) -> Model:
+    """A pydantic model of the ruled fields of a dataclass, and of `more` fields as (annotation, default)."""
+    given = {
+        name: (_read(rule.parse), ... if default is MISSING else default)
+        for name, rule, default in ruled_fields(kind)
+    }
+    return create_model(kind.__name__, __base__=_Strict, **{**given, **more})
+
+
+def _read(parse: Callable[..., Any]) -> Any:
+    return Annotated[Any, PlainValidator(partial(parse, text=True))]
+
+
+def _column(rule: Rule, value: object, *, text: bool) -> Any:
+    """A value for all rows, or a list with one for each."""
+    pairs = isinstance(rule, Quantity) and bool(rule.shape)
+    if isinstance(value, list) and (not pairs or any(isinstance(item, list) for item in value)):
+        return [rule.parse(item, text=text) for item in value]
+    return rule.parse(value, text=text)
+
+
+def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
+    """The union of tables told apart by their `kind`, and each table's model by its kind."""
+    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...)) for kind in kinds}
+    return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
+
+
+def _named(value: Any) -> Any:
+    return {"preset": value} if isinstance(value, str) else value
+
+
+def _bearing_kind(value: Any) -> str:
+    return "preset" if isinstance(value, Mapping) and "preset" in value else "full"
+
+
+def _rows(model: Model) -> Any:
+    return GenericAlias(list, (model,))
+
+
+def _bearing_union(full: Model, preset: Model) -> Any:
+    """A bearing in full or a preset with changes; a text alone is the name of a preset."""
+    union = reduce(or_, (Annotated[full, Tag("full")], Annotated[preset, Tag("preset")]))
+    return Annotated[union, Discriminator(_bearing_kind), BeforeValidator(_named)]
+
+
+_SURFACE, _BODY, _LAYOUT = _model(Surface), _model(Body), _model(Layout)
+_BEARING = _model(Bearing, layout=(_LAYOUT, ...), surfaces=(_rows(_SURFACE), ...), bodies=(_rows(_BODY), ...))
+_CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fields(Bearing)} | {
+    name: (_read(partial(_column, rule)), None) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
+}
+_PRESET: Model = create_model("PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), **_CHANGES)
+_EITHER = _bearing_union(_BEARING, _PRESET)
+_MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
+_TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
+_PARTS: dict[str, Model] = {
+    name: _model(kind)
+    for name, kind in (("effects", Effects), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
+}
+_SCENE = _model(
+    Scene,
+    bearing=(_EITHER, ...),
+    motion=(_MOTION, ...),
+    top=(_TOP, ...),
+    **{name: (model, None) for name, model in _PARTS.items()},
+)
+# Every table by its path, union tags included, to tell what a misspelt or missing key could be.
+_TABLES: dict[str, Model] = {
+    "": _SCENE,
+    "bearing.full": _BEARING,
+    "bearing.full.layout": _LAYOUT,
+    "bearing.full.surfaces": _SURFACE,
+    "bearing.full.bodies": _BODY,
+    "bearing.preset": _PRESET,
+    **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
+    **{f"top.{kind}": model for kind, model in _TOPS.items()},
+    **_PARTS,
+}
+_TAGGED = ("bearing", "motion", "top")
+_WANTED = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
+
+
+def validate_scene(table: Mapping[str, Any]) -> Table:
+    """A scene's table with its quantities in SI and only the keys it gave; raises InputError of one line."""
+    return _validate(_SCENE, table)
+
+
+def validate_bearing(table: Mapping[str, Any]) -> Table:
+    """A `[bearing]` table likewise."""
+    return _validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
+
+
+_ONLY_BEARING = create_model("OnlyBearing", __base__=_Strict, bearing=(_EITHER, ...))
+
+
+def _validate(model: Model, table: Mapping[str, Any]) -> Table:
+    try:
+        return _plain(model.model_validate(table))  # type: ignore[no-any-return]
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    # A misspelt key is also a missing one: the misspelling says more.
+    worst = min(details, key=lambda detail: detail["type"] != "extra_forbidden")
+    raise InputError(_one_line(worst["type"], worst["loc"], worst["input"], worst.get("ctx", {})))
+
+
+def _plain(value: Any) -> Any:
+    """Tables as dicts of the keys that were given."""
+    if isinstance(value, BaseModel):
+        return {name: _plain(getattr(value, name)) for name in sorted(value.model_fields_set)}
+    return [_plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
+    path, note = _path(location)
+    table = _TABLES.get(".".join(part for part in location[:-1] if isinstance(part, str)), _Strict)
+    if kind == "extra_forbidden":
+        known = list(table.model_fields)
+        hint = suggestion(str(location[-1]), known) or f"; the keys here are {', '.join(known)}"
+        return f"{path}{note}: unknown key{hint}"
+    if kind == "missing":
+        return f"{path}{note} is missing: {_remedy(table, str(location[-1]))}"
+    if kind.startswith("union_tag") and isinstance(value, Mapping):
+        said = f"{path}.kind = {value['kind']!r}" if "kind" in value else f"{path}.kind is missing"
+        return f"{said}: give one of {context.get('expected_tags') or _kinds(path)}"
+    remedy = str(context["error"]) if "error" in context else _WANTED.get(kind, "give a table")
+    return f"{path} = {_short(value)}{note}: {remedy}"
+
+
+def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
+    """`bearing.surfaces[2].radius`, and ` (surface 3)` as the report counts; bodies start at 2, above the base."""
+    parts = location[:1] + location[2:] if location[0] in _TAGGED else location
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
+    for name, word, first in (("surfaces", "surface", 1), ("bodies", "body", 2)):
+        if parts[1:2] == (name,) and len(parts) > 2:
+            return path, f" ({word} {int(parts[2]) + first})"
+    return path, ""
+
+
+def _kinds(path: str) -> str:
+    return ", ".join(repr(kind) for kind in (_MOTIONS if path == "motion" else _TOPS))
+
+
+def _remedy(table: Model, name: str) -> str:
+    """What the rule of a field says about no value at all."""
+    for item in table.model_fields[name].metadata if name in table.model_fields else ():
+        if isinstance(item, PlainValidator):
+            try:
+                item.func(None)  # type: ignore[call-arg]
+            except ValueError as error:
+                return str(error)
+    return "give this table"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
