@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from msfp_gen.tables import Table
 
 DEMO = ("ridgecrest-clc", "fenz-test5")
-BAD_INPUT, INTERRUPTED = 2, 130
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 # The base of usage errors (ClickException), in click or in the copy of it that newer typers carry.
 USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
@@ -35,6 +35,20 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
+def _read(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
+    """A parser whose error names the value, as those of typer do not."""
+
+    def parse(text: str) -> Any:
+        try:
+            return kind(text)
+        except ValueError:
+            raise typer.BadParameter(f"{text!r} is no {noun}; give one") from None
+
+    return parse
+
+
+_whole, _number = _read(int, "whole number"), _read(float, "number")
 Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.nc", help="Write every row as netCDF-4.")]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file (TOML) or the name of a preset.")]
 
@@ -43,13 +57,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input."""
     arguments = sys.argv[1:] if argv is None else argv
     try:
-        return app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0
+        code = app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0
     except MsfpError as error:
         return _fail(str(error), error.exit_code)
-    except (typer.Abort, KeyboardInterrupt):
-        return _fail("interrupted", INTERRUPTED)
+    except OSError as error:  # such as a full disk, or a reader of our output that left
+        return _fail(str(error), FAILED)
+    except typer.Abort:
+        code = INTERRUPTED
     except USAGE_ERROR as error:
         return _fail(f"{error.format_message().rstrip('.')} (see msfp-gen --help)", BAD_INPUT)
+    # Typer turns Ctrl-C into this code without a word.
+    return _fail("interrupted", code) if code == INTERRUPTED else int(code)
 
 
 def _print_version(wanted: bool) -> None:
@@ -69,9 +87,11 @@ def _root(
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen generate 5 2 2 -o models   # then: import msfp_5_2_2")
 def generate(
-    n: Annotated[int, typer.Argument(help="Bodies, base and top plate included.")],
-    m: Annotated[int, typer.Argument(help="Surfaces that are concave up; they lie below.")],
-    p: Annotated[int, typer.Argument(help="Surfaces that are concave down; n = m + p + 1.")],
+    n: Annotated[int, typer.Argument(parser=_whole, metavar="N", help="Bodies, base and top plate included.")],
+    m: Annotated[int, typer.Argument(parser=_whole, metavar="M", help="Surfaces that are concave up; they lie below.")],
+    p: Annotated[
+        int, typer.Argument(parser=_whole, metavar="P", help="Surfaces that are concave down; n = m + p + 1.")
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put sources and module here.")
     ] = None,
@@ -103,24 +123,25 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")] = False,
     method: Annotated[str | None, typer.Option(metavar="implicit|dopri5", help="Instead of the scene's.")] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance, instead of the scene's.")] = None,
-    max_step: Annotated[float | None, typer.Option(help="Longest step [s], instead of the scene's.")] = None,
-    duration: Annotated[float | None, typer.Option(help="End after this time [s].")] = None,
+    rtol: Annotated[
+        float | None, typer.Option(parser=_number, metavar="NUMBER", help="Relative tolerance, instead of the scene's.")
+    ] = None,
+    max_step: Annotated[
+        float | None, typer.Option(parser=_number, metavar="SECONDS", help="Longest step, instead of the scene's.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(parser=_number, metavar="SECONDS", help="End after this time.")
+    ] = None,
 ) -> None:
     """Simulate a scene."""
     if output is not None:
         check_output(output, DATASET_SUFFIXES, "--output")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    chosen = _changed(_find_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    result, failure = _simulate(chosen)
-    if result is not None:
-        _report(result, as_json)
-    saved = [] if result is None else _save(result, output, plot)
-    if failure is not None:
-        kept = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
-        raise RunError(f"{failure}{kept}", status=failure.status, result=result) from failure
-    for path in saved:
+    from msfp_gen.scenefile import load_scene
+
+    chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
+    for path in _run(chosen, output, plot, as_json):
         _note(f"wrote {path}")
 
 
@@ -128,8 +149,9 @@ def run(
 def explain(scene: SceneName) -> None:
     """Say in plain words what a scene computes."""
     from msfp_gen.explain import explain as describe
+    from msfp_gen.scenefile import load_scene
 
-    _show(describe(_find_scene(scene)))
+    _show(describe(load_scene(scene)))
 
 
 @app.command()
@@ -161,28 +183,13 @@ def demo(
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
     from msfp_gen.output import make_folder
+    from msfp_gen.scenefile import load_scene
 
-    scenes = [_find_scene(name) for name in DEMO]
+    scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
     for name, scene in zip(DEMO, scenes, strict=True):
-        result, failure = _simulate(scene)
-        if failure is not None:
-            raise failure
-        assert result is not None
-        _report(result, as_json=False)
-        for path in _save(result, output / f"{name}.nc", output / f"{name}.png"):
+        for path in _run(scene, output / f"{name}.nc", output / f"{name}.png"):
             typer.echo(f"wrote {path}\n")
-
-
-def _find_scene(name: str) -> Scene:
-    """The scene in a file, or the preset of that name."""
-    if name.endswith(".toml") or Path(name).exists():
-        from msfp_gen.scenefile import load_scene
-
-        return load_scene(name)
-    from msfp_gen import presets as catalogue
-
-    return catalogue.scene(name)
 
 
 def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
@@ -190,6 +197,19 @@ def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
     given = {name: value for name, value in solver.items() if value is not None}
     scene = replace(scene, solver=replace(scene.solver, **given)) if given else scene
     return scene if duration is None else replace(scene, duration=duration)
+
+
+def _run(scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False) -> list[Path]:
+    """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
+    result, failure = _simulate(scene)
+    saved = []
+    if result is not None:
+        _report(result, as_json)
+        saved = _save(result, output, plot)
+    if failure is not None:
+        kept = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
+        raise RunError(f"{failure}{kept}", status=failure.status, result=result) from failure
+    return saved
 
 
 def _simulate(scene: Scene) -> tuple[Result | None, RunError | None]:

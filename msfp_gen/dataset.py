@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.errors import InputError
-from msfp_gen.history import ENERGY, LABELS, History, quantities
+from msfp_gen.history import ENERGY, LABELS, Counters, Event, History, quantities
 from msfp_gen.output import DATASET_SUFFIXES, check_output, replacing
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from msfp_gen.result import Result
 
+COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of attributes
 Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
 
 
@@ -62,6 +64,22 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
 
 
+def read_result(path: str | Path) -> Result:
+    """The result that `Result.to_netcdf` wrote, its scene included. Raises InputError where `path` holds none."""
+    from msfp_gen.result import Result
+    from msfp_gen.scenefile import scene_from_table
+
+    dataset = read_netcdf(path)
+    if dataset.attrs.get("source") != "msfp-gen":
+        raise InputError(f"path = {str(path)!r}: no result of msfp-gen; give a file that `run -o` wrote")
+    attributes = dataset.attrs
+    return Result(
+        scene_from_table(tomllib.loads(attributes["scene"])), _history(dataset), _event_list(dataset),
+        Counters(**_without(COUNTER, attributes)), attributes["status"], attributes["message"],
+        _without(PROVENANCE, attributes),
+    )  # fmt: skip
+
+
 def _rows(history: History) -> Variables:
     for field, rows in quantities().items():
         if field == "time":
@@ -96,12 +114,43 @@ def _events(result: Result) -> Variables:
 
 
 def _attributes(result: Result) -> dict[str, str | int | float]:
-    scene = result.scene
+    from msfp_gen.scenefile import scene_text
+
     return {
-        "title": scene.name or "unnamed",
+        "title": result.scene.name or "unnamed",
         "source": "msfp-gen",
         "status": result.status,
         "message": result.message,
-        **{f"counter_{name}": value for name, value in asdict(result.counters).items()},
-        **result.provenance,
+        "scene": scene_text(result.scene),
+        **_prefixed(COUNTER, asdict(result.counters)),
+        **_prefixed(PROVENANCE, result.provenance),
     }
+
+
+def _prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    return {prefix + name: value for name, value in values.items()}
+
+
+def _without(prefix: str, attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """The inverse of `_prefixed`; numbers of numpy as Python's."""
+    return {
+        str(name).removeprefix(prefix): value.item() if isinstance(value, np.generic) else value
+        for name, value in attributes.items()
+        if str(name).startswith(prefix)
+    }
+
+
+def _history(dataset: xr.Dataset) -> History:
+    arrays = {}
+    for field, rows in quantities().items():
+        columns = [dataset[name].to_numpy() for name in rows.names or (field,)]
+        arrays[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+    return History(**arrays, energy={name: dataset[f"energy_{name}"].to_numpy() for name in ENERGY})
+
+
+def _event_list(dataset: xr.Dataset) -> tuple[Event, ...]:
+    columns = [dataset[f"event_{name}"].to_numpy() for name in ("time", "surface", "kind", "displacement", "top_force")]
+    return tuple(
+        Event(float(time), int(surface), str(kind), displacement, force)  # type: ignore[arg-type]
+        for time, surface, kind, displacement, force in zip(*columns, strict=True)
+    )

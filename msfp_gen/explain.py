@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.fields import Quantity, ruled_fields
 from msfp_gen.tables import Table, vector, yes
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]
 def _motion(motion: Motion) -> Table:
     t = np.union1d(motion.knots, np.linspace(0, motion.duration, 4001))
     peaks = [np.abs(of(t)).max(axis=0) for of in (motion.displacement, motion.velocity, motion.acceleration)]
-    sources = [(str(key).replace("_", " "), str(value)) for key, value in motion.metadata.items()]
+    sources = [(str(key).replace("_", " "), _value(value)) for key, value in motion.metadata.items()]
     return Table(f"motion of the base: {motion.name or 'unnamed'}", (), [
         ("duration", f"{motion.duration:.6g} s, {len(motion.knots) - 1} pieces"),
         ("peak displacement along E1, E2, E3", f"{vector(peaks[0], 1e3)} mm"),
@@ -104,9 +105,12 @@ def _motion(motion: Motion) -> Table:
 
 
 def _top(top: Top) -> Table:
-    rules = {field.name: field for field in fields(top)}
-    rows = [(name.replace("_", " "), f"{_value(getattr(top, name))}") for name in rules]
-    return Table(f"top: {top.kind}, {TOPS[top.kind]} (SI)", (), rows)
+    rows = [
+        (name.replace("_", " "), f"{_value(getattr(top, name))} {rule.unit}")
+        for name, rule, _ in ruled_fields(type(top))
+        if isinstance(rule, Quantity)
+    ]
+    return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
 
 
 def _effects(effects: Effects) -> Table:

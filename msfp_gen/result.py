@@ -60,3 +60,10 @@ class Result:
         from msfp_gen.dataset import write_netcdf
 
         return write_netcdf(self, path)
+
+    @classmethod
+    def from_netcdf(cls, path: str | Path) -> Result:
+        """What `to_netcdf` wrote, its scene included. Raises InputError where `path` holds no result."""
+        from msfp_gen.dataset import read_result
+
+        return read_result(path)

@@ -24,7 +24,7 @@ RIMS = (1, 4)  # and those whose rims are met
 
 def is_monotonic(result: Result) -> bool:
     """Whether the run pushed the bearing one way: its motion is a ramp, or the displacement never came back."""
-    if result.scene.motion.metadata.get("kind") == "ramp":
+    if result.scene.motion.metadata.get("source") == "ramp":
         return True
     along, aside = _path(result.history)
     peak = along.max(initial=0.0)

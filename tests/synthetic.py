@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from msfp_gen.bearing import Bearing, Body, Surface
 from msfp_gen.history import ENERGY, Counters, Event, History
+from msfp_gen.layout import Effects, Layout
+from msfp_gen.motion import Motion
 from msfp_gen.result import Result
+from msfp_gen.scene import Scene
 from msfp_gen.top import Top
 
 CAPACITIES = (0.065, 0.019, 0.019, 0.065)
@@ -38,15 +41,15 @@ def history(
     )  # fmt: skip
 
 
-def scene(name: str = "made-up", capacities: Sequence[float] = CAPACITIES, kind: str = "harmonic") -> Any:
-    """As much of a scene as the views of a result read."""
-    surfaces = [SimpleNamespace(capacity=capacity) for capacity in capacities]
-    return SimpleNamespace(
-        name=name,
-        bearing=SimpleNamespace(surfaces=surfaces),
-        motion=SimpleNamespace(metadata={"kind": kind}),
-        top=Top.rig(axial_load=LOAD, stiffness=1e8),
-    )
+def scene(name: str = "made-up", capacities: Sequence[float] = CAPACITIES, kind: str = "harmonic") -> Scene:
+    """A scene whose motion is of a `kind` and whose stack has surfaces of these capacities, all concave up."""
+    count = len(capacities)
+    motion = Motion.ramp(0.1, 2.0) if kind == "ramp" else Motion.harmonic(0.1, 0.1)
+    surfaces = [Surface(radius=10.0, capacity=c, friction=0.05, yield_displacement=1e-4) for c in capacities]
+    bodies = [Body(height=0.02, centroid=0.01, mass=1.0, inertia=1e-3)] * count
+    bearing = Bearing(Layout(count + 1, count, 0), base_height=0.02, surfaces=surfaces, bodies=bodies)
+    top = Top.rig(axial_load=LOAD, stiffness=1e8)
+    return Scene(bearing, motion, top, Effects(rims=False), name=name)
 
 
 def contact(rows: History, surface: int) -> Event:
@@ -66,7 +69,7 @@ def ramp(stop2: float = 0.002, stop3: float = 0.048, rim1: float = 0.088, rim4: 
     sliding = np.cumsum(steps, axis=0)
     vector = np.stack([u1, 0 * u1, 0 * u1], axis=1)
     force = np.array([2e5, 0, 0]) * vector + [3e3, 0, LOAD]
-    capacities = tuple(np.interp(u, u1, sliding[:, i]) for u, i in ((rim1, 0), (1, 1), (1, 2), (rim4, 3)))
+    capacities = tuple(float(np.interp(u, u1, sliding[:, i])) for u, i in ((rim1, 0), (1, 1), (1, 2), (rim4, 3)))
     capacities = (capacities[0], 0.2, 0.2, capacities[3])
     rows = history(vector, force, sliding, capacities)
     return Result(scene("ramp", capacities, "ramp"), rows, (contact(rows, 1), contact(rows, 4)), Counters(steps=1450))

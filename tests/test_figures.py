@@ -57,7 +57,8 @@ def test_second_axis_is_force_over_load():
 
 def test_no_second_axis_without_a_load():
     run = loops()
-    run.scene.top = Top.prescribed(force=(0.0, 0.0, 0.0))
+    unloaded = dataclasses.replace(run.scene, top=Top.prescribed(force=(0.0, 0.0, 0.0)))
+    run = dataclasses.replace(run, scene=unloaded)
     assert not panels(plot_result(run))["Hysteresis along E₁"].child_axes
 
 
