@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.errors import InputError
-from msfp_gen.fields import Quantity, check_fields, require_type
+from msfp_gen.fields import Quantity, check_fields, located, require_type
 from msfp_gen.layout import Layout
 
 _LENGTH = Quantity("m", above=0.0)
@@ -173,13 +173,15 @@ class Bearing:
         whole = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **whole)
         rows = {name: list(getattr(base, name)) for name in _LISTS}
-        for column, value in changes.items():
+        for column, given in changes.items():
             if column not in owner:
                 known = ", ".join([*_names(Bearing), *owner])
                 raise InputError(f"bearing.{column}: unknown name; give one of {known}")
             items = rows[owner[column]]
-            values = _spread(column, value, len(items))
-            items[:] = [dataclass_replace(item, **{column: each}) for item, each in zip(items, values, strict=True)]
+            values = _spread(column, given, len(items))
+            for index, value in enumerate(values):
+                with located(type(items[index]).__name__.lower(), f"bearing.{owner[column]}[{index}]"):
+                    items[index] = dataclass_replace(items[index], **{column: value})
         return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:

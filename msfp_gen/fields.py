@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
 from functools import lru_cache
@@ -124,6 +125,16 @@ def check_fields(instance: Any, path: str) -> None:
             object.__setattr__(instance, name, rule.parse(value))
         except ValueError as error:
             raise InputError(f"{path}.{name} = {value!r}: {error}") from None
+
+
+@contextmanager
+def located(word: str, path: str) -> Iterator[None]:
+    """Give a message that names its field `word.field` the whole path of that field."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(path + text.removeprefix(word) if text.startswith(f"{word}.") else text) from None
 
 
 def require_type(value: object, kind: type | tuple[type, ...], path: str) -> None:

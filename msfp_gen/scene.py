@@ -99,12 +99,12 @@ class Scene:
     @property
     def end(self) -> float:
         """Time at which the run ends at the latest [s]."""
-        return self.motion.duration if self.duration is None else self.duration
+        return self.motion.duration if self.duration is None else min(self.duration, self.motion.duration)
 
     def _check_times(self) -> None:
-        if self.end > self.motion.duration * (1 + 1e-12):
+        if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):  # rounding is forgiven
             raise InputError(
-                f"duration = {self.end}: the motion lasts {self.motion.duration:.12g} s; give at most that, or hold "
+                f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or hold "
                 "the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
             )
         if self.output_step is not None and self.output_step > self.end:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 from msfp_gen import catalogue, schema
 from msfp_gen.bearing import Bearing, Body, Surface
 from msfp_gen.errors import InputError
-from msfp_gen.fields import ruled_fields
+from msfp_gen.fields import located, ruled_fields
 from msfp_gen.layout import Effects, Layout
 from msfp_gen.motion import Motion
 from msfp_gen.motion_tables import KINDS, Pieces
@@ -92,9 +91,8 @@ def _bearing(given: Mapping[str, Any]) -> Bearing:
     changes = dict(given)
     if "preset" in changes:
         preset = catalogue.bearing_table(changes.pop("preset"))
-        with _located("surface", "bearing.surfaces"), _located("body", "bearing.bodies"):
-            return bearing_from_table(preset).replace(**changes)
-    with _located("layout", "bearing.layout"):
+        return bearing_from_table(preset).replace(**changes)
+    with located("layout", "bearing.layout"):
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
         changes[name] = [_row(kind, row, word, f"bearing.{name}[{index}]") for index, row in enumerate(changes[name])]
@@ -102,18 +100,8 @@ def _bearing(given: Mapping[str, Any]) -> Bearing:
 
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
-    with _located(word, path):
+    with located(word, path):
         return kind(**row)
-
-
-@contextmanager
-def _located(word: str, path: str) -> Iterator[None]:
-    """Put the path in a file in front of a message that names its field `word.field`."""
-    try:
-        yield
-    except InputError as error:
-        text = str(error)
-        raise InputError(path + text.removeprefix(word) if text.startswith(f"{word}.") else text) from None
 
 
 def _motion(table: Mapping[str, Any]) -> Motion:

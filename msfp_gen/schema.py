@@ -166,6 +166,7 @@ def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: M
         said = f"{path}.kind = {value['kind']!r}" if "kind" in value else f"{path}.kind is missing"
         return f"{said}: give one of {context.get('expected_tags') or _kinds(path)}"
     remedy = str(context["error"]) if "error" in context else _WANTED.get(kind, "give a table")
+    remedy += " or the name of a preset" if path == "bearing" else ""
     return f"{path} = {_short(value)}{note}: {remedy}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -40,8 +41,8 @@ def _value(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, str):
         return _text(value)
-    if isinstance(value, int | float):
-        return repr(value)
+    if isinstance(value, Real):  # numpy's numbers too, whose own repr is no TOML
+        return repr(int(value) if isinstance(value, Integral) else float(value))
     if isinstance(value, Sequence):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     raise TypeError(f"TOML cannot hold {value!r}")
