@@ -1,0 +1,221 @@
+"""One body: its forward pass (kinematics up the stack) and its momentum balances.
+
+Up and down differ by a sign that sits in the arms; base and top plate are the same rows with
+R_0 = 0 below the base and R_n = 0 above the top plate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from .blocks import Blocks
+from .program import Program, Vector
+from .vectors import add, combine, cross, dot, project, scale, subtract
+
+Symbols = dict[str, Any]
+
+
+def arms(b: Blocks) -> Program:
+    """Distances along t3, from the positions (3.4)-(3.11)."""
+    p = Program("arms", "distances along t3 of one body, from (3.4)-(3.11)")
+    d: Symbols = p.read(b.dimensions, "d", active=False)
+    up = (1 + d["sign_lower"]) / 2
+    bottom = -d["sign_lower"] * d["radius_lower"]  # (3.5), (3.9)
+    centroid = up * d["centroid"] + (1 - up) * (d["height"] - d["centroid"])  # (3.6), (3.10)
+    p.write(b.arms, {"c": bottom + centroid,
+                     "e": bottom + d["height"] + d["sign_upper"] * d["radius_upper"]}, tangents=False)  # (3.4), (3.8)
+    return p
+
+
+def basis(p: Program, parent: Symbols, x: Symbols) -> tuple[Vector, Vector, Vector]:
+    """Co-rotational basis of a body from its parent's: (2.1)-(2.6)."""
+    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
+    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    t1, t2, t3 = parent["t1"], parent["t2"], parent["t3"]
+    t2_new = p.let_vector(add(scale(cos_psi, t2), scale(sin_psi, t3)), "t2")  # (2.4): t'_2 = t_2 of the body
+    t3_mid = p.let_vector(add(scale(-sin_psi, t2), scale(cos_psi, t3)), "tm")  # (2.4), (2.6)
+    t1_new = p.let_vector(add(scale(cos_theta, t1), scale(-sin_theta, t3_mid)), "t1")  # (2.5)
+    t3_new = p.let_vector(add(scale(sin_theta, t1), scale(cos_theta, t3_mid)), "t3")  # (2.5)
+    return t1_new, t2_new, t3_new
+
+
+def turn(p: Program, parent: Symbols, x: Symbols) -> Symbols:
+    """Basis, angular velocities (3.12) and their derivatives; declares the rates of everything."""
+    t1, t2, t3 = basis(p, parent, x)
+    w = p.let_vector(add(parent["w"], scale(x["psi1"], parent["t1"]), scale(x["theta1"], t2)), "w")  # (3.12)
+    wp = p.let_vector(add(w, scale(x["phi1"], t3)), "wp")  # (3.12), (2.29)
+    for angle in ("psi", "theta", "phi"):
+        if x[f"{angle}1"].is_Symbol:
+            p.rates[x[f"{angle}1"]] = x[f"{angle}2"]
+    p.declare_rates(parent["w"], parent["al"])
+    p.declare_rates(parent["t1"], cross(parent["w"], parent["t1"]))  # (2.36)
+    for t in (t2, t3):
+        p.declare_rates(t, p.let_vector(cross(w, t), "dt"))  # (2.36)
+    # omega follows from its own statement, not from a declared rate: d omega/dt is derived, not typed.
+    al = p.rate_vector(w)
+    alp = p.rate_vector(wp)
+    return {"t1": t1, "t2": t2, "t3": t3, "w": w, "wp": wp, "al": al, "alp": alp}
+
+
+def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Vector, Vector, Vector]:
+    """Position centre + distance * t3 with velocity and acceleration, obtained by differentiation."""
+    r = add(centre, scale(distance, t3))
+    v = p.rate_vector(r)
+    return p.let_vector(r, "r"), v, p.rate_vector(v)
+
+
+def forward(b: Blocks) -> Program:
+    """Body k from body k-1: (2.1)-(2.6), (3.4)-(3.12) and their derivatives."""
+    p = Program("forward", "kinematics of body k from body k-1: (2.1)-(2.6), (3.4)-(3.12), velocities and accelerations by differentiation")
+    par: Symbols = p.read(b.body_parameters, "par", active=False)
+    up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
+    x: Symbols = p.read(b.coordinates, "x", active=True)
+    out = turn(p, up, x)
+    p.declare_rates(up["C"], up["V"])
+    p.declare_rates(up["V"], up["A"])
+    out["C"], out["V"], out["A"] = point(p, up["C"], par["e"], out["t3"])
+    out["rc"], out["vc"], out["ac"] = point(p, up["C"], par["c"], out["t3"])
+    p.write(b.body, out, tangents=[q for q in b.body.quantities if q not in ("rc", "vc")])
+    return p
+
+
+def named_points(b: Blocks) -> Program:
+    """All named points of one body (3.4)-(3.11) with velocity and acceleration."""
+    p = Program("named_points", "named points of body k: (3.4)-(3.11) with velocity and acceleration")
+    d: Symbols = p.read(b.dimensions, "d", active=False)
+    up: Symbols = p.read(b.body, "u", active=False)
+    x: Symbols = p.read(b.coordinates, "x", active=False)
+    t3 = turn(p, up, x)["t3"]
+    p.declare_rates(up["C"], up["V"])
+    p.declare_rates(up["V"], up["A"])
+    concave_up = (1 + d["sign_lower"]) / 2
+    bottom = p.let(-d["sign_lower"] * d["radius_lower"])
+    centroid = p.let(bottom + concave_up * d["centroid"] + (1 - concave_up) * (d["height"] - d["centroid"]))
+    top = p.let(bottom + d["height"])
+    distances = {"lo": bottom, "cm": centroid, "up": top, "sc": p.let(top + d["sign_upper"] * d["radius_upper"])}
+    out: Symbols = {}
+    for name, distance in distances.items():
+        out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, up["C"], distance, t3)
+    p.write(b.points, out, tangents=False)
+    return p
+
+
+def weight_and_inertia(p: Program, par: Symbols, body: Symbols, massless: bool) -> Vector:
+    """m (a + g E3): what the interface below must carry more than the one above."""
+    gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
+    acceleration = gravity if massless else add(body["ac"], gravity)
+    return p.let_vector(scale(par["m"], acceleration), "inertia")
+
+
+def interface_force(b: Blocks, massless: bool) -> Program:
+    """Force through the interface below from the one above: (3.26), (3.28) summed from the top down."""
+    p = Program("interface_force", "force below a body from the force above: (3.26), (3.28), summed from the top down")
+    par: Symbols = p.read(b.body_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=("ac",))
+    above: Symbols = p.read(b.vector, "up")
+    p.write(b.vector, {"F": add(above["F"], weight_and_inertia(p, par, body, massless))})
+    return p
+
+
+def linear_balance(b: Blocks, massless: bool) -> Program:
+    """Residual of the balance of linear momentum (3.26), (3.28)."""
+    p = Program("linear_balance", "balance of linear momentum (3.26), (3.28): left side less right side")
+    par: Symbols = p.read(b.body_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=("ac",))
+    below: Symbols = p.read(b.vector, "lo")
+    above: Symbols = p.read(b.vector, "up")
+    p.write(b.linear, {"r": add(weight_and_inertia(p, par, body, massless), subtract(above["F"], below["F"]))})
+    return p
+
+
+def angular_balance(b: Blocks, massless: bool) -> Program:
+    """Residual of the balance of angular momentum (3.27), (3.29) about the centre of mass, along t_i.
+
+    The wrench of an interface is (F, M) with M about its sphere centre; r_gc - r_k = -c t3 below and
+    (e - c) t3 above, so that the moments of both forces share one product with t3.
+    """
+    p = Program("angular_balance", "balance of angular momentum (3.27), (3.29) about the centre of mass: left side less right side, along t_i")
+    par: Symbols = p.read(b.body_parameters, "par", active=False)
+    active = ("t1", "t2", "t3") if massless else ("t1", "t2", "t3", "wp", "alp")
+    body: Symbols = p.read(b.body, "b", active=active)
+    below: Symbols = p.read(b.vector, "lo")
+    moment_below: Symbols = p.read(b.moment, "ml")
+    above: Symbols = p.read(b.vector, "up")
+    moment_above: Symbols = p.read(b.moment, "mu")
+    t3 = body["t3"]
+    lever = p.let(par["e"] - par["c"])
+    weighted = p.let_vector(add(scale(par["c"], below["F"]), scale(lever, above["F"])), "g")
+    total = add(cross(t3, weighted), subtract(moment_above["M"], moment_below["M"]))  # -(right side)
+    if not massless:
+        total = add(total, rate_of_angular_momentum(p, par, body))
+    r = p.let_vector(total, "r")
+    p.write(b.angular, {"r": project((body["t1"], body["t2"], t3), r)})
+    return p
+
+
+def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
+    """J d omega'/dt + omega' x J omega' with J of (2.118), lambda_1 = lambda_2."""
+    t3, wp, alp = body["t3"], body["wp"], body["alp"]
+    difference = p.let(par["ja"] - par["jt"])
+    spin, spin_rate = p.let(dot(t3, wp)), p.let(dot(t3, alp))
+    gyroscopic = p.let_vector(cross(wp, t3), "gy")
+    return p.let_vector(add(scale(par["jt"], alp), scale(p.let(difference * spin_rate), t3),
+                            scale(p.let(difference * spin), gyroscopic)), "hdot")
+
+
+def body_energy(b: Blocks) -> Program:
+    """Kinetic and potential energy of one body in the frame that moves with the base, and the power of the frame."""
+    p = Program("body_energy", "energy of a body in the frame moving with the base")
+    par: Symbols = p.read(b.body_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    base: Symbols = p.read(b.base_motion, "o", active=False)
+    p.write(b.energy, energy_terms(p, par, body, body["rc"], body["vc"], base), tangents=False)
+    return p
+
+
+def energy_terms(p: Program, par: Symbols, body: Symbols, r: Vector, v: Vector, base: Symbols) -> Symbols:
+    """Energies of a rigid axisymmetric body whose centre of mass is at r with velocity v."""
+    relative = p.let_vector(subtract(v, base["U"]), "v")
+    spin = p.let(dot(body["t3"], body["wp"]))
+    rotation = (par["jt"] * dot(body["wp"], body["wp"]) + (par["ja"] - par["jt"]) * spin**2) / 2
+    return {"kinetic": par["m"] * dot(relative, relative) / 2 + rotation,
+            "potential": par["m"] * par["g"] * (r[2] - base["O"][2]),
+            "power": -par["m"] * dot(base["B"], relative)}
+
+
+def to_world(b: Blocks) -> Program:
+    """Moment of an interface from the basis of the body below to E."""
+    p = Program("moment_to_world", "moment about the sphere centre: from the basis of the body below to E")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    local: Symbols = p.read(b.moment, "loc")
+    p.write(b.moment, {"M": combine((body["t1"], body["t2"], body["t3"]), local["M"])})
+    return p
+
+
+def force_to_world(b: Blocks) -> Program:
+    """Force of an interface from the basis of the body below to E."""
+    p = Program("force_to_world", "force: from the basis of the body below to E")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    local: Symbols = p.read(b.vector, "loc")
+    p.write(b.vector, {"F": combine((body["t1"], body["t2"], body["t3"]), local["F"])})
+    return p
+
+
+def to_local(b: Blocks) -> Program:
+    """Contact force and relative angular velocity of a surface in the basis of the body below it."""
+    p = Program("surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    x: Symbols = p.read(b.coordinates, "x", active=("psi", "theta", "psi1", "theta1", "phi1"))
+    lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
+    total: Symbols = p.read(b.vector, "tot")
+    rim: Symbols = p.read(b.vector, "rim")
+    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
+    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    zero = sp.Integer(0)
+    t2: Vector = (zero, cos_psi, sin_psi)
+    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
+    relative = add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
+    p.write(b.local, {"p": subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"]), "dw": relative})
+    return p

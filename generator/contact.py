@@ -1,0 +1,200 @@
+"""One sliding surface: normal and friction force, slip, Bouc-Wen rates, drilling moment, rim.
+
+All vectors here are along the basis t_i of the body below the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from .blocks import Blocks
+from .program import Program, Vector
+from .vectors import add, dot, scale
+
+Symbols = dict[str, Any]
+SPIN_SMOOTHING = sp.Float("0.01")
+"""w_0 [rad/s] of the drilling moment (docs/model.md)."""
+
+
+class Step(sp.Function):  # type: ignore[misc]
+    """1 for a positive argument, else 0: the switches a, b of (3.18). Its derivative is zero on both sides."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """Zero on both sides of the switch."""
+        return sp.Integer(0)
+
+
+class ArcTan2(sp.Function):  # type: ignore[misc]
+    """atan2(y, x) with the derivative it has off its branch cut (SymPy's own adds a distribution on the cut)."""
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """x/(x^2 + y^2) and -y/(x^2 + y^2)."""
+        y, x = self.args
+        return (x if argindex == 1 else -y) / (x**2 + y**2)
+
+
+class Modulus(sp.Function):  # type: ignore[misc]
+    """|x|, with the derivative +-1 that it has on either side."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """+1 or -1."""
+        return 2 * Step(self.args[0]) - 1
+
+
+def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
+    """sqrt(x^2 + y^2); |x| where y vanishes identically (planar)."""
+    return Modulus(x) if y == 0 else sp.sqrt(x**2 + y**2)
+
+
+@dataclass(frozen=True)
+class Law:
+    """What the effects choose about friction."""
+
+    bouc_wen: str
+    patch: bool
+
+
+Basis = tuple[Vector, Vector, Vector]
+
+
+def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.Expr, cos_theta: sp.Expr) -> Basis:
+    """t~_1, t~_2, t~_3 (2.85), (3.13): R(psi~, theta~) applied to the basis of the body below."""
+    zero = sp.Integer(0)
+    t1: Vector = (cos_theta, p.let(sin_psi * sin_theta), p.let(-cos_psi * sin_theta))
+    t2: Vector = (zero, cos_psi, sin_psi)
+    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
+    return t1, t2, t3
+
+
+def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the isotropic law has one switch on f . v."""
+    yu, zv = p.let(Y * u), p.let(Z * v)
+    if law.bouc_wen == "report":
+        drive = p.let(Step(yu) * yu + Step(zv) * zv)
+    else:
+        drive = p.let(Step(p.let(yu + zv)) * (yu + zv))
+    return p.let((u - Y * drive) / dy, "dY"), p.let((v - Z * drive) / dy, "dZ")
+
+
+def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector) -> Symbols:
+    """Slip velocity (3.19), (2.98), Bouc-Wen rates (3.18) and the moment of the contact about the sphere centre."""
+    t1, t2, t3 = base
+    sliding = p.let(par["sign"] * par["R"])
+    # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
+    u, v = p.let(-sliding * dot(dw, t2), "u"), p.let(sliding * dot(dw, t1), "v")
+    dY, dZ = bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"])
+    # (3.14)-(3.17): the normal force passes through the centre; -sign R t~_3 x F_f is what is left.
+    arm = p.let(sliding * par["mu"] * N)
+    moment = add(scale(p.let(arm * f["Y"]), t2), scale(p.let(-arm * f["Z"]), t1))
+    drill = sp.Integer(0)
+    if law.patch:
+        spin = p.let(dot(dw, t3))
+        size = p.let(-sp.Rational(2, 3) * par["mu"] * par["rs"] * N * spin / sp.sqrt(spin**2 + SPIN_SMOOTHING**2))
+        moment = add(moment, scale(size, t3))
+        drill = p.let(size * spin)
+    return {"M": p.let_vector(moment, "M"), "dY": dY, "dZ": dZ, "u": u, "v": v, "drill": drill}
+
+
+def report_contact(b: Blocks, law: Law) -> Program:
+    """Contact force and moment at given unknowns psi~, theta~, N: (3.13)-(3.19) as the report states them."""
+    p = Program("report_contact", "contact force and moment at given psi~, theta~, N: (3.13)-(3.19)")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    x: Symbols = p.read(b.unknowns, "x")
+    f: Symbols = p.read(b.friction, "f")
+    loc: Symbols = p.read(b.local, "loc", active=("dw",))
+    base = contact_basis(p, *(p.let(g(x[a])) for a in ("psi", "theta") for g in (sp.sin, sp.cos)))
+    out = friction(p, law, par, base, x["N"], f, loc["dw"])
+    t1, t2, t3 = base
+    mu_n = p.let(-par["mu"] * x["N"])
+    force = add(scale(x["N"], t3), scale(p.let(mu_n * f["Y"]), t1), scale(p.let(mu_n * f["Z"]), t2))  # (3.15)-(3.17)
+    p.write(b.report_contact, {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"]})
+    return p
+
+
+def closed_form(p: Program, par: Symbols, force: Vector, f: Symbols) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+    """N and the sines and cosines of psi~, theta~ from the contact force: the inverse of (3.15)-(3.17).
+
+    P = N e with e = (-mu Y, -mu Z, 1) along t~_i. Rotating about axis 2 must bring e_1 to p_1, then
+    about axis 1 (e_2, w) to (p_2, p_3), where p = P/N.
+    """
+    ex, ey = p.let(-par["mu"] * f["Y"]), p.let(-par["mu"] * f["Z"])
+    length = p.let(sp.sqrt(1 + ex**2 + ey**2))
+    N = p.let(sp.sqrt(dot(force, force)) / length, "N")
+    px, py, pz = p.let_vector(scale(1 / N, force), "p")
+    square = p.let(1 + ex**2)
+    root = p.let(sp.sqrt(square - px**2))
+    sin_theta, cos_theta = p.let((px - ex * root) / square), p.let((ex * px + root) / square)
+    if py == 0 and ey == 0:  # planar
+        return N, (sp.Integer(0), sp.Integer(1), sin_theta, cos_theta)
+    w = p.let(cos_theta - ex * sin_theta)
+    norm = p.let(ey**2 + w**2)
+    return N, (p.let((ey * pz - w * py) / norm), p.let((ey * py + w * pz) / norm), sin_theta, cos_theta)
+
+
+def contact(b: Blocks, law: Law) -> Program:
+    """Contact moment, N and position of the normal at a given contact force (closed form) with the Bouc-Wen rates."""
+    p = Program("contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    loc: Symbols = p.read(b.local, "loc")
+    f: Symbols = p.read(b.friction, "f")
+    N, (sp_, cp_, st_, ct_) = closed_form(p, par, loc["p"], f)
+    base = contact_basis(p, sp_, cp_, st_, ct_)
+    out = friction(p, law, par, base, N, f, loc["dw"])
+    p.write(b.contact, {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
+            tangents=("M", "dY", "dZ"), columns="MSFP_LOCAL")
+    return p
+
+
+def gap(b: Blocks) -> Program:
+    """Sliding displacement and gap (3.20), (3.21); arccos by atan2, exact at zero tilt."""
+    p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    x: Symbols = p.read(b.rim_coordinates, "x", active=False)
+    cos_theta = p.let(sp.cos(x["theta"]))
+    across = p.let(norm(p.let(sp.sin(x["theta"])), p.let(sp.sin(x["psi"]) * cos_theta)))
+    s = p.let(par["R"] * ArcTan2(across, p.let(sp.cos(x["psi"]) * cos_theta)))
+    p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
+    return p
+
+
+def rim(b: Blocks) -> Program:
+    """Rim contact (3.20)-(3.25): gap, force and its moment about the sphere centre.
+
+    The rim sits on the slider: the body above a concave-up surface, the body below a concave-down one.
+    The caller applies it only while it pushes (docs/model.md, choice 4).
+    """
+    p = Program("rim", "rim contact (3.20)-(3.25); the caller applies it only while it pushes")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    x: Symbols = p.read(b.rim_coordinates, "x")
+    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
+    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    above: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))  # t_3 of the body above
+    below: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(1))
+    sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
+    cosine = above[2]
+    gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
+    for angle in ("psi", "theta"):
+        if x[angle].is_Symbol:
+            p.rates[x[angle]] = x[f"{angle}1"]
+    gap_rate = p.rate(gap)  # (2.102)
+    size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
+    up = p.let((1 + par["sign"]) / 2)
+    down = p.let((1 - par["sign"]) / 2)
+    # (3.24): the other body's axis projected on the face of the slider, normalised.
+    toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
+    force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
+    slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
+    arm = p.let(-par["sign"] * (par["R"] - par["pr"]))  # (3.25); the part r f_b is along the force
+    moment = p.let_vector(scale(arm, (slider[1] * force[2] - slider[2] * force[1], slider[2] * force[0] - slider[0] * force[2],
+                                      slider[0] * force[1] - slider[1] * force[0])), "M")
+    p.write(b.rim, {"f": force, "M": moment, "g": gap, "dg": gap_rate, "fc": size}, tangents=("f", "M"), columns="MSFP_RIM_LOCAL")
+    return p

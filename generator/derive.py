@@ -1,0 +1,43 @@
+"""Derive: all programs of one model from its specification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from msfp_gen.layout import ModelSpec
+
+from . import body, contact, top
+from .blocks import Blocks, make_blocks
+from .program import Program
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The straight-line programs of one body, one surface and the top, and the blocks between them."""
+
+    spec: ModelSpec
+    blocks: Blocks
+    programs: tuple[Program, ...]
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Coordinates of one body whose accelerations are unknown."""
+        if self.spec.effects.dimension == "planar":
+            return ("theta",)
+        return ("psi", "theta") if self.spec.effects.spin == "locked" else ("psi", "theta", "phi")
+
+
+def derive(spec: ModelSpec) -> Equations:
+    """Derive the programs; what an effect leaves out never enters them."""
+    effects = spec.effects
+    blocks = make_blocks(planar=effects.dimension == "planar")
+    law = contact.Law(effects.bouc_wen, patch=effects.spin == "patch" and effects.dimension == "spatial")
+    massless = effects.sliders == "massless"
+    programs = [body.arms(blocks), body.forward(blocks), body.named_points(blocks), body.to_local(blocks),
+                contact.contact(blocks, law), contact.report_contact(blocks, law), body.to_world(blocks),
+                body.force_to_world(blocks), body.interface_force(blocks, massless), body.linear_balance(blocks, massless),
+                body.angular_balance(blocks, massless), body.body_energy(blocks), top.top_wrench(blocks, massless),
+                top.top_energy(blocks), contact.gap(blocks)]
+    if effects.rims:
+        programs.append(contact.rim(blocks))
+    return Equations(spec, blocks, tuple(programs))

@@ -1,0 +1,79 @@
+"""Lowering: each program with the local partial derivatives its tangent needs (forward mode, statement by statement)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from .program import Program, Statement
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """d target = sum of partial * d source over the sources that carry a tangent."""
+
+    target: sp.Symbol
+    terms: tuple[tuple[sp.Expr, sp.Symbol], ...]
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A program ready to be emitted: its value statements, and the statements of its tangent."""
+
+    program: Program
+    values: tuple[Statement, ...]
+    partials: tuple[Statement, ...]
+    tangents: tuple[Tangent, ...]
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of the value form."""
+        return int(sum(sp.count_ops(s.expression, visual=False) for s in self.values))
+
+    @property
+    def tangent_operations(self) -> int:
+        """Arithmetic operations of one tangent column."""
+        return sum(2 * len(t.terms) - 1 for t in self.tangents)
+
+
+def live(program: Program, wanted: set[sp.Symbol]) -> tuple[Statement, ...]:
+    """Statements that the wanted names depend on."""
+    keep: list[Statement] = []
+    needed = set(wanted)
+    for statement in reversed(program.statements):
+        if statement.target in needed:
+            keep.append(statement)
+            needed |= statement.expression.free_symbols
+    return tuple(reversed(keep))
+
+
+def active_inputs(program: Program) -> set[sp.Symbol]:
+    """Input symbols that carry a tangent."""
+    return {sp.Symbol(f"{use.alias}_{name}", real=True) for use in program.inputs for name in use.active}
+
+
+def lower(program: Program) -> Kernel:
+    """Prune what no output needs and differentiate statement by statement."""
+    values = live(program, {s for e in program.results.values() for s in e.free_symbols})
+    if not program.tangents:
+        return Kernel(program, values, (), ())
+    targets = {s for name in program.tangents for s in program.results[name].free_symbols}
+    moving = active_inputs(program)
+    partials: list[Statement] = []
+    tangents: list[Tangent] = []
+    for statement in live(program, targets):
+        terms = []
+        for source in sorted(statement.expression.free_symbols & moving, key=str):
+            partial = sp.diff(statement.expression, source)
+            if partial == 0:
+                continue
+            if not (partial.is_Number or partial.is_Symbol or (-partial).is_Symbol):
+                name = sp.Symbol(f"p_{statement.target.name}_{source.name}", real=True)
+                partials.append(Statement(name, partial))
+                partial = name
+            terms.append((partial, source))
+        if terms:
+            moving.add(statement.target)
+            tangents.append(Tangent(statement.target, tuple(terms)))
+    return Kernel(program, values, tuple(partials), tuple(tangents))

@@ -1,0 +1,117 @@
+/* dopri5.c: the report's method. Dormand-Prince 5(4) (1980) with Newton's method on the 6(n-1) unknowns at every stage. */
+#include <math.h>
+#include <string.h>
+#include "msfp_model.h"
+
+#define NB MSFP_NB
+#define STAGES 7
+
+static const double a[STAGES][STAGES - 1] = {
+    { 0 },
+    { 1.0 / 5 },
+    { 3.0 / 40, 9.0 / 40 },
+    { 44.0 / 45, -56.0 / 15, 32.0 / 9 },
+    { 19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729 },
+    { 9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656 },
+    { 35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84 }
+};
+static const double c[STAGES] = { 0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1 };
+/* fifth-order weights less fourth-order weights */
+static const double e[STAGES] = { 71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40 };
+
+typedef struct {
+    double v[NB][3], a[NB][3], f[NB][2];
+} slope;
+
+/* State derivatives at a point: Newton on the report's unknowns, warm from the last stage. */
+static int slope_at(msfp_run *run, msfp_point *at, slope *s)
+{
+    msfp_solution solution;
+    int status = MSFP_E_NEWTON;
+    for (int warm = run->have_unknowns; warm >= 0 && status == MSFP_E_NEWTON; --warm) {
+        status = msfp_report_solve(&run->parameters, at, &run->work, run->unknowns, warm, &solution);
+        run->counts[MSFP_COUNT_NEWTON] += solution.iterations;
+        run->counts[MSFP_COUNT_EVALUATIONS] += 2 * solution.iterations + 1;
+        run->counts[MSFP_COUNT_FACTORISATIONS] += solution.iterations;
+    }
+    run->have_unknowns = status == MSFP_OK;
+    if (status)
+        return status;
+    if (solution.iterations) {
+        if (run->determinant == 0)
+            run->determinant = solution.determinant;
+        if (solution.determinant != run->determinant)
+            return MSFP_E_IRREGULAR;
+    }
+    memcpy(s->v, at->v, sizeof s->v);
+    memcpy(s->a, at->a, sizeof s->a);
+    msfp_friction_rates(&run->work, s->f);
+    return MSFP_OK;
+}
+
+static void combine(const msfp_state *now, const slope *k, const double *weights, int count, double h, msfp_point *at)
+{
+    memcpy(at->q, now->q, sizeof at->q);
+    memcpy(at->v, now->v, sizeof at->v);
+    memcpy(at->f, now->f, sizeof at->f);
+    for (int i = 0; i < count; ++i)
+        for (int b = 0; b < NB; ++b) {
+            for (int d = 0; d < 3; ++d) {
+                at->q[b][d] += h * weights[i] * k[i].v[b][d];
+                at->v[b][d] += h * weights[i] * k[i].a[b][d];
+            }
+            for (int d = 0; d < 2; ++d)
+                at->f[b][d] += h * weights[i] * k[i].f[b][d];
+        }
+}
+
+static int finish(msfp_run *run, const msfp_point *at, const slope *last, double h)
+{
+    msfp_state *next = &run->next;
+    double f[NB][2], residual[MSFP_DOF];
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    memcpy(seed.fp, at->f, sizeof seed.fp);
+    memcpy(f, at->f, sizeof f);
+    const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, f, residual, NULL);
+    if (status)
+        return status;
+    next->t = run->now.t + h;
+    memcpy(next->q, at->q, sizeof next->q);
+    memcpy(next->v, at->v, sizeof next->v);
+    memcpy(next->a, last->a, sizeof next->a);
+    memcpy(next->f, at->f, sizeof next->f);
+    memcpy(next->df, last->f, sizeof next->df);
+    msfp_powers(&run->parameters, at, at->f, &run->work, next->power);
+    for (int i = 0; i < MSFP_WORKS; ++i) /* steps are far below the scale of the powers: the trapezoid does */
+        next->work[i] = run->now.work[i] + 0.5 * h * (run->now.power[i] + next->power[i]);
+    return MSFP_OK;
+}
+
+int msfp_step_dopri5(msfp_run *run, double h, double *error)
+{
+    slope k[STAGES];
+    msfp_point at;
+    double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    memset(&at, 0, sizeof at);
+    memcpy(k[0].v, run->now.v, sizeof k[0].v);
+    memcpy(k[0].a, run->now.a, sizeof k[0].a);
+    memcpy(k[0].f, run->now.df, sizeof k[0].f);
+    for (int i = 1; i < STAGES; ++i) {
+        msfp_point_at(run, run->now.t + c[i] * h, &at);
+        combine(&run->now, k, a[i], i, h, &at);
+        const int status = slope_at(run, &at, &k[i]);
+        if (status)
+            return status;
+    }
+    for (int i = 0; i < STAGES; ++i)
+        for (int b = 0; b < NB; ++b) {
+            for (int d = 0; d < 3; ++d) {
+                dq[b][d] += h * e[i] * k[i].v[b][d];
+                dv[b][d] += h * e[i] * k[i].a[b][d];
+            }
+            for (int d = 0; d < 2; ++d)
+                df[b][d] += h * e[i] * k[i].f[b][d];
+        }
+    *error = msfp_error_norm(run, dq, dv, df);
+    return finish(run, &at, &k[STAGES - 1], h);
+}

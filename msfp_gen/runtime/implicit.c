@@ -1,0 +1,227 @@
+/* implicit.c: one step of a stiffly accurate ESDIRK method on the condensed equations.
+ *
+ * Unknowns of a stage are the angular rates v; q = Q + beta v and a = (v - V)/beta with beta = gamma h follow
+ * from the method's own formula, and Y, Z from theirs, surface by surface. Rates stay out of the error norm.
+ */
+#include <math.h>
+#include <string.h>
+#include "msfp_model.h"
+
+#define DOF MSFP_DOF
+#define NB MSFP_NB
+#define ND MSFP_ND
+
+#define STAGES 3
+typedef struct {
+    double gamma;
+    double a[STAGES][STAGES]; /* strictly lower part; the diagonal is gamma but for the explicit first stage */
+    double c[STAGES];
+    double e[STAGES];         /* weights less embedded weights */
+    double order;             /* exponent of the step controller: order of the error estimate + 1 */
+} tableau;
+
+#define ROOT2 1.41421356237309504880
+#define W (ROOT2 / 4.0)
+#define D (1.0 - ROOT2 / 2.0)
+
+/* TR-BDF2 with the embedded third-order estimate of Hosea and Shampine (1996). */
+static const tableau method = {
+    D,
+    { { 0, 0, 0 }, { D, 0, 0 }, { W, W, 0 } },
+    { 0.0, 2.0 - ROOT2, 1.0 },
+    { W - (1.0 - W) / 3.0, W - (3.0 * W + 1.0) / 3.0, D - D / 3.0 },
+    3.0
+};
+
+static const int angles[ND] = MSFP_ANGLES;
+
+typedef struct {
+    double v[STAGES][NB][3], a[STAGES][NB][3], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
+    double Q[NB][3], V[NB][3];
+    double beta;
+    msfp_seed seed;
+    msfp_point at;
+    double f[NB][2];
+} stages;
+
+/* What the stages before leave: q = Q + beta v, v = V + beta a, f = fp + beta df. */
+static void prepare(const msfp_run *run, stages *s, int i, double h)
+{
+    const msfp_state *now = &run->now;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < 3; ++d) {
+            s->Q[k][d] = now->q[k][d];
+            s->V[k][d] = now->v[k][d];
+            for (int j = 0; j < i; ++j) {
+                s->Q[k][d] += h * method.a[i][j] * s->v[j][k][d];
+                s->V[k][d] += h * method.a[i][j] * s->a[j][k][d];
+            }
+        }
+        for (int d = 0; d < 2; ++d) {
+            s->seed.fp[k][d] = now->f[k][d];
+            for (int j = 0; j < i; ++j)
+                s->seed.fp[k][d] += h * method.a[i][j] * s->df[j][k][d];
+        }
+    }
+}
+
+static void place(stages *s)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < 3; ++d)
+            s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i)
+            s->at.a[k][angles[i]] = (s->at.v[k][angles[i]] - s->V[k][angles[i]]) / s->beta;
+}
+
+/* Residual at the present rates relative to its natural size; infinite where it cannot be formed. */
+static double size_of(msfp_run *run, stages *s, double *residual)
+{
+    double scale[DOF], size = 0.0;
+    place(s);
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    if (msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, NULL))
+        return INFINITY;
+    msfp_residual_scale(&run->parameters, &run->work, scale);
+    for (int i = 0; i < DOF; ++i)
+        size = fmax(size, fabs(residual[i]) / scale[i]);
+    return size < INFINITY ? size : INFINITY;
+}
+
+static void move(stages *s, const double *step, double factor)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i)
+            s->at.v[k][angles[i]] -= factor * step[k * ND + i];
+}
+
+/* Newton direction at the present rates, in place of the residual. */
+static int direction(msfp_run *run, stages *s, double *residual)
+{
+    double tangent[DOF * DOF];
+    int pivots[DOF];
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, tangent);
+    if (status)
+        return status;
+    ++run->counts[MSFP_COUNT_FACTORISATIONS];
+    const int sign = msfp_lu(tangent, DOF, pivots);
+    if (sign == 0)
+        return MSFP_E_IRREGULAR;
+    run->work_sign = sign;
+    msfp_lu_solve(tangent, DOF, pivots, residual);
+    return MSFP_OK;
+}
+
+/* Newton with backtracking on the residual; the switches of friction and rims make it semi-smooth. */
+static int solve_stage(msfp_run *run, stages *s)
+{
+    const double goal = fmin(1e-4, fmax(1e-10, 1e-2 * run->options.rtol));
+    double residual[DOF], step[DOF];
+    double size = size_of(run, s, residual);
+    for (int i = 0; size > goal; ++i) {
+        if (i == 20 || !(size < INFINITY))
+            return MSFP_E_NEWTON;
+        ++run->counts[MSFP_COUNT_NEWTON];
+        const int status = direction(run, s, step);
+        if (status)
+            return status;
+        const double before = size;
+        double factor = 1.0;
+        move(s, step, 1.0);
+        size = size_of(run, s, residual);
+        while (size > before && factor > 0.05) {
+            move(s, step, -0.5 * factor);
+            factor *= 0.5;
+            size = size_of(run, s, residual);
+        }
+    }
+    if (run->work_sign && run->determinant == 0)
+        run->determinant = run->work_sign;
+    return run->work_sign && run->work_sign != run->determinant ? MSFP_E_IRREGULAR : MSFP_OK;
+}
+
+static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
+{
+    memcpy(s->at.v, run->now.v, sizeof s->at.v);
+    memcpy(s->f, i > 1 ? s->f : run->now.f, sizeof s->f);
+    if (extrapolate)
+        for (int k = 0; k < NB; ++k)
+            for (int d = 0; d < ND; ++d)
+                s->at.v[k][angles[d]] += method.c[i] * h * run->now.a[k][angles[d]];
+}
+
+static int stage(msfp_run *run, stages *s, int i, double h)
+{
+    prepare(run, s, i, h);
+    msfp_point_at(run, run->now.t + method.c[i] * h, &s->at);
+    int status = MSFP_E_NEWTON;
+    for (int attempt = 0; attempt < 2 && status == MSFP_E_NEWTON; ++attempt) {
+        guess(run, s, i, h, (run->restart ? 1 : 0) == attempt);
+        run->work_sign = 0;
+        status = solve_stage(run, s);
+    }
+    if (status)
+        return status;
+    memcpy(s->v[i], s->at.v, sizeof s->v[i]);
+    memcpy(s->a[i], s->at.a, sizeof s->a[i]);
+    msfp_friction_rates(&run->work, s->df[i]);
+    msfp_powers(&run->parameters, &s->at, s->f, &run->work, s->power[i]);
+    return MSFP_OK;
+}
+
+/* Y, Z beyond the unit disc are integration error; how far counts like any other error. */
+static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
+{
+    double worst = 0.0;
+    for (int j = 0; j < NB; ++j)
+        worst = fmax(worst, sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - 1.0);
+    return worst / (10.0 * run->options.rtol);
+}
+
+int msfp_step_implicit(msfp_run *run, double h, double *error)
+{
+    stages s;
+    double dq[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    const msfp_state *now = &run->now;
+    msfp_state *next = &run->next;
+    s.beta = method.gamma * h;
+    s.seed.cq = s.beta;
+    s.seed.cv = 1.0;
+    s.seed.ca = 1.0 / s.beta;
+    s.seed.beta = s.beta;
+    memset(&s.at, 0, sizeof s.at);
+    memcpy(s.v[0], now->v, sizeof s.v[0]);
+    memcpy(s.a[0], now->a, sizeof s.a[0]);
+    memcpy(s.df[0], now->df, sizeof s.df[0]);
+    memcpy(s.power[0], now->power, sizeof s.power[0]);
+    double disc = 0.0;
+    for (int i = 1; i < STAGES; ++i) {
+        const int status = stage(run, &s, i, h);
+        if (status)
+            return status;
+        disc = fmax(disc, beyond_disc(run, s.f));
+    }
+    next->t = now->t + h;
+    memcpy(next->q, s.at.q, sizeof next->q);
+    memcpy(next->v, s.at.v, sizeof next->v);
+    memcpy(next->a, s.at.a, sizeof next->a);
+    memcpy(next->f, s.f, sizeof next->f);
+    memcpy(next->df, s.df[STAGES - 1], sizeof next->df);
+    memcpy(next->power, s.power[STAGES - 1], sizeof next->power);
+    for (int e = 0; e < MSFP_WORKS; ++e) {
+        next->work[e] = now->work[e] + h * method.gamma * s.power[STAGES - 1][e];
+        for (int i = 0; i < STAGES - 1; ++i)
+            next->work[e] += h * method.a[STAGES - 1][i] * s.power[i][e];
+    }
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < STAGES; ++i) {
+            for (int d = 0; d < 3; ++d)
+                dq[k][d] += h * method.e[i] * s.v[i][k][d];
+            for (int d = 0; d < 2; ++d)
+                df[k][d] += h * method.e[i] * s.df[i][k][d];
+        }
+    *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
+    return MSFP_OK;
+}

@@ -1,0 +1,53 @@
+/* linear.c: dense LU with partial pivoting for the small systems of one step. */
+#include <math.h>
+#include "msfp_model.h"
+
+int msfp_lu(double *matrix, int n, int *pivots)
+{
+    int sign = 1;
+    for (int k = 0; k < n; ++k) {
+        int pivot = k;
+        for (int i = k + 1; i < n; ++i)
+            if (fabs(matrix[i * n + k]) > fabs(matrix[pivot * n + k]))
+                pivot = i;
+        pivots[k] = pivot;
+        if (!(fabs(matrix[pivot * n + k]) > 0.0))
+            return 0;
+        if (pivot != k) {
+            sign = -sign;
+            for (int j = 0; j < n; ++j) {
+                const double swap = matrix[k * n + j];
+                matrix[k * n + j] = matrix[pivot * n + j];
+                matrix[pivot * n + j] = swap;
+            }
+        }
+        if (matrix[k * n + k] < 0.0)
+            sign = -sign;
+        const double inverse = 1.0 / matrix[k * n + k];
+        for (int i = k + 1; i < n; ++i) {
+            const double factor = matrix[i * n + k] * inverse;
+            matrix[i * n + k] = factor;
+            if (factor != 0.0)
+                for (int j = k + 1; j < n; ++j)
+                    matrix[i * n + j] -= factor * matrix[k * n + j];
+        }
+    }
+    return sign;
+}
+
+void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
+{
+    for (int k = 0; k < n; ++k) {
+        const double swap = rhs[pivots[k]];
+        rhs[pivots[k]] = rhs[k];
+        rhs[k] = swap;
+    }
+    for (int i = 1; i < n; ++i)
+        for (int j = 0; j < i; ++j)
+            rhs[i] -= matrix[i * n + j] * rhs[j];
+    for (int i = n - 1; i >= 0; --i) {
+        for (int j = i + 1; j < n; ++j)
+            rhs[i] -= matrix[i * n + j] * rhs[j];
+        rhs[i] /= matrix[i * n + i];
+    }
+}

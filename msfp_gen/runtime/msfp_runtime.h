@@ -1,0 +1,218 @@
+/* msfp_runtime.h: types and functions of the runtime that is compiled with each model.
+ * Included by the generated msfp_model.h, which knows the dimensions. SI units throughout.
+ */
+#ifndef MSFP_RUNTIME_H
+#define MSFP_RUNTIME_H
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- values: a bearing and its top ------------------------------------------------------- */
+
+#define MSFP_SURFACE_VALUES 6 /* R, s_c, mu, d_y, k_c, c_c */
+#define MSFP_BODY_VALUES 7    /* l, z, m, J transverse, J axial, r, p; the base first (m, J, z unused) */
+#define MSFP_TOP_VALUES 10    /* k, c, k_rot, c_rot, m, J transverse, J axial, h, anchor x, anchor y */
+
+typedef struct {
+    double gravity;
+    double dimensions[MSFP_NB + 1][MSFP_DIMENSIONS_SIZE];
+    double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE];
+    double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
+    double top[MSFP_TOP_PARAMETERS_SIZE];
+} msfp_parameters;
+
+void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies /* [N][7] */,
+                         const double *surfaces /* [NB][6] */, const double *top /* [10] */);
+
+/* ---- one evaluation ---------------------------------------------------------------------- */
+
+/* Where the equations are evaluated. Angles psi, theta, phi of the moving bodies; Y, Z of the surfaces. */
+typedef struct {
+    double base[3][6]; /* u_g1..3, psi_1, theta_1, phi_1; first and second derivatives */
+    double load[6];    /* force and moment that the outside applies to the top plate at r_nn */
+    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3];
+    double f[MSFP_NB][2];
+} msfp_point;
+
+/* How q, v, a follow the unknown of a step (columns of the tangent) and Y, Z their stage formula
+ * f = fp + beta df/dt. beta = 0 holds Y, Z at fp. */
+typedef struct {
+    double cq, cv, ca, beta;
+    double fp[MSFP_NB][2];
+} msfp_seed;
+
+/* Everything one evaluation leaves behind, with tangents [field][column]. */
+typedef struct {
+    double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE];
+    double body[MSFP_NB + 1][MSFP_BODY_SIZE];
+    double force[MSFP_NB + 1][MSFP_FORCE_SIZE], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE];
+    double local[MSFP_NB][MSFP_LOCAL_SIZE];
+    double contact[MSFP_NB][MSFP_CONTACT_SIZE];
+    double rim[MSFP_NB][MSFP_RIM_SIZE];
+    double sliding[MSFP_NB][MSFP_GAP_SIZE];
+    int rim_active[MSFP_NB];
+    double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
+    double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
+    double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
+} msfp_work;
+
+enum {
+    MSFP_OK = 0,
+    MSFP_STOPPED,         /* a stop condition was met */
+    MSFP_E_NEWTON,        /* Newton's method did not converge at the smallest step */
+    MSFP_E_STEP,          /* the error control asks for a step below the smallest */
+    MSFP_E_IRREGULAR,     /* the determinant of the equations changed sign: no unique acceleration */
+    MSFP_E_UPLIFT,        /* an interface would have to pull */
+    MSFP_E_ANGLE,         /* theta near +-pi/2: the Euler angles are singular */
+    MSFP_E_STEPS,         /* the allowed number of steps is used up */
+    MSFP_E_FINITE,        /* a value is not finite */
+    MSFP_E_MEMORY
+};
+
+/* The condensed equations: angular balances with interface forces summed from the top and contact in
+ * closed form. On return f holds Y, Z. residual [DOF], tangent [DOF][DOF] or NULL. Nonzero on failure. */
+int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                   double f[MSFP_NB][2], double *residual, double *tangent);
+
+/* Natural size of each residual: N R (mu + 1/100) of the surface below. */
+void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
+
+/* Accelerations at a given state from the condensed equations; fills at->a. */
+typedef struct {
+    int iterations, determinant;
+    double residual;
+} msfp_solution;
+int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out);
+
+/* The report's 6(n-1) balances (planar: 3(n-1)). Unknowns in the order of (2.119): accelerations body by
+ * body, position angles of the normals surface by surface, normal forces. Rows: per body linear, angular. */
+#define MSFP_SPACE (MSFP_PLANAR ? 2 : 3)
+#define MSFP_ANGLES_A (MSFP_PLANAR ? 1 : 3)  /* accelerations of a body */
+#define MSFP_ANGLES_C (MSFP_PLANAR ? 1 : 2)  /* position angles of a normal */
+#define MSFP_UNKNOWNS (MSFP_NB * (MSFP_PLANAR ? 3 : 6))
+enum { MSFP_SEED_COORDINATE, MSFP_SEED_CONTACT, MSFP_SEED_FRICTION, MSFP_SEED_BASE, MSFP_SEED_LOAD };
+/* What one column of the report's Jacobian is taken with respect to. coordinate: body 0..NB, field 3*order + angle;
+ * contact: surface, psi~, theta~, N; friction: surface, Y, Z; base: 3*order + axis; load: 0..5. */
+typedef struct {
+    int kind, index, field;
+} msfp_variable;
+void msfp_report(const msfp_parameters *p, const msfp_point *at, const double *unknowns, msfp_work *w,
+                 double *residual, const msfp_variable *variables, int count, double *jacobian /* [UNKNOWNS][count] */);
+int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm, msfp_solution *out);
+
+void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
+
+/* Named points (3.1)-(3.11) of bodies 0..NB: [body][bottom, centre of mass, top, sphere centre][r, v, a][3];
+ * [body][omega, omega', their rates][3]; [body][t_1, t_2, t_3][3]. */
+void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *points, double *rotations, double *bases);
+
+/* Dense LU with partial pivoting, in place. Returns the sign of the determinant, 0 if singular. */
+int msfp_lu(double *matrix, int n, int *pivots);
+void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs);
+
+/* ---- histories: piecewise polynomials in time --------------------------------------------- */
+
+#define MSFP_DEGREE 5
+typedef struct {
+    int pieces;
+    const double *knots;        /* [pieces + 1] */
+    const double *coefficients; /* [pieces][6][MSFP_DEGREE + 1], ascending powers of t - knot */
+    int last;                   /* piece found last: the search starts there */
+} msfp_history;
+void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
+
+/* ---- runs ----------------------------------------------------------------------------------- */
+
+enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1 };
+
+typedef struct {
+    int method;
+    double rtol, atol_angle;
+    double max_step, first_step; /* 0: chosen */
+    double max_steps;
+    double duration, output_step; /* output_step 0: the solver's own steps */
+    double stop_displacement;     /* 0: none */
+    int stop_all_rims;
+} msfp_options;
+
+enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
+       MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
+
+/* Integrals over the run, in order: work put in, recoverable friction, dissipated friction, rims, top dampers. */
+enum { MSFP_WORK_INPUT, MSFP_WORK_FRICTION_STORED, MSFP_WORK_FRICTION, MSFP_WORK_RIM, MSFP_WORK_TOP, MSFP_WORKS };
+
+/* One row of output. */
+typedef struct {
+    double time;
+    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2];
+    double normal[MSFP_NB], angles[MSFP_NB][2], sliding[MSFP_NB], gap[MSFP_NB], rim[MSFP_NB], force[MSFP_NB][3], slip[MSFP_NB][2];
+    double base[3], top[3], top_force[3], top_moment[3];
+    double kinetic, potential, restraint, rim_stored;
+    double work[MSFP_WORKS];
+} msfp_row;
+#define MSFP_ROW_SIZE (sizeof(msfp_row) / sizeof(double))
+
+typedef struct {
+    double time;
+    int surface; /* 1-based; 0: none */
+    int kind;    /* 0 rim contact, 1 rim release, 2 stop */
+    double displacement[3], top_force[3];
+} msfp_event;
+
+/* Values at the end of a step from which the next goes on. */
+typedef struct {
+    double t;
+    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2], df[MSFP_NB][2];
+    double work[MSFP_WORKS], power[MSFP_WORKS];
+    double gap[MSFP_NB];
+} msfp_state;
+
+typedef struct {
+    msfp_parameters parameters;
+    msfp_history motion, load;
+    const double *jumps;
+    int jump_count, next_jump;
+    msfp_options options;
+    msfp_state now, next;
+    msfp_work work;
+    double h, previous_error, output_time;
+    double start[3]; /* r_01 - r_nn at the start */
+    double unknowns[MSFP_UNKNOWNS];
+    int have_unknowns, determinant, work_sign, restart;
+    long counts[MSFP_COUNTS];
+    int status, status_surface;
+    double status_value;
+    msfp_row *rows;
+    size_t row_count, row_capacity;
+    msfp_event *events;
+    size_t event_count, event_capacity;
+} msfp_run;
+
+/* Start a run: histories and jumps must outlive it. */
+int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+                   const double *jumps, int jump_count, const msfp_options *options,
+                   const double *q, const double *v, const double *f);
+/* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
+int msfp_run_advance(msfp_run *run, long steps);
+void msfp_run_free(msfp_run *run);
+const char *msfp_status_name(int status);
+
+/* Between the files of the runtime. */
+void msfp_point_at(msfp_run *run, double t, msfp_point *at);
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
+void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
+/* Whether the model holds at a state: no interface pulls, no angle is singular. 0 or a status. */
+int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
+/* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */
+double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const double dv[MSFP_NB][3], const double df[MSFP_NB][2]);
+void msfp_interpolate(const msfp_state *a, const msfp_state *b, double theta, msfp_state *out);
+/* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
+int msfp_step_implicit(msfp_run *run, double h, double *error);
+int msfp_step_dopri5(msfp_run *run, double h, double *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,156 @@
+/* observe.c: what is recorded of a state, and the powers of the energy balance.
+ *
+ * Energies are those of the frame that translates with the base (docs/model.md, choice 9).
+ */
+#include <math.h>
+#include <string.h>
+#include "msfp_kernels.h"
+
+#define NB MSFP_NB
+
+static double dot3(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void frame(const msfp_point *at, double *base)
+{
+    msfp_base_motion_O_put(base, at->base[0]);
+    msfp_base_motion_U_put(base, at->base[1]);
+    msfp_base_motion_B_put(base, at->base[2]);
+}
+
+/* Kinetic, potential and frame power of all masses that the model keeps. */
+static void energies(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double total[3])
+{
+    double base[MSFP_BASE_MOTION_SIZE], one[MSFP_ENERGY_SIZE];
+    frame(at, base);
+    total[0] = total[1] = total[2] = 0.0;
+    for (int k = 1; k <= NB; ++k) {
+        msfp_body_energy(p->body[k], w->body[k], base, one);
+        total[1] += one[MSFP_ENERGY_POTENTIAL];
+        if (!MSFP_MASSLESS) {
+            total[0] += one[MSFP_ENERGY_KINETIC];
+            total[2] += one[MSFP_ENERGY_POWER];
+        }
+    }
+    msfp_top_energy(p->top, w->body[NB], base, one);
+    total[0] += one[MSFP_ENERGY_KINETIC];
+    total[1] += one[MSFP_ENERGY_POTENTIAL];
+    total[2] += one[MSFP_ENERGY_POWER];
+}
+
+/* Friction of one surface: mu N f . slip, split into what Y, Z store and what is lost (3.16)-(3.18). */
+static void friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost)
+{
+    const double u = contact[MSFP_CONTACT_U], v = msfp_contact_v(contact);
+    const double yu = f[0] * u, zv = f[1] * v, square = f[0] * f[0] + f[1] * f[1];
+    const double drive = MSFP_ISOTROPIC ? fmax(yu + zv, 0.0) : fmax(yu, 0.0) + fmax(zv, 0.0);
+    const double force = par[MSFP_SURFACE_PARAMETERS_MU] * contact[MSFP_CONTACT_N];
+    *lost += force * square * drive - msfp_contact_drill(contact);
+    *stored += force * (yu + zv - square * drive);
+}
+
+static double rim_power(const msfp_work *w, int j)
+{
+    double moment[3], turning[3];
+    msfp_rim_M_get(w->rim[j], moment);
+    msfp_local_dw_get(w->local[j], turning);
+    return -dot3(moment, turning);
+}
+
+/* Work of the base on the stack by turning, of the rig's base point, and of the loads. */
+static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
+{
+    const double *body = w->body[NB], *t = p->top;
+    double relative[3], C[3], V[3], turning[3], axis[3], centre[3], force[3], moment[3], anchor[3];
+    msfp_body_C_get(body, C);
+    msfp_body_V_get(body, V);
+    msfp_body_wp_get(body, turning);
+    msfp_body_t3_get(body, axis);
+    msfp_top_parameters_x0_get(t, anchor);
+    for (int i = 0; i < 3; ++i)
+        relative[i] = V[i] - at->base[1][i];
+    double power = dot3(at->load, relative) + dot3(at->load + 3, turning);
+    power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
+    for (int i = 0; i < 2; ++i)
+        power += (t[MSFP_TOP_PARAMETERS_K] * (C[i] - anchor[i]) + t[MSFP_TOP_PARAMETERS_C] * V[i]) * at->base[1][i];
+    *damped = t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning);
+    msfp_body_V_get(w->body[0], centre);
+    msfp_body_wp_get(w->body[0], turning);
+    msfp_force_F_get(w->force[0], force);
+    msfp_moment_M_get(w->moment[0], moment);
+    for (int i = 0; i < 3; ++i)
+        relative[i] = centre[i] - at->base[1][i];
+    return power + dot3(force, relative) + dot3(moment, turning);
+}
+
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+{
+    double total[3];
+    energies(p, at, w, total);
+    memset(power, 0, MSFP_WORKS * sizeof *power);
+    power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]);
+    for (int j = 0; j < NB; ++j) {
+        friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
+        if (w->rim_active[j])
+            power[MSFP_WORK_RIM] += rim_power(w, j);
+    }
+}
+
+static double restraint_energy(const msfp_parameters *p, const msfp_work *w)
+{
+    const double *t = p->top;
+    double C[3], axis[3], anchor[3];
+    msfp_body_C_get(w->body[NB], C);
+    msfp_body_t3_get(w->body[NB], axis);
+    msfp_top_parameters_x0_get(t, anchor);
+    const double x = C[0] - anchor[0], y = C[1] - anchor[1];
+    /* 1 - t3.E3 without cancellation at small tilt */
+    const double lean = (axis[0] * axis[0] + axis[1] * axis[1]) / (1.0 + axis[2]);
+    return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean;
+}
+
+static double rim_energy(const msfp_parameters *p, const msfp_work *w)
+{
+    double total = 0.0;
+    for (int j = 0; j < NB; ++j)
+        if (w->rim_active[j]) {
+            const double *par = p->surface[j], g = w->sliding[j][MSFP_GAP_G];
+            /* the force acts at R - p from the centre, the gap is measured at R (3.20), (3.25) */
+            total += 0.5 * par[MSFP_SURFACE_PARAMETERS_KC] * g * g * (1.0 - par[MSFP_SURFACE_PARAMETERS_PR] / par[MSFP_SURFACE_PARAMETERS_R]);
+        }
+    return total;
+}
+
+void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
+{
+    double residual[MSFP_DOF], f[NB][2], total[3];
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    memcpy(seed.fp, at->f, sizeof seed.fp);
+    memcpy(f, at->f, sizeof f);
+    msfp_condensed(p, at, &seed, w, f, residual, NULL);
+    memcpy(row->q, at->q, sizeof row->q);
+    memcpy(row->v, at->v, sizeof row->v);
+    memcpy(row->a, at->a, sizeof row->a);
+    memcpy(row->f, at->f, sizeof row->f);
+    for (int j = 0; j < NB; ++j) {
+        const double *contact = w->contact[j];
+        row->normal[j] = contact[MSFP_CONTACT_N];
+        row->angles[j][0] = atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
+        row->angles[j][1] = atan2(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
+        row->sliding[j] = w->sliding[j][MSFP_GAP_S];
+        row->gap[j] = w->sliding[j][MSFP_GAP_G];
+        row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;
+        row->slip[j][0] = contact[MSFP_CONTACT_U];
+        row->slip[j][1] = msfp_contact_v(contact);
+        msfp_force_F_get(w->force[j], row->force[j]);
+    }
+    memcpy(row->base, at->base[0], sizeof row->base);
+    msfp_body_C_get(w->body[NB], row->top);
+    row->top[1] += MSFP_PLANAR ? at->base[0][1] : 0.0;
+    msfp_force_F_get(w->force[NB], row->top_force);
+    msfp_moment_M_get(w->moment[NB], row->top_moment);
+    energies(p, at, w, total);
+    row->kinetic = total[0];
+    row->potential = total[1];
+    row->restraint = restraint_energy(p, w);
+    row->rim_stored = rim_energy(p, w);
+}

@@ -1,0 +1,413 @@
+/* run.c: the loop of a run: step size, events, jumps, output. Resumable, so that a caller can look in between. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "msfp_kernels.h"
+
+#define NB MSFP_NB
+#define SMALLEST_STEP 1e-12
+#define RATE_SCALE 1e3 /* error weight of a rate against that of its angle, where rates count [1/s] */
+
+static const int angles[MSFP_ND] = MSFP_ANGLES;
+
+const char *msfp_status_name(int status)
+{
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory" };
+    return names[status];
+}
+
+void msfp_point_at(msfp_run *run, double t, msfp_point *at)
+{
+    /* Up to a jump the motion is that of the piece before it. */
+    if (run->next_jump < run->jump_count && t >= run->jumps[run->next_jump])
+        t = nextafter(run->jumps[run->next_jump], -INFINITY);
+    msfp_history_at(&run->motion, t, 3, at->base);
+    msfp_history_at(&run->load, t, 1, (double(*)[6])at->load);
+}
+
+double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const double dv[MSFP_NB][3], const double df[MSFP_NB][2])
+{
+    const double rtol = run->options.rtol, atol = run->options.atol_angle;
+    double worst = 0.0;
+    for (int k = 0; k < NB; ++k) {
+        for (int i = 0; i < MSFP_ND; ++i) {
+            const int d = angles[i];
+            const double q = fmax(fabs(run->now.q[k][d]), fabs(run->next.q[k][d]));
+            worst = fmax(worst, fabs(dq[k][d]) / (atol + rtol * q));
+            if (dv)
+                worst = fmax(worst, fabs(dv[k][d]) / (RATE_SCALE * atol + rtol * fabs(run->now.v[k][d])));
+        }
+        for (int d = 0; d < 2; ++d)
+            worst = fmax(worst, fabs(df[k][d]) / rtol);
+    }
+    return worst;
+}
+
+int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
+{
+    for (int j = 0; j < NB; ++j) {
+        double p[3];
+        msfp_local_p_get(w->local[j], p);
+        if (!(fabs(s->q[j][0]) + fabs(s->q[j][1]) + fabs(s->q[j][2]) < INFINITY) || !(fabs(p[2]) < INFINITY)) {
+            run->status_surface = j + 1;
+            return MSFP_E_FINITE;
+        }
+        if (p[2] <= 0.0) {
+            run->status_surface = j + 1;
+            run->status_value = p[2];
+            return MSFP_E_UPLIFT;
+        }
+        if (fabs(s->q[j][1]) > 1.5 || fabs(s->q[j][0]) > 1.5) {
+            run->status_surface = j + 1;
+            run->status_value = fabs(s->q[j][1]) > 1.5 ? s->q[j][1] : s->q[j][0];
+            return MSFP_E_ANGLE;
+        }
+    }
+    return MSFP_OK;
+}
+
+/* ---- dense output: cubic Hermite between accepted states --------------------------------------------- */
+
+static double hermite(double y0, double d0, double y1, double d1, double h, double s)
+{
+    const double r = 1.0 - s;
+    return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
+}
+
+void msfp_interpolate(const msfp_state *a, const msfp_state *b, double s, msfp_state *out)
+{
+    const double h = b->t - a->t;
+    out->t = a->t + s * h;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < 3; ++d) {
+            out->q[k][d] = hermite(a->q[k][d], a->v[k][d], b->q[k][d], b->v[k][d], h, s);
+            out->v[k][d] = hermite(a->v[k][d], a->a[k][d], b->v[k][d], b->a[k][d], h, s);
+            out->a[k][d] = (1.0 - s) * a->a[k][d] + s * b->a[k][d];
+        }
+        for (int d = 0; d < 2; ++d)
+            out->f[k][d] = hermite(a->f[k][d], a->df[k][d], b->f[k][d], b->df[k][d], h, s);
+    }
+    for (int i = 0; i < MSFP_WORKS; ++i)
+        out->work[i] = hermite(a->work[i], a->power[i], b->work[i], b->power[i], h, s);
+}
+
+static void to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
+{
+    memset(at, 0, sizeof *at);
+    msfp_point_at(run, s->t, at);
+    memcpy(at->q, s->q, sizeof at->q);
+    memcpy(at->v, s->v, sizeof at->v);
+    memcpy(at->a, s->a, sizeof at->a);
+    memcpy(at->f, s->f, sizeof at->f);
+}
+
+static void observe(msfp_run *run, const msfp_state *s, msfp_row *row)
+{
+    msfp_point at;
+    msfp_work w;
+    to_point(run, s, &at);
+    msfp_observe(&run->parameters, &at, &w, row);
+    row->time = s->t;
+    memcpy(row->work, s->work, sizeof row->work);
+}
+
+/* ---- output -------------------------------------------------------------------------------------------- */
+
+static void *grown(void *items, size_t count, size_t *capacity, size_t size)
+{
+    if (count < *capacity)
+        return items;
+    *capacity = *capacity ? 2 * *capacity : 256;
+    return realloc(items, *capacity * size);
+}
+
+static int write_row(msfp_run *run, const msfp_state *s)
+{
+    msfp_row *rows = grown(run->rows, run->row_count, &run->row_capacity, sizeof *rows);
+    if (!rows)
+        return MSFP_E_MEMORY;
+    run->rows = rows;
+    observe(run, s, &rows[run->row_count++]);
+    return MSFP_OK;
+}
+
+static int write_step(msfp_run *run)
+{
+    msfp_state s;
+    int status = MSFP_OK;
+    if (run->options.output_step <= 0.0)
+        return write_row(run, &run->next);
+    while (status == MSFP_OK && run->output_time <= run->next.t * (1.0 + 1e-14)) {
+        msfp_interpolate(&run->now, &run->next, fmin(1.0, (run->output_time - run->now.t) / (run->next.t - run->now.t)), &s);
+        status = write_row(run, &s);
+        run->output_time = run->options.output_step * (double)run->row_count;
+    }
+    return status;
+}
+
+static void across(const msfp_run *run, const msfp_row *row, double *displacement)
+{
+    for (int i = 0; i < 3; ++i)
+        displacement[i] = row->base[i] - row->top[i] - run->start[i];
+}
+
+static int write_event(msfp_run *run, const msfp_state *s, int surface, int kind)
+{
+    msfp_row row;
+    msfp_event *events = grown(run->events, run->event_count, &run->event_capacity, sizeof *events);
+    if (!events)
+        return MSFP_E_MEMORY;
+    run->events = events;
+    msfp_event *event = &events[run->event_count++];
+    observe(run, s, &row);
+    event->time = s->t;
+    event->surface = surface;
+    event->kind = kind;
+    across(run, &row, event->displacement);
+    memcpy(event->top_force, row.top_force, sizeof event->top_force);
+    ++run->counts[MSFP_COUNT_EVENTS];
+    return MSFP_OK;
+}
+
+/* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
+
+#define EVENTS (NB + 1)
+
+/* Event functions of a state: the gaps, and what is left to the stop displacement. */
+static void event_values(msfp_run *run, const msfp_state *s, double *g)
+{
+    msfp_row row;
+    double u[3];
+    observe(run, s, &row);
+    across(run, &row, u);
+    for (int j = 0; j < NB; ++j)
+        g[j] = row.gap[j];
+    g[NB] = run->options.stop_displacement > 0.0 ? run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]) : 1.0;
+}
+
+static double event_tolerance(const msfp_run *run, int i)
+{
+    return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
+}
+
+/* Where in the step the first event lies: its share of the step, or 1. */
+static double first_event(msfp_run *run, const double *before, const double *after)
+{
+    double first = 1.0, g[EVENTS];
+    for (int i = 0; i < EVENTS; ++i) {
+        const double tolerance = event_tolerance(run, i);
+        if (!(before[i] > tolerance && after[i] < -tolerance) || (i < NB && !MSFP_RIMS))
+            continue;
+        double low = 0.0, high = 1.0;
+        for (int n = 0; n < 40; ++n) {
+            msfp_state s;
+            const double middle = 0.5 * (low + high);
+            msfp_interpolate(&run->now, &run->next, middle, &s);
+            event_values(run, &s, g);
+            *(g[i] > 0.0 ? &low : &high) = middle;
+        }
+        first = fmin(first, high);
+    }
+    return first;
+}
+
+static int all_rims_met(const double *g)
+{
+    for (int j = 0; j < NB; ++j)
+        if (g[j] > 0.0)
+            return 0;
+    return 1;
+}
+
+/* Record what happened in the accepted step; 1: stop here. */
+static int record_events(msfp_run *run, const double *before, const double *after)
+{
+    int stop = 0;
+    for (int j = 0; j < NB && MSFP_RIMS; ++j) {
+        if (before[j] > 0.0 && after[j] <= 0.0)
+            write_event(run, &run->next, j + 1, 0);
+        else if (before[j] <= 0.0 && after[j] > 0.0)
+            write_event(run, &run->next, j + 1, 1);
+    }
+    if (after[NB] <= event_tolerance(run, NB) || (run->options.stop_all_rims && all_rims_met(after))) {
+        write_event(run, &run->next, 0, 2);
+        stop = 1;
+    }
+    return stop;
+}
+
+/* ---- the loop ------------------------------------------------------------------------------------------------ */
+
+/* Accelerations, friction rates and powers of the present state: at the start and after a jump of the base acceleration. */
+static int settle(msfp_run *run)
+{
+    msfp_point at;
+    msfp_solution solution = { 0, 0, 0.0 };
+    double f[NB][2], residual[MSFP_DOF];
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    to_point(run, &run->now, &at);
+    memset(at.a, 0, sizeof at.a);
+    if (!MSFP_MASSLESS) {
+        const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
+        if (status)
+            return status;
+        if (solution.iterations && run->options.method == MSFP_IMPLICIT && run->determinant == 0)
+            run->determinant = solution.determinant;
+    }
+    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(f, at.f, sizeof f);
+    const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, f, residual, NULL);
+    if (status)
+        return status;
+    memcpy(run->now.a, at.a, sizeof at.a);
+    msfp_friction_rates(&run->work, run->now.df);
+    msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
+    run->have_unknowns = 0;
+    run->restart = 1;
+    return msfp_check_state(run, &run->work, &run->now);
+}
+
+int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+                   const double *jumps, int jump_count, const msfp_options *options,
+                   const double *q, const double *v, const double *f)
+{
+    memset(run, 0, sizeof *run);
+    run->parameters = *p;
+    run->motion = *motion;
+    run->load = *load;
+    run->jumps = jumps;
+    run->jump_count = jump_count;
+    run->options = *options;
+    memcpy(run->now.q, q, sizeof run->now.q);
+    memcpy(run->now.v, v, sizeof run->now.v);
+    memcpy(run->now.f, f, sizeof run->now.f);
+    while (run->next_jump < jump_count && jumps[run->next_jump] <= 0.0)
+        ++run->next_jump;
+    run->status = settle(run);
+    if (run->status)
+        return run->status;
+    msfp_row row;
+    observe(run, &run->now, &row);
+    for (int i = 0; i < 3; ++i)
+        run->start[i] = row.base[i] - row.top[i];
+    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * options->duration);
+    run->previous_error = 1.0;
+    run->status = write_row(run, &run->now);
+    run->output_time = options->output_step;
+    return run->status;
+}
+
+static double target(const msfp_run *run)
+{
+    double end = run->options.duration;
+    if (run->next_jump < run->jump_count)
+        end = fmin(end, run->jumps[run->next_jump]);
+    return end;
+}
+
+static int try_step(msfp_run *run, double h, double *error)
+{
+    const int status = run->options.method == MSFP_DOPRI5 ? msfp_step_dopri5(run, h, error) : msfp_step_implicit(run, h, error);
+    if (status)
+        return status;
+    if (!(*error < INFINITY))
+        return MSFP_E_FINITE;
+    return *error <= 1.0 ? msfp_check_state(run, &run->work, &run->next) : MSFP_OK;
+}
+
+static double controlled(const msfp_run *run, double error)
+{
+    const double order = run->options.method == MSFP_DOPRI5 ? 5.0 : 3.0;
+    const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
+    return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+}
+
+/* Shrink after a failure that a shorter step may cure. Returns nonzero when there is no shorter step. */
+static int shrink(msfp_run *run, double h, double factor, int status)
+{
+    run->h = h * factor;
+    if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
+        return 0;
+    run->status = status;
+    return 1;
+}
+
+/* After an accepted step: record, move on. */
+static int accept(msfp_run *run, const double *before, const double *after, double error, double h)
+{
+    ++run->counts[MSFP_COUNT_STEPS];
+    run->h = h * controlled(run, error);
+    run->previous_error = error;
+    run->restart = 0;
+    const int stop = record_events(run, before, after);
+    run->status = write_step(run);
+    if (run->status)
+        return 0;
+    run->now = run->next;
+    if (stop) {
+        if (run->options.output_step > 0.0)
+            write_row(run, &run->now);
+        run->status = MSFP_STOPPED;
+        return 0;
+    }
+    if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] * (1.0 - 1e-15)) {
+        ++run->next_jump;
+        run->status = settle(run);
+        run->h = fmin(run->h, 1e-4);
+    }
+    return run->status == MSFP_OK;
+}
+
+static int one_step(msfp_run *run)
+{
+    double error = 0.0, before[EVENTS], after[EVENTS];
+    const double left = target(run) - run->now.t;
+    double h = run->h;
+    if (run->options.max_step > 0.0)
+        h = fmin(h, run->options.max_step);
+    h = h > 0.999 * left ? left : h > 0.5 * left ? 0.5 * left : h;
+    for (int relocations = 0;; ++relocations) {
+        const int status = try_step(run, h, &error);
+        if (status) {
+            run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
+            ++run->counts[MSFP_COUNT_REJECTED];
+            return !shrink(run, h, 0.25, status);
+        }
+        if (error > 1.0) {
+            ++run->counts[MSFP_COUNT_REJECTED];
+            return !shrink(run, h, fmax(0.1, 0.9 * pow(error, run->options.method == MSFP_DOPRI5 ? -0.2 : -1.0 / 3.0)), MSFP_E_STEP);
+        }
+        event_values(run, &run->now, before);
+        event_values(run, &run->next, after);
+        const double share = relocations < 4 ? first_event(run, before, after) : 1.0;
+        if (share >= 1.0)
+            break;
+        h *= share;
+    }
+    if (h == left) /* land on the target exactly */
+        run->next.t = target(run);
+    return accept(run, before, after, error, h);
+}
+
+int msfp_run_advance(msfp_run *run, long steps)
+{
+    for (long i = 0; i < steps && run->status == MSFP_OK; ++i) {
+        if (run->now.t >= run->options.duration)
+            return 0;
+        if ((double)(run->counts[MSFP_COUNT_STEPS] + run->counts[MSFP_COUNT_REJECTED]) >= run->options.max_steps) {
+            run->status = MSFP_E_STEPS;
+            break;
+        }
+        if (!one_step(run))
+            return 0;
+    }
+    return run->status == MSFP_OK && run->now.t < run->options.duration;
+}
+
+void msfp_run_free(msfp_run *run)
+{
+    free(run->rows);
+    free(run->events);
+    run->rows = NULL;
+    run->events = NULL;
+}
