@@ -104,8 +104,8 @@ class Scene:
     def _check_times(self) -> None:
         if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):  # rounding is forgiven
             raise InputError(
-                f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or hold "
-                "the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
+                f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
+                "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
             )
         if self.output_step is not None and self.output_step > self.end:
             raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")
