@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
 from msfp_gen.errors import MsfpError, RunError
 from msfp_gen.layout import Effects, Layout, ModelSpec
 from msfp_gen.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.solver import Solver
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -46,6 +47,11 @@ def _read(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
             raise typer.BadParameter(f"{text!r} is no {noun}; give one") from None
 
     return parse
+
+
+def _words(owner: type, field: str) -> str:
+    """The choices of a field, as help shows them."""
+    return "|".join(get_args(get_type_hints(owner)[field]))
 
 
 _whole, _number = _read(int, "whole number"), _read(float, "number")
@@ -95,11 +101,11 @@ def generate(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put sources and module here.")
     ] = None,
-    dimension: Annotated[str | None, typer.Option(metavar="spatial|planar")] = None,
-    spin: Annotated[str | None, typer.Option(metavar="locked|patch|free")] = None,
-    sliders: Annotated[str | None, typer.Option(metavar="inertial|massless")] = None,
+    dimension: Annotated[str | None, typer.Option(metavar=_words(Effects, "dimension"))] = None,
+    spin: Annotated[str | None, typer.Option(metavar=_words(Effects, "spin"))] = None,
+    sliders: Annotated[str | None, typer.Option(metavar=_words(Effects, "sliders"))] = None,
     rims: Annotated[bool | None, typer.Option("--rims/--no-rims", help="Whether sliders meet rims.")] = None,
-    bouc_wen: Annotated[str | None, typer.Option(metavar="report|isotropic")] = None,
+    bouc_wen: Annotated[str | None, typer.Option(metavar=_words(Effects, "bouc_wen"))] = None,
 ) -> None:
     """Derive, emit and compile the equations of a layout."""
     given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen}
@@ -122,7 +128,9 @@ def run(
         Path | None, typer.Option(metavar="FILE", help="Draw loops and sliding: .png, .svg or .pdf.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")] = False,
-    method: Annotated[str | None, typer.Option(metavar="implicit|dopri5", help="Instead of the scene's.")] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar=_words(Solver, "method"), help="Instead of the scene's.")
+    ] = None,
     rtol: Annotated[
         float | None, typer.Option(parser=_number, metavar="NUMBER", help="Relative tolerance, instead of the scene's.")
     ] = None,

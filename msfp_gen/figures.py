@@ -12,6 +12,7 @@ import numpy as np
 from msfp_gen.history import Event
 from msfp_gen.output import FIGURE_SUFFIXES, check_output, replacing
 from msfp_gen.summary import axial_load
+from msfp_gen.transitions import SYMBOLS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,12 +96,14 @@ def _draw_loop(axes: Axes, result: Result, axis: int) -> None:
         label = f"rim {event.surface} first met"
         axes.plot(event.displacement[axis] * MILLI, event.top_force[axis] * scale, **_mark(event), label=label)
     axes.set(
-        title=f"Hysteresis along E{name}",
+        title=f"Force and displacement along E{name}",
         xlabel=f"displacement across the bearing u{name} [mm]",
         ylabel=f"force on the top support F{name} [{prefix}N]",
     )
     axes.margins(0.06)
-    if _first_contacts(result):
+    if len(moving_axes(result)) == 1 and "transitions" in result.summary:
+        _draw_transitions(axes, result, axis)
+    elif _first_contacts(result):
         axes.legend(loc="upper left", handletextpad=0.1)
     load = axial_load(result)
     if load:
@@ -108,6 +111,24 @@ def _draw_loop(axes: Axes, result: Result, axis: int) -> None:
         ratio = axes.secondary_yaxis("right", functions=(partial(mul, 1 / factor), partial(mul, factor)))
         ratio.set_ylabel(f"F{name} / N  (N = {load / 1e3:.4g} kN)")
         ratio.spines["right"].set_visible(True)
+
+
+def _draw_transitions(axes: Axes, result: Result, axis: int) -> None:
+    """Dotted lines where the stages of a monotonic run change, each with its symbol and value."""
+    history = result.history
+    sign = np.sign(history.displacement[int(history.horizontal.argmax()), axis])
+    for key, value in result.summary["transitions"].items():
+        if not key.startswith("u_") or value is None:
+            continue
+        x = sign * value * MILLI
+        axes.axvline(x, color=FAINT, linewidth=0.9, linestyle=":")
+        # The curve rises: above it there is room on its first half, below it on its second.
+        above = value < history.horizontal.max() / 2
+        axes.annotate(
+            f"{SYMBOLS.get(key, key)} = {value * MILLI:.1f} mm", (x, float(above)),
+            xycoords=("data", "axes fraction"), xytext=(2, -4 if above else 4), textcoords="offset points",
+            va="top" if above else "bottom", rotation=90, fontsize=8, color=INK,
+        )  # fmt: skip
 
 
 def _draw_orbit(axes: Axes, result: Result) -> None:
@@ -129,7 +150,7 @@ def _draw_sliding(figure: SubFigure, result: Result) -> None:
     for index, (axes, surface) in enumerate(zip(strips[::-1], surfaces, strict=True)):
         capacity, sliding = surface.capacity * MILLI, history.sliding[:, index] * MILLI
         axes.axhline(capacity, color=INK, linewidth=0.9, linestyle=(0, (5, 3)))
-        axes.annotate(f"capacity {capacity:.3g} mm", (1, capacity), xycoords=("axes fraction", "data"), xytext=(0, 2),
+        axes.annotate(f"capacity {capacity:.3g} mm", (1, capacity), xycoords=("axes fraction", "data"), xytext=(0, 4),
                       textcoords="offset points", ha="right", va="bottom", fontsize=7.5, color=INK)  # fmt: skip
         axes.plot(history.time, sliding, color=_colour(index + 1))
         for event in contacts:

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.transitions import SYMBOLS
+
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
@@ -13,12 +15,12 @@ if TYPE_CHECKING:
     from msfp_gen.doctor import Check
     from msfp_gen.result import Result
 
-TRANSITIONS = {
-    "u_star": ("u*", "surface 2 stops"),
-    "u_star_star": ("u**", "surface 3 stops"),
-    "u_dr": ("u_dr{}", "rim {} met"),
-    "F_dr": ("F_dr{}/N", "force over axial load then"),
-    "resolution": ("resolution", "widest spacing of rows"),
+MEANINGS = {
+    "u_star": "surface 2 stops",
+    "u_star_star": "surface 3 stops",
+    "u_dr": "rim {} met",
+    "F_dr": "force over axial load when rim {} was met",
+    "resolution": "widest spacing of rows",
 }
 
 
@@ -139,11 +141,10 @@ def _surface_table(result: Result) -> Table:
 def _transition_table(transitions: Mapping[str, float | None]) -> Table:
     rows = []
     for key, value in transitions.items():
-        surface = key[4:] if key[:4] in TRANSITIONS else ""
-        name, meaning = (text.format(surface) for text in TRANSITIONS[key[:4] if surface else key])
-        shown = "not met" if value is None else f"{value:.4f}" if key.startswith("F_") else f"{value * 1e3:.2f} mm"
-        rows.append((name, shown, meaning))
-    return Table("stages of motion (Table 4.2 of the report)", (), rows)
+        kind = key.rstrip("0123456789")
+        shown = "not met" if value is None else f"{value:.4f}" if kind == "F_dr" else f"{value * 1e3:.2f} mm"
+        rows.append((SYMBOLS.get(key, key), shown, MEANINGS[kind].format(key.removeprefix(kind))))
+    return Table("stages of motion (Table 4.2 of the report), F over the axial load", (), rows)
 
 
 def _peaks(peaks: Mapping[str, float], scale: float) -> str:

@@ -19,6 +19,7 @@ WINDOW = 2e-4  # displacement over which shares of sliding are taken [m]
 SHARE = 0.05  # a surface that does less than this share of all sliding has stopped
 MONOTONIC = 1e-3  # way back or aside, over the largest displacement, that still counts as a monotonic run
 STOPS = {"u_star": 2, "u_star_star": 3}  # surfaces of a four-surface stack that stop (Table 4.2)
+SYMBOLS = {"u_star": "u*", "u_star_star": "u**"}  # as the report writes them; the others are written as they are
 RIMS = (1, 4)  # and those whose rims are met
 
 

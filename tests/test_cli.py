@@ -193,7 +193,7 @@ def test_monotonic_run_shows_the_stages(capsys, simulated, monkeypatch):
     lines = {line.split()[0]: line.split()[1:] for line in out.split("stages of motion")[1].splitlines()[1:]}
     assert lines["u*"] == ["1.98", "mm", "surface", "2", "stops"]
     assert lines["u_dr4"] == ["134.00", "mm", "rim", "4", "met"]
-    assert lines["F_dr4/N"][0] == "0.2661"
+    assert lines["F_dr4"][0] == "0.2661"
 
 
 def test_generate_says_what_was_built_and_where(capsys, monkeypatch, tmp_path):

@@ -38,8 +38,12 @@ def test_refuses_a_path_and_writes_nothing(name, tmp_path):
 def test_one_direction_gives_one_loop_in_mm_and_kn():
     run = loops()
     titles = panels(plot_result(run))
-    assert "Hysteresis along E₁" in titles and "Hysteresis along E₂" not in titles and "Orbit" not in titles
-    axes = titles["Hysteresis along E₁"]
+    assert (
+        "Force and displacement along E₁" in titles
+        and "Force and displacement along E₂" not in titles
+        and "Orbit" not in titles
+    )
+    axes = titles["Force and displacement along E₁"]
     x, y = axes.get_lines()[0].get_data()
     np.testing.assert_allclose(x, 1e3 * run.history.displacement[:, 0])
     np.testing.assert_allclose(y, 1e-3 * run.history.top_force[:, 0])
@@ -47,7 +51,7 @@ def test_one_direction_gives_one_loop_in_mm_and_kn():
 
 
 def test_second_axis_is_force_over_load():
-    axes = panels(plot_result(loops()))["Hysteresis along E₁"]
+    axes = panels(plot_result(loops()))["Force and displacement along E₁"]
     (second,) = axes.child_axes
     assert "F₁ / N" in second.get_ylabel() and "112 kN" in second.get_ylabel()
     low, high = axes.get_ylim()
@@ -59,11 +63,13 @@ def test_no_second_axis_without_a_load():
     run = loops()
     unloaded = dataclasses.replace(run.scene, top=Top.prescribed(force=(0.0, 0.0, 0.0)))
     run = dataclasses.replace(run, scene=unloaded)
-    assert not panels(plot_result(run))["Hysteresis along E₁"].child_axes
+    assert not panels(plot_result(run))["Force and displacement along E₁"].child_axes
 
 
 def test_two_directions_give_two_loops_and_the_orbit():
-    assert {"Hysteresis along E₁", "Hysteresis along E₂", "Orbit"} <= set(panels(plot_result(loops(both=True))))
+    assert {"Force and displacement along E₁", "Force and displacement along E₂", "Orbit"} <= set(
+        panels(plot_result(loops(both=True)))
+    )
 
 
 def test_every_surface_has_a_strip_with_its_capacity_and_rims():
@@ -97,6 +103,15 @@ def test_no_text_is_cut_or_lies_on_other_text(run):
         assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
     for (first, one), (second, other) in combinations(boxes, 2):
         assert not one.overlaps(other), (first, second)
+
+
+def test_stages_of_a_monotonic_run_are_marked():
+    axes = panels(plot_result(ramp()))["Force and displacement along E₁"]
+    marks = {text.get_text(): text.xy[0] for text in axes.texts}
+    assert marks == pytest.approx(
+        {"u* = 2.0 mm": 2.0, "u** = 48.1 mm": 48.1, "u_dr1 = 87.9 mm": 87.9, "u_dr4 = 134.0 mm": 134.0}, abs=0.05
+    )
+    assert not panels(plot_result(loops()))["Force and displacement along E₁"].texts
 
 
 def test_global_state_of_matplotlib_is_left_alone():
