@@ -42,8 +42,9 @@ def test_bases_are_the_printed_rotation_tensors() -> None:
 
     def tensor(angle: float, axis: int, basis: Array) -> Array:
         i, j, k = (basis[(axis + shift) % 3] for shift in range(3))  # turns j to k about i
-        return (np.cos(angle) * (np.outer(j, j) + np.outer(k, k)) + np.sin(angle) * (np.outer(k, j) - np.outer(j, k))
-                + np.outer(i, i))  # fmt: skip
+        turning: Array = np.cos(angle) * (np.outer(j, j) + np.outer(k, k))
+        turning += np.sin(angle) * (np.outer(k, j) - np.outer(j, k)) + np.outer(i, i)
+        return turning
 
     first = tensor(psi, 0, e)
     assert rotate(psi, theta, e) == pytest.approx(e @ (tensor(theta, 1, e @ first.T) @ first).T, abs=1e-15)
