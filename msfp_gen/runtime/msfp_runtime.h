@@ -99,7 +99,8 @@ typedef struct {
     int kind, index, field;
 } msfp_variable;
 void msfp_report(const msfp_parameters *p, const msfp_point *at, const double *unknowns, msfp_work *w,
-                 double *residual, const msfp_variable *variables, int count, double *jacobian /* [UNKNOWNS][count] */);
+                 double *residual, const msfp_variable *variables, int count, double *jacobian /* [UNKNOWNS][count] */,
+                 double *rates /* derivatives of dY/dt, dZ/dt [2 NB][count], zeroed by the caller, or NULL */);
 int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm, msfp_solution *out);
 
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);

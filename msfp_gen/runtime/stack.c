@@ -436,7 +436,7 @@ static void spread(const double *unknowns, msfp_point *at, double contact[NB][MS
 
 typedef struct {
     double contact[NB][MSFP_UNKNOWNS_SIZE], dcontact[NB][MSFP_UNKNOWNS_SIZE * DOF];
-    double dfriction[NB][FRICTION * DOF], dload[(VECTOR + MOMENT) * DOF], dground[MSFP_BODY_SIZE * DOF];
+    double dfriction[NB][FRICTION * DOF], drates[NB][FRICTION * DOF], dload[(VECTOR + MOMENT) * DOF], dground[MSFP_BODY_SIZE * DOF];
 } columns;
 
 /* Put a 1 where variable `v` lives, in column c. */
@@ -508,6 +508,7 @@ static void report_surface(const msfp_parameters *p, const msfp_point *at, msfp_
         msfp_moment_to_world(w->body[j], moment, w->moment[j]);
         return;
     }
+    memcpy(s->drates[j], dout + MSFP_REPORT_CONTACT_DY * DOF, sizeof s->drates[j]);
     for (int i = 0; i < VECTOR * DOF; ++i)
         dout[i] += drf[i];
     for (int i = 0; i < MOMENT * DOF; ++i)
@@ -542,7 +543,7 @@ static void report_rows(const msfp_parameters *p, msfp_work *w, int k, double *r
 }
 
 void msfp_report(const msfp_parameters *p, const msfp_point *given, const double *unknowns, msfp_work *w,
-                 double *residual, const msfp_variable *variables, int count, double *jacobian)
+                 double *residual, const msfp_variable *variables, int count, double *jacobian, double *rates)
 {
     msfp_point at = *given;
     columns s;
@@ -576,6 +577,9 @@ void msfp_report(const msfp_parameters *p, const msfp_point *given, const double
             for (int r = 0; r < ROWS_BODY; ++r)
                 memcpy(jacobian + ((size_t)(k - 1) * ROWS_BODY + r) * count + first, drows + r * DOF, width * sizeof *jacobian);
         }
+        for (int j = 0; j < NB && rates; ++j)
+            for (int r = 0; r < FRICTION; ++r)
+                memcpy(rates + ((size_t)2 * j + r) * count + first, s.drates[j] + r * DOF, width * sizeof *rates);
     }
 }
 
@@ -630,7 +634,7 @@ int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, do
     double last = INFINITY;
     out->determinant = 1;
     for (out->iterations = 0; out->iterations < 30; ++out->iterations) {
-        msfp_report(p, at, unknowns, w, residual, NULL, 0, NULL);
+        msfp_report(p, at, unknowns, w, residual, NULL, 0, NULL, NULL);
         out->residual = report_size(p, unknowns, residual);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
@@ -640,7 +644,7 @@ int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, do
             return MSFP_OK;
         }
         last = out->residual;
-        msfp_report(p, at, unknowns, w, residual, variables, MSFP_UNKNOWNS, jacobian);
+        msfp_report(p, at, unknowns, w, residual, variables, MSFP_UNKNOWNS, jacobian, NULL);
         out->determinant = msfp_lu(jacobian, MSFP_UNKNOWNS, pivots);
         if (out->determinant == 0)
             return MSFP_E_IRREGULAR;

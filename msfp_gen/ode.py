@@ -1,0 +1,76 @@
+"""A model as an ordinary differential equation for library integrators."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.packing import Array, load_values
+
+if TYPE_CHECKING:
+    from msfp_gen.bearing import Bearing
+    from msfp_gen.model import Model
+    from msfp_gen.motion import Motion
+    from msfp_gen.top import Top
+
+
+class Ode:
+    """y' = fun(t, y) with y = (q, v, h) flattened, shape (8(n-1),): angles [rad], rates [rad/s], Y and Z.
+
+    `jac(t, y)` is exact: the implicit function theorem on the report's balances. `y0` is centred and at rest.
+    Unpacks as `fun, jac, y0`.
+    """
+
+    def __init__(self, model: Model, bearing: Bearing, motion: Motion, top: Top) -> None:
+        if model.effects.sliders == "massless":
+            raise InputError("as_ode: a massless model is no ordinary differential equation; use sliders = 'inertial'")
+        if model.planar and motion.plane() != 0.0:
+            raise InputError("as_ode: a planar model takes a motion in the E1-E3 plane; turn it with motion.rotated(angle)")
+        self.model, self.motion = model, motion
+        self.count = model.layout.surfaces
+        self.stack = model.stack(bearing, top, anchor=motion.displacement(0.0)[:2])
+        self.load = load_values(top)
+        self.y0: Array = np.zeros(8 * self.count)
+
+    def __iter__(self):  # type: ignore[no-untyped-def]
+        return iter((self.fun, self.jac, self.y0))
+
+    def _split(self, y: Array) -> tuple[Array, Array, Array]:
+        k = 3 * self.count
+        q, v, h = y[:k].reshape(-1, 3), y[k:2 * k].reshape(-1, 3), y[2 * k:].reshape(-1, 2)
+        return np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), np.ascontiguousarray(h, float)
+
+    def _base(self, t: float) -> Array:
+        return np.ascontiguousarray([self.motion.evaluate(t, order) for order in range(3)], dtype=float)
+
+    def fun(self, t: float, y: Array) -> Array:
+        """State derivative, shape (8(n-1),). Raises RunError where no acceleration is found."""
+        q, v, h = self._split(np.asarray(y))
+        status, a, _, rates, *_ = self.stack.accelerations(q, v, h, self._base(t), self.load)
+        if status != "ok":
+            raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
+        return np.concatenate([v.ravel(), a.ravel(), rates.ravel()])
+
+    def jac(self, t: float, y: Array) -> Array:
+        """d fun / d y, shape (8(n-1), 8(n-1))."""
+        q, v, h = self._split(np.asarray(y))
+        base = self._base(t)
+        status, *_, unknowns = self.stack.accelerations(q, v, h, base, self.load, report=True)
+        if status != "ok":
+            raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
+        inner, outer = self.model._unknown_columns(), self.model._state_columns()
+        _, jacobian, rates = self.stack.report(q, v, h, base, self.load, unknowns, [*inner, *outer])
+        split = len(inner)
+        sensitivity = -np.linalg.solve(jacobian[:, :split], jacobian[:, split:])  # d unknowns / d y
+        k = 3 * self.count
+        out = np.zeros((8 * self.count, 8 * self.count))
+        out[:k, k:2 * k] = np.eye(k)
+        accelerations = sensitivity[: split // (3 if self.model.planar else 2)]
+        if self.model.planar:
+            out[k + 1:2 * k:3] = accelerations
+        else:
+            out[k:2 * k] = accelerations
+        out[2 * k:] = rates[:, split:] + rates[:, :split] @ sensitivity
+        return out

@@ -1,0 +1,85 @@
+"""Planar models hold for any vertical plane: turn the frame into it, and results back (docs/model.md, choice 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.packing import Array
+
+Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A state and what acts on it, as a compiled stack takes it; `azimuth` of its E1 axis in the user's frame [rad]."""
+
+    q: Array
+    v: Array
+    f: Array
+    base: Array
+    load: Array
+    azimuth: float = 0.0
+
+
+def turned(vectors: Array, angle: float) -> Array:
+    """Components (..., 3) in a frame turned by `angle` about E3."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.ascontiguousarray(vectors @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
+    """Angles psi, theta, phi of a tilt in the E1-E3 plane (azimuth 0) or the E2-E3 plane (pi/2) as theta alone."""
+    across, along, sign = (0, 1, 1.0) if abs(azimuth) < 1e-9 else (1, 0, -1.0)
+    if azimuth and abs(azimuth - np.pi / 2) > 1e-9 and np.any(q):
+        raise InputError(f"{name}: a planar model takes a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'")
+    if np.any(q[..., [across, 2]]):
+        raise InputError(f"{name} leaves the vertical plane of the model: give angles of that plane, or dimension = 'spatial'")
+    out = np.zeros_like(q)
+    out[..., 1] = sign * q[..., along]
+    return out
+
+
+def into_plane(state: State) -> State:
+    """The state seen in its own vertical plane, E1-E3 or E2-E3; InputError if it lies in neither."""
+    base = state.base.copy()
+    in_second = any(np.any(x) for x in (state.q[:, 0], state.v[:, 0], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]]))
+    azimuth = np.pi / 2 if in_second else 0.0
+    base[:, :3] = turned(base[:, :3], azimuth) if in_second else base[:, :3]
+    base[:, 3:] = tilts_into_plane(base[:, 3:], azimuth, "base_rotation")
+    force, moment = (turned(x, azimuth) if in_second else x for x in (state.load[:3], state.load[3:]))
+    f = turned_pairs(state.f, azimuth)
+    for name, value in (("h", f[:, 1]), ("base_acceleration", base[:, 1]), ("top_force", force[1:2]), ("top_moment", moment[[0, 2]])):
+        if np.any(np.abs(value) > 1e-12 * (1 + np.abs(np.concatenate([force, moment])).max())):
+            raise InputError(f"{name} leaves the vertical plane of the state: give one plane, or dimension = 'spatial'")
+    base[:, 1] = 0.0
+    return replace(state, q=tilts_into_plane(state.q, azimuth, "q"), v=tilts_into_plane(state.v, azimuth, "v"),
+                   f=np.ascontiguousarray(f * [1.0, 0.0]), base=base, load=np.concatenate([force, moment]), azimuth=azimuth)
+
+
+def turned_pairs(pairs: Array, angle: float) -> Array:
+    """Components (..., 2) along t_1, t_2 in a frame turned by `angle`."""
+    if not angle:
+        return pairs
+    padded = np.concatenate([pairs, np.zeros((*pairs.shape[:-1], 1))], axis=-1)
+    return np.ascontiguousarray(turned(padded, angle)[..., :2])
+
+
+def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
+    """Results of a planar model in the user's frame. Angles are exact at azimuth 0 and pi/2, else to order tilt^2."""
+    if not azimuth:
+        return values
+    if kind in ("vector", "axial"):
+        return turned(values, -azimuth)
+    if kind == "pair":
+        return turned_pairs(values, -azimuth)
+    first = 1 if kind in ("angles", "pair_angles") else 0
+    out = np.array(values)
+    out[..., 0] = -np.sin(azimuth) * values[..., first]
+    out[..., 1] = np.cos(azimuth) * values[..., first]
+    if abs(azimuth - np.pi / 2) < 1e-9:
+        out[..., 1] = 0.0
+    return out
