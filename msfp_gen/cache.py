@@ -22,12 +22,13 @@ from typing import Any
 from msfp_gen.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler
 from msfp_gen.errors import InputError
 from msfp_gen.layout import ModelSpec
+from msfp_gen.version import __version__
 
 MANIFEST_NAME = "manifest.json"
 PACKAGE = Path(__file__).parent
 # Everything written by hand that decides what a built model contains.
 ROOMS = (("generator", "*.py"), ("templates", "*.jinja"), ("runtime", "*.[ch]"))
-TOOLS = ("msfp-gen", "sympy", "cython", "jinja2")
+TOOLS = ("sympy", "cython", "jinja2")
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Entry:
         inputs = {
             "spec": spec.key,
             "sources": _digest_rooms(),
-            "tools": {tool: _version(tool) for tool in TOOLS},
+            "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
             "compiler": [*compiler.command, compiler.path, compiler.version],
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
