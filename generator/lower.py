@@ -76,4 +76,15 @@ def lower(program: Program) -> Kernel:
         if terms:
             moving.add(statement.target)
             tangents.append(Tangent(statement.target, tuple(terms)))
-    return Kernel(program, values, tuple(partials), tuple(tangents))
+    return Kernel(program, values, *pruned(partials, tangents, targets))
+
+
+def pruned(partials: list[Statement], tangents: list[Tangent], targets: set[sp.Symbol]) -> tuple[tuple[Statement, ...], tuple[Tangent, ...]]:
+    """What the wanted tangents depend on: a switch has no derivative, so what feeds it may fall away."""
+    needed, kept, used = set(targets), [], set()
+    for tangent in reversed(tangents):
+        if tangent.target in needed:
+            kept.append(tangent)
+            needed |= {source for _, source in tangent.terms}
+            used |= {s for partial, _ in tangent.terms for s in partial.free_symbols}
+    return tuple(p for p in partials if p.target in used), tuple(reversed(kept))
