@@ -168,7 +168,7 @@ def test_report_jacobians_against_differences(layout, spin):
     fine = 1e-4 if spin == "patch" else 1e-3
     checks = {"unknowns": (lambda x: residual(x, s, e), u, np.where(np.abs(u) > 1e3, 10.0, np.where(np.abs(u) < 0.2, fine, 1e-2))),
               "state": (lambda x: residual(u, x, e), s, np.full(len(s), fine)),
-              "inputs": (lambda x: residual(u, s, x), e, np.where(np.abs(e) > 1e2, 10.0, fine))}
+              "inputs": (lambda x: residual(u, s, x), e, np.where(np.arange(len(e)) >= 18, 10.0, fine))}
     for wrt, (function, x, steps) in checks.items():
         found = model.jacobian(bearing, state.q, state.v, h, u, wrt=wrt, **inputs(state, load))
         want = differences(function, x, steps)
