@@ -196,8 +196,8 @@ def demo(
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
     for name, scene in zip(DEMO, scenes, strict=True):
-        for path in _run(scene, output / f"{name}.nc", output / f"{name}.png"):
-            typer.echo(f"wrote {path}\n")
+        written = _run(scene, output / f"{name}.nc", output / f"{name}.png")
+        typer.echo("\n".join(["", *(f"wrote {path}" for path in written), ""]))
 
 
 def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
@@ -272,15 +272,15 @@ class _Progress:
         self._name = name
         self._shown = -1
 
-    def __enter__(self) -> Callable[[float], None] | None:
+    def __enter__(self) -> Callable[[float, float], None] | None:
         return self._update if sys.stderr.isatty() else None
 
     def __exit__(self, *_: object) -> None:
         if self._shown >= 0:
             typer.echo("\r\x1b[K", nl=False, err=True)
 
-    def _update(self, fraction: float) -> None:
-        percent = int(100 * fraction)
+    def _update(self, time: float, end: float) -> None:
+        percent = int(100 * time / end)
         if percent > self._shown:
             self._shown = percent
             typer.echo(f"\r\x1b[K{self._name}: {percent} %", nl=False, err=True)

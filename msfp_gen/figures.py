@@ -157,7 +157,8 @@ def _draw_sliding(figure: SubFigure, result: Result) -> None:
             if event.surface == index + 1:
                 axes.plot(event.time, capacity, **_mark(event))
         axes.set_ylabel(f"s{str(index + 1).translate(SUBSCRIPTS)} [mm]")
-        axes.set_ylim(0, 1.38 * max(capacity, sliding.max()))
+        top = 1.38 * max(capacity, sliding.max())
+        axes.set_ylim(-0.05 * top, top)  # a surface that is stuck at its centre does not hide on the frame
         axes.locator_params(axis="y", nbins=3)
     strips[0].set_title("Sliding of every surface" + ("  (▼ rim met)" if contacts else ""))
     strips[-1].set_xlabel("time t [s]")

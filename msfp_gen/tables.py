@@ -20,7 +20,7 @@ MEANINGS = {
     "u_star_star": "surface 3 stops",
     "u_dr": "rim {} met",
     "F_dr": "force over axial load when rim {} was met",
-    "resolution": "widest spacing of rows",
+    "resolution": "spacing of rows about the stops of surfaces",
 }
 
 

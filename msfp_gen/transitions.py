@@ -37,8 +37,8 @@ def transitions(result: Result, axial_load: float | None) -> dict[str, float | N
     """Displacements [m], and forces over the axial load, at which the stages of a monotonic run change.
 
     Four surfaces: u_star, u_star_star (surfaces 2, 3 stop), u_dr1, u_dr4, F_dr1, F_dr4 (rims 1, 4 met), Table 4.2.
-    Other stacks: u_dr and F_dr of every surface. What did not happen is None. `resolution` [m] is the widest spacing
-    of rows over the run: stops are known no better than that, rims are located exactly.
+    Other stacks: u_dr and F_dr of every surface. What did not happen is None. `resolution` [m] is the widest spacing of
+    rows about the stops found, which are known no better than that; rims are located exactly.
     """
     history = result.history
     four = history.surfaces == 4
@@ -49,7 +49,8 @@ def transitions(result: Result, axial_load: float | None) -> dict[str, float | N
         displacement, force = _first_contact(result, surface)
         found[f"u_dr{surface}"] = displacement
         found[f"F_dr{surface}"] = None if force is None or not axial_load else force / axial_load
-    found["resolution"] = float(np.diff(_path(history)[0]).max(initial=0.0))
+    if four:
+        found["resolution"] = max((_spacing(history, u) for u in map(found.get, STOPS) if u is not None), default=None)
     return found
 
 
@@ -84,6 +85,13 @@ def _share(u: Array, sliding: Array, surface: int, centres: Array, window: float
     total = increments.sum(axis=0)
     share: Array = np.divide(increments[surface - 1], total, out=np.zeros_like(total), where=total > 1e-6 * window)
     return share
+
+
+def _spacing(history: History, displacement: float) -> float:
+    """Distance [m] between the rows on either side of a displacement on the way out."""
+    out = np.maximum.accumulate(_path(history)[0])
+    row = int(np.searchsorted(out, displacement))
+    return float(out[row] - out[row - 1])
 
 
 def _path(history: History) -> tuple[Array, Array]:

@@ -6,7 +6,6 @@ import dataclasses
 import json
 import subprocess
 import sys
-from types import ModuleType
 
 import pytest
 from synthetic import loops, ramp
@@ -27,10 +26,8 @@ def simulated(monkeypatch):
         asked.append(scene)
         return dataclasses.replace(loops(), scene=scene)
 
+    monkeypatch.setattr("msfp_gen.simulation.simulate", simulate)
     monkeypatch.setattr("msfp_gen.build.build_model", lambda *_, **__: None)
-    module = ModuleType("msfp_gen.simulation")
-    module.simulate = simulate
-    monkeypatch.setitem(sys.modules, "msfp_gen.simulation", module)
     return asked
 
 
@@ -43,7 +40,7 @@ def failing(simulated, monkeypatch):
         raise RunError("t = 3 s, surface 2:\nNewton did not converge; give a smaller max_step", status="newton_failed",
                        result=partial)  # fmt: skip
 
-    monkeypatch.setattr(sys.modules["msfp_gen.simulation"], "simulate", simulate)
+    monkeypatch.setattr("msfp_gen.simulation.simulate", simulate)
 
 
 def assert_one_line_error(capsys, *words):
@@ -187,7 +184,7 @@ def test_failed_run_without_output_writes_nothing(capsys, failing, tmp_path, mon
 
 
 def test_monotonic_run_shows_the_stages(capsys, simulated, monkeypatch):
-    monkeypatch.setattr(sys.modules["msfp_gen.simulation"], "simulate", lambda *_, **__: ramp())
+    monkeypatch.setattr("msfp_gen.simulation.simulate", lambda *_, **__: ramp())
     assert main(["run", "fenz-monotonic"]) == 0
     out = capsys.readouterr().out
     lines = {line.split()[0]: line.split()[1:] for line in out.split("stages of motion")[1].splitlines()[1:]}
@@ -295,7 +292,7 @@ def test_interrupted_run_says_so(capsys, simulated, monkeypatch):
     def simulate(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["msfp_gen.simulation"], "simulate", simulate)
+    monkeypatch.setattr("msfp_gen.simulation.simulate", simulate)
     assert main(["run", "fenz-test2"]) == 130
     assert_one_line_error(capsys, "interrupted")
 
@@ -305,8 +302,32 @@ def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     cli._report(loops(), as_json=False)
     with cli._Progress("fenz-test5") as update:
-        for fraction in (0.0, 0.5, 0.5, 1.0):
-            update(fraction)
+        for time in (0.0, 20.0, 20.1, 40.0):
+            update(time, 40.0)
     out, err = capsys.readouterr()
     assert "─" in out and "fenz-test5" in out
     assert err.count("50 %") == 1 and "100 %" in err and err.endswith("\r\x1b[K")
+
+
+def test_real_run_from_scene_to_files(capsys, tmp_path):
+    """Nothing replaced: test 2 of the report, F/N = 0.083 at 25 mm."""
+    data, picture = tmp_path / "run.nc", tmp_path / "run.svg"
+    assert main(["run", "fenz-test2", "--json", "-o", str(data), "--plot", str(picture)]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["status"] == "ok" and summary["duration"] == 56.25
+    assert summary["peak_displacement"]["radial"] == pytest.approx(0.025, rel=0.01)
+    assert summary["peak_force_ratio"] == pytest.approx(0.083, abs=0.002)
+    assert summary["rims_met"] == [] and summary["energy"]["closure_error"] < 2e-3
+    assert Result.from_netcdf(data).summary == summary
+    assert picture.read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_real_monotonic_run_passes_all_stages(capsys):
+    """Closed form: u** = 47.3 mm; Table 4.2: the others. Wide bounds: the study of the table is in the benchmarks."""
+    assert main(["run", "fenz-monotonic", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["transitions"]
+    assert found["u_star"] == pytest.approx(0.0019, abs=3e-4)
+    assert found["u_star_star"] == pytest.approx(0.0473, abs=5e-4)
+    assert found["u_dr1"] == pytest.approx(0.087, abs=1e-3) and found["F_dr1"] == pytest.approx(0.175, abs=0.003)
+    assert found["u_dr4"] == pytest.approx(0.134, abs=3e-3) and found["F_dr4"] == pytest.approx(0.275, abs=0.012)
+    assert found["resolution"] < 5e-4

@@ -108,7 +108,7 @@ def test_other_stacks_get_every_rim():
     rows = dataclasses.replace(run.history, gap=0.05 - run.history.sliding)
     run = dataclasses.replace(run, history=rows, events=(contact(rows, 2),))
     found = transitions(run, LOAD)
-    assert set(found) == {"u_dr1", "u_dr2", "F_dr1", "F_dr2", "resolution"}
+    assert set(found) == {"u_dr1", "u_dr2", "F_dr1", "F_dr2"}
     assert found["u_dr2"] == pytest.approx(0.1) and found["u_dr1"] is None
 
 
