@@ -150,7 +150,7 @@ def contact(b: Blocks, law: Law) -> Program:
     base = contact_basis(p, sp_, cp_, st_, ct_)
     out = friction(p, law, par, base, N, f, loc["dw"])
     p.write(b.contact, {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
-            tangents=("M", "dY", "dZ"), columns="MSFP_LOCAL")
+            tangents=("M", "dY", "dZ", "N"), columns="MSFP_LOCAL")
     return p
 
 

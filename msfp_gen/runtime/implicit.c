@@ -42,6 +42,8 @@ typedef struct {
     msfp_seed seed;
     msfp_point at;
     double f[NB][2];
+    double factors[DOF * DOF]; /* LU of the last tangent */
+    int pivots[DOF], factored;
 } stages;
 
 /* What the stages before leave: q = Q + beta v, v = V + beta a, f = fp + beta df. */
@@ -96,21 +98,36 @@ static void move(stages *s, const double *step, double factor)
             s->at.v[k][angles[i]] -= factor * step[k * ND + i];
 }
 
+/* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that
+ * nearly vanishes, and a heavy top makes N itself depend strongly on the rates. Dividing removes that product. */
+static void relative_to_normal(const msfp_work *w, double *residual, double *tangent)
+{
+    for (int k = 0; k < NB; ++k) {
+        const double inverse = 1.0 / w->contact[k][MSFP_CONTACT_N];
+        for (int i = k * ND; i < (k + 1) * ND; ++i) {
+            residual[i] *= inverse;
+            for (int c = 0; c < DOF; ++c)
+                tangent[i * DOF + c] = inverse * (tangent[i * DOF + c] - residual[i] * w->dnormal[k][c]);
+        }
+    }
+}
+
 /* Newton direction at the present rates, in place of the residual. */
 static int direction(msfp_run *run, stages *s, double *residual)
 {
-    double tangent[DOF * DOF];
-    int pivots[DOF];
     ++run->counts[MSFP_COUNT_EVALUATIONS];
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, tangent);
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, s->factors);
+    s->factored = 0;
     if (status)
         return status;
+    relative_to_normal(&run->work, residual, s->factors);
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
-    const int sign = msfp_lu(tangent, DOF, pivots);
+    const int sign = msfp_lu(s->factors, DOF, s->pivots);
     if (sign == 0)
         return MSFP_E_IRREGULAR;
+    s->factored = 1;
     run->work_sign = sign;
-    msfp_lu_solve(tangent, DOF, pivots, residual);
+    msfp_lu_solve(s->factors, DOF, s->pivots, residual);
     return MSFP_OK;
 }
 
@@ -180,10 +197,43 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
     return worst / (10.0 * run->options.rtol);
 }
 
+/* The embedded estimate of an undamped fast mode is of the size of its ringing, however well the method damps it.
+ * Filter it as Hosea and Shampine (1996) do, by (1 - beta J)^-1: the last stage with its history moved by the
+ * estimate, solved with the factors at hand. */
+static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3], double df[NB][2])
+{
+    stages moved = *s;
+    double residual[DOF];
+    if (!s->factored)
+        return;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < 3; ++d) {
+            moved.Q[k][d] += dq[k][d];
+            moved.V[k][d] += dv[k][d];
+        }
+        for (int d = 0; d < 2; ++d)
+            moved.seed.fp[k][d] += df[k][d];
+    }
+    if (!(size_of(run, &moved, residual) < INFINITY))
+        return;
+    for (int i = 0; i < DOF; ++i)
+        residual[i] /= run->work.contact[i / ND][MSFP_CONTACT_N];
+    msfp_lu_solve(s->factors, DOF, s->pivots, residual);
+    move(&moved, residual, 1.0);
+    if (!(size_of(run, &moved, residual) < INFINITY))
+        return;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < 3; ++d)
+            dq[k][d] = moved.at.q[k][d] - s->at.q[k][d];
+        for (int d = 0; d < 2; ++d)
+            df[k][d] = moved.f[k][d] - s->f[k][d];
+    }
+}
+
 int msfp_step_implicit(msfp_run *run, double h, double *error)
 {
     stages s;
-    double dq[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
     s.beta = method.gamma * h;
@@ -196,6 +246,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
     memcpy(s.power[0], now->power, sizeof s.power[0]);
+    s.factored = 0;
     double disc = 0.0;
     for (int i = 1; i < STAGES; ++i) {
         const int status = stage(run, &s, i, h);
@@ -217,11 +268,19 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     }
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < STAGES; ++i) {
-            for (int d = 0; d < 3; ++d)
+            for (int d = 0; d < 3; ++d) {
                 dq[k][d] += h * method.e[i] * s.v[i][k][d];
+                dv[k][d] += h * method.e[i] * s.a[i][k][d];
+            }
             for (int d = 0; d < 2; ++d)
                 df[k][d] += h * method.e[i] * s.df[i][k][d];
         }
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
+    if (*error > 1.0) {
+        const msfp_work converged = run->work;
+        filter(run, &s, dq, dv, df);
+        run->work = converged;
+        *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
+    }
     return MSFP_OK;
 }

@@ -56,6 +56,7 @@ typedef struct {
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
     double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
+    double dnormal[MSFP_NB][MSFP_DOF];
 } msfp_work;
 
 enum {

@@ -202,7 +202,8 @@ static void rim_columns(const msfp_work *w, int j, const double *drim, double *d
 /* ---- contact of one surface -------------------------------------------------------------------- */
 
 #define FRICTION MSFP_FRICTION_SIZE
-#define ROWS (MOMENT + FRICTION) /* rows of the contact's tangent: M, dY, dZ */
+#define ROWS (MOMENT + FRICTION + 1) /* rows of the contact's tangent: M, dY, dZ, N */
+#define ACTIONS (MOMENT + 1)         /* what is condensed: M and N */
 
 static void contact_tangent(const double *par, const double *local, const double *f, double *out, double *jacobian)
 {
@@ -229,7 +230,7 @@ static int solve_small(const double *a, double *b)
 
 /* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation.
  * Newton from the last value, halved while it does not help. Leaves the contact and, condensed,
- * the Jacobian of its moment [MOMENT][MSFP_LOCAL_SIZE]. */
+ * the Jacobian of its moment and normal force [ACTIONS][MSFP_LOCAL_SIZE]. */
 static int friction_stage(const double *par, const double *local, const double *fp, double beta, double *f, double *out, double *condensed)
 {
     double jacobian[ROWS * MSFP_LOCAL], g[FRICTION], best = INFINITY, step[FRICTION] = { 0 };
@@ -275,10 +276,11 @@ static int friction_stage(const double *par, const double *local, const double *
                 b[r] = beta * jacobian[(MOMENT + r) * MSFP_LOCAL + k];
             if (!solve_small(a, b))
                 return MSFP_E_NEWTON;
-            for (int r = 0; r < MOMENT; ++r) {
-                double sum = jacobian[r * MSFP_LOCAL + k];
+            for (int r = 0; r < ACTIONS; ++r) {
+                const double *row = jacobian + (r < MOMENT ? r : MOMENT + FRICTION) * MSFP_LOCAL;
+                double sum = row[k];
                 for (int c = 0; c < FRICTION; ++c)
-                    sum += jacobian[r * MSFP_LOCAL + MSFP_LOCAL_SIZE + c] * b[c];
+                    sum += row[MSFP_LOCAL_SIZE + c] * b[c];
                 condensed[r * MSFP_LOCAL_SIZE + k] = sum;
             }
         }
@@ -289,7 +291,7 @@ static int friction_stage(const double *par, const double *local, const double *
 /* Force, slip, friction and moment of surface j. */
 static int surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
 {
-    double drim[(VECTOR + MOMENT + 3) * MSFP_RIM_LOCAL] = { 0 }, condensed[MOMENT * MSFP_LOCAL_SIZE], moment[MOMENT];
+    double drim[(VECTOR + MOMENT + 3) * MSFP_RIM_LOCAL] = { 0 }, condensed[ACTIONS * MSFP_LOCAL_SIZE], moment[MOMENT];
     double drf[VECTOR * DOF], dmoment[MOMENT * DOF], dlocal[MSFP_LOCAL_SIZE * DOF];
     const double *par = p->surface[j];
     const double fp[2] = { seed->fp[j][0], seed->fp[j][1] };
@@ -310,6 +312,10 @@ static int surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed
             for (int k = 0; k < MSFP_LOCAL_SIZE; ++k)
                 for (int c = 0; c < DOF; ++c)
                     dmoment[r * DOF + c] += condensed[r * MSFP_LOCAL_SIZE + k] * dlocal[k * DOF + c];
+        memset(w->dnormal[j], 0, sizeof w->dnormal[j]);
+        for (int k = 0; k < MSFP_LOCAL_SIZE; ++k)
+            for (int c = 0; c < DOF; ++c)
+                w->dnormal[j][c] += condensed[MOMENT * MSFP_LOCAL_SIZE + k] * dlocal[k * DOF + c];
         msfp_moment_to_world_tangent(w->body[j], moment, w->moment[j], w->dbody[j], dmoment, w->dmoment[j]);
     } else
         msfp_moment_to_world(w->body[j], moment, w->moment[j]);
