@@ -21,7 +21,7 @@ def test_catalogue_is_complete_and_described():
     expected |= {f"becker-{shape}-{mm}" for shape in ("circle", "eight") for mm in ORBITS}
     expected |= {"ridgecrest-ccc", "ridgecrest-clc"}
     assert set(presets.names("scene")) == expected
-    assert set(presets.names("bearing")) == {"fenz-tfp", "becker-tfp"}
+    assert set(presets.names("bearing")) == {"fenz-tfp", "becker-tfp", "prototype-tfp"}
     assert presets.names() == presets.names("bearing") | presets.names("scene")
     assert all(line and "\n" not in line for line in presets.names().values())
 
