@@ -1,0 +1,135 @@
+"""The programs as LaTeX, for people: `docs/make_equations.py` writes `docs/equations.md` with this.
+
+Nothing is typed by hand but names: what stands for a stored number (`SYMBOLS`) and which body or surface an
+argument of a program belongs to (`PLACES`). The equations themselves are those that become C. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import sympy as sp
+from sympy.printing.latex import LatexPrinter
+
+from .lower import live
+from .program import AXES, Block, Program, Statement, Use
+
+# Kind of record -> quantity -> symbol: @ is the number of the body or surface, # the component.
+SYMBOLS: dict[str, dict[str, str]] = {
+    "dimensions": {"height": r"\ell_{@}", "centroid": r"z_{@}",
+                   "sign_lower": r"\sigma_{@-1}", "sign_upper": r"\sigma_{@}",
+                   "radius_lower": r"R_{@-1}", "radius_upper": r"R_{@}"},
+    "arms": {"c": r"c_{@}", "e": r"e_{@}"},
+    "body_parameters": {"c": r"c_{@}", "e": r"e_{@}", "m": r"m_{@}",
+                        "jt": r"\lambda_{1}^{@}", "ja": r"\lambda_{3}^{@}", "g": "g"},
+    "surface_parameters": {"sign": r"\sigma_{@}", "R": r"R_{@}", "sc": r"s_{c@}", "mu": r"\mu_{@}", "dy": r"d_{@}",
+                           "kc": r"k_{c@}", "cc": r"c_{c@}", "rs": r"r_{s@}", "pr": r"p_{s@}"},
+    "coordinates": {"psi": r"\psi_{@}", "theta": r"\theta_{@}", "phi": r"\phi_{@}",
+                    "psi1": r"\dot{\psi}_{@}", "theta1": r"\dot{\theta}_{@}", "phi1": r"\dot{\phi}_{@}",
+                    "psi2": r"\ddot{\psi}_{@}", "theta2": r"\ddot{\theta}_{@}", "phi2": r"\ddot{\phi}_{@}"},
+    "rim_coordinates": {"psi": r"\psi_{@}", "theta": r"\theta_{@}",
+                        "psi1": r"\dot{\psi}_{@}", "theta1": r"\dot{\theta}_{@}"},
+    "body": {"t1": r"t_{1#}^{@}", "t2": r"t_{2#}^{@}", "t3": r"t_{3#}^{@}",
+             "w": r"\omega_{@,#}", "wp": r"\omega'_{@,#}", "al": r"\dot{\omega}_{@,#}", "alp": r"\dot{\omega}'_{@,#}",
+             "C": r"r_{@,#}^{c}", "V": r"\dot{r}_{@,#}^{c}", "A": r"\ddot{r}_{@,#}^{c}",
+             "rc": r"r_{@,#}", "vc": r"\dot{r}_{@,#}", "ac": r"\ddot{r}_{@,#}"},
+    "force": {"F": r"P_{@,#}"},
+    "moment": {"M": r"M_{@,#}"},
+    "rim_force": {"F": r"F_{c@,#}"},
+    "local_moment": {"M": r"M_{@,#}"},
+    "local": {"p": r"p_{@,#}", "dw": r"\Delta\omega'_{@,#}"},
+    "friction": {"Y": r"Y_{@}", "Z": r"Z_{@}"},
+    "unknowns": {"psi": r"\tilde{\psi}_{@}", "theta": r"\tilde{\theta}_{@}", "N": r"N_{@}"},
+    "contact": {"M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}", "N": r"N_{@}",
+                "sp": r"\sin\tilde{\psi}_{@}", "cp": r"\cos\tilde{\psi}_{@}",
+                "st": r"\sin\tilde{\theta}_{@}", "ct": r"\cos\tilde{\theta}_{@}",
+                "u": r"\tilde{u}_{@}", "v": r"\tilde{v}_{@}"},
+    "report_contact": {"p": r"p_{@,#}", "M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}"},
+    "rim": {"f": r"F_{c@,#}", "M": r"M_{c@,#}", "g": r"g_{@}", "dg": r"\dot{g}_{@}", "fc": r"F_{c@}"},
+    "gap": {"s": r"s_{@}", "g": r"g_{@}"},
+    "linear": {"r": r"\epsilon_{@,#}"},
+    "angular": {"r": r"\eta_{@,#}"},
+}
+# Components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
+LOCAL_KINDS = {"local", "local_moment", "rim_force", "contact", "report_contact", "rim", "angular"}
+
+# Program -> alias -> number of its body or surface.
+PLACES: dict[str, dict[str, str]] = {
+    "arms": {"d": "k", "out": "k"},
+    "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
+    "gap": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
+    "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
+    "interface_force": {"par": "k", "b": "k", "up": "k", "out": "k-1"},
+    "surface_local": {"b": r"\gamma", "x": r"\gamma+1", "y": r"\gamma", "tot": r"\gamma", "rim": r"\gamma",
+                      "out": r"\gamma"},
+    "contact": {"par": r"\gamma", "loc": r"\gamma", "f": r"\gamma", "out": r"\gamma"},
+    "moment_to_world": {"b": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
+    "report_contact": {"par": r"\gamma", "x": r"\gamma", "f": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
+    "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
+    "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
+}
+# Where an argument is another kind of record than its block's name says.
+KINDS = {("surface_local", "rim"): "rim_force", ("moment_to_world", "loc"): "local_moment"}
+
+
+class Latex(LatexPrinter):  # type: ignore[misc]
+    """SymPy's LaTeX with the project's own functions."""
+
+    def _function(self, name: str, expr: sp.Function, exp: Any) -> str:
+        text = rf"\operatorname{{{name}}}\left({', '.join(self._print(a) for a in expr.args)}\right)"
+        return text if exp is None else rf"{text}^{{{exp}}}"
+
+    def _print_Step(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("H", expr, exp)
+
+    def _print_ArcTan2(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("atan2", expr, exp)
+
+    def _print_Modulus(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("abs", expr, exp)
+
+
+def to_latex(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
+    """LaTeX of one expression; `names` says how symbols are written."""
+    return str(Latex({"symbol_names": dict(names)}).doprint(expression))
+
+
+def field_names(block: Block, kind: str, index: str) -> dict[str, str]:
+    """LaTeX of the stored fields of a block for body or surface `index`; what has no symbol is left out."""
+    marks = dict(zip(AXES, "123" if kind in LOCAL_KINDS else AXES, strict=True))
+    out: dict[str, str] = {}
+    for quantity, symbol in SYMBOLS[kind].items():
+        parts = block.quantities[quantity]
+        for part in parts:
+            if isinstance(part, str):
+                out[part] = symbol.replace("@", index).replace("#", marks[part[-1]] if len(parts) == 3 else "")
+    return out
+
+
+def names_of(program: Program, use: Use) -> dict[str, str]:
+    """LaTeX of the fields of one argument of a program."""
+    kind = KINDS.get((program.name, use.alias), use.block.name)
+    return field_names(use.block, kind, PLACES[program.name][use.alias])
+
+
+def written(program: Program, results: Iterable[str]) -> tuple[Statement, ...]:
+    """The statements that some results need, in their order."""
+    return live(program, {s for name in results for s in program.results[name].free_symbols})
+
+
+def statements(program: Program) -> list[tuple[str, str]]:
+    """Left and right sides, as LaTeX, of a program: results under their symbols, what lies between as x_1, x_2, ..."""
+    assert program.output is not None
+    names = {sp.Symbol(f"{use.alias}_{field}", real=True): text
+             for use in program.inputs for field, text in names_of(program, use).items()}
+    results = names_of(program, program.output)
+    names.update({program.results[field]: text for field, text in results.items() if program.results[field].is_Symbol})
+    rows: list[tuple[str, str]] = []
+    between = 0
+    for statement in written(program, results):
+        if statement.target not in names:
+            between += 1
+            names[statement.target] = f"x_{{{between}}}"
+        rows.append((names[statement.target], to_latex(statement.expression, names)))
+    return rows
