@@ -46,6 +46,11 @@ SYMBOLS: dict[str, dict[str, str]] = {
                 "st": r"\sin\tilde{\theta}_{@}", "ct": r"\cos\tilde{\theta}_{@}",
                 "u": r"\tilde{u}_{@}", "v": r"\tilde{v}_{@}"},
     "report_contact": {"p": r"p_{@,#}", "M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}"},
+    "top_parameters": {"k": "k_{T}", "c": "c_{T}", "kr": "k_{R}", "cr": "c_{R}", "m": "m_{T}", "jt": r"\lambda_{1}^{T}",
+                       "ja": r"\lambda_{3}^{T}", "h": "h_{T}", "g": "g", "x0": "u_{0,#}"},
+    "top_force": {"F": r"F_{E,#}"},
+    "top_moment": {"M": r"M_{E,#}"},
+    "top_wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
     "rim": {"f": r"F_{c@,#}", "M": r"M_{c@,#}", "g": r"g_{@}", "dg": r"\dot{g}_{@}", "fc": r"F_{c@}"},
     "gap": {"s": r"s_{@}", "g": r"g_{@}"},
     "linear": {"r": r"\epsilon_{@,#}"},
@@ -66,11 +71,13 @@ PLACES: dict[str, dict[str, str]] = {
     "contact": {"par": r"\gamma", "loc": r"\gamma", "f": r"\gamma", "out": r"\gamma"},
     "moment_to_world": {"b": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "report_contact": {"par": r"\gamma", "x": r"\gamma", "f": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
+    "top_wrench": {"par": "T", "b": "n", "x": "n", "fe": "E", "me": "E", "out": "n"},
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
     "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
 }
 # Where an argument is another kind of record than its block's name says.
-KINDS = {("surface_local", "rim"): "rim_force", ("moment_to_world", "loc"): "local_moment"}
+KINDS = {("surface_local", "rim"): "rim_force", ("moment_to_world", "loc"): "local_moment",
+         ("top_wrench", "fe"): "top_force", ("top_wrench", "me"): "top_moment"}
 
 
 class Latex(LatexPrinter):  # type: ignore[misc]

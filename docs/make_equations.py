@@ -1,0 +1,106 @@
+"""Write docs/equations.md from the programs that become C: `python docs/make_equations.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from msfp_gen.generator.assembled import assembled_latex
+from msfp_gen.generator.derive import derive
+from msfp_gen.generator.latex import statements
+from msfp_gen.layout import Effects, Layout, ModelSpec
+
+TARGET = Path(__file__).with_name("equations.md")
+ROWS = 6  # statements in one block: small blocks render everywhere
+
+INTRODUCTION = r"""# The equations, as the generator holds them
+
+Written by `docs/make_equations.py` from the same programs that become C; do not edit. Equation numbers are those of
+PEER Report 2017/07; [model.md](model.md) explains what is computed and why.
+
+## A small stack, assembled
+
+The planar stack $(n, m, p) = (2, 1, 0)$, one slider in one bowl, over a base that translates by $u_{g1}, u_{g3}$. The
+rim is open. The outside applies $F_1, F_3$ and $M_2$ to the top plate at $r_{22}$; $\lambda_{1}^{2}$ is the transverse
+moment of inertia of body 2 (2.118), $d_1$ the yield displacement ($R_0/R_1$ of the report), $H(x)$ is 1 for $x > 0$ and
+else 0. Unknown are $\ddot\theta_2$, $\tilde\theta_1$ and $N_1$ (2.119)."""
+
+ASSEMBLED = {
+    "E1": ("Linear momentum along $E_1$ (3.28):", " = 0"),
+    "E3": ("Linear momentum along $E_3$ (3.28):", " = 0"),
+    "t2": ("Angular momentum about the centre of mass, along $t_2$ (3.29):", " = 0"),
+    "dY": ("Friction (3.18):", r" = \dot{Y}_1"),
+}
+
+PASSES = r"""## One body and one surface, spatial
+
+These are the statements of one body $k$ (between surfaces $k-1$ and $k$) and of one surface $\gamma$ (between bodies
+$\gamma$ and $\gamma+1$), in the order in which they run. The C loops over bodies and surfaces, so that they hold for
+every stack.
+
+- $\sigma = +1$ where a surface is concave up, $-1$ where it is concave down; the radius below the base and that above
+  the top plate count as 0.
+- Subscripts $x, y, z$ are components along $E_1, E_2, E_3$; 1, 2, 3 are components along the basis of the body below
+  the surface (of the body itself in the angular balance).
+- $r_{k}^{c}$ is the sphere centre above body $k$, $r_{kc}$ of (3.4) and (3.8), and $r_{nn}$ for the top plate.
+- $P_k, M_k$ is the wrench through interface $k$ on the body above, the moment about the sphere centre; $P_n, M_n$ is
+  $-F_{top}, -M_{top}$. $F_E, M_E$ is what the outside prescribes of it.
+- $r_{s\gamma}, p_{s\gamma}$ are rim radius and rim offset of the slider of surface $\gamma$.
+- $x_1, x_2, \dots$ are numbers that a program keeps to itself."""
+
+TITLES = {
+    "arms": "Distances along the axis, from (3.4)-(3.11)",
+    "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
+    "gap": "Sliding and gap (3.20), (3.21)",
+    "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
+    "top_wrench": "The top (3.28), (3.29): rig springs, supported mass and outside load",
+    "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",
+    "surface_local": "Contact force and slip rotation in the basis of the body below (3.12), (3.19)",
+    "contact": "Normal force and its position in closed form, friction (3.13)-(3.19)",
+    "report_contact": "The same at given unknowns, as the report states it (3.13)-(3.19)",
+    "moment_to_world": "Moment about the sphere centre",
+    "linear_balance": "Balance of linear momentum (3.26), (3.28): left side less right side",
+    "angular_balance": "Balance of angular momentum (3.27), (3.29): left side less right side",
+}
+
+
+def block(rows: list[str]) -> str:
+    """One displayed block of aligned rows."""
+    inner = " \\\\\n".join(rows)
+    return f"$$\n\\begin{{aligned}}\n{inner}\n\\end{{aligned}}\n$$"
+
+
+def assembled_section() -> list[str]:
+    """The balances of the small stack."""
+    parts = []
+    for name, terms in assembled_latex().items():
+        text, end = ASSEMBLED[name]
+        rows = [f"& {term}" for term in terms]
+        parts += [text, block([*rows[:-1], rows[-1] + end])]
+    return parts
+
+
+def program_sections() -> list[str]:
+    """The statements of every pass."""
+    programs = {program.name: program for program in derive(ModelSpec(Layout.tfp(), Effects())).programs}
+    parts = []
+    for name, title in TITLES.items():
+        rows = [f"{left} &= {right}" for left, right in statements(programs[name])]
+        parts += [f"### {title}", f"Program `{name}`."]
+        parts += [block(rows[i : i + ROWS]) for i in range(0, len(rows), ROWS)]
+    return parts
+
+
+def text() -> str:
+    """The whole page."""
+    return "\n\n".join([INTRODUCTION, *assembled_section(), PASSES, *program_sections()]) + "\n"
+
+
+def main() -> None:
+    """Replace the page in one rename."""
+    part = TARGET.with_suffix(".part")
+    part.write_text(text(), encoding="utf-8")
+    part.replace(TARGET)
+
+
+if __name__ == "__main__":
+    main()
