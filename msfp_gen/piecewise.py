@@ -85,16 +85,23 @@ def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Arra
     """Jumps at the inner knots and what rounding may leave there, both ndarray, shape (k-1, channels).
 
     The rounding allowance is 1e-9 of the largest value of the derivative, and what cancellation in the values
-    costs: eps |u| / h**derivative over the shorter neighbour.
+    costs: eps |u| / h**derivative over the shorter neighbour. The three components of a vector share one allowance:
+    where the frame is turned, each takes a part of the rounding of the others.
     """
     h = np.diff(knots)
     left = _horner(coefficients[:-1], h[:-1, None], derivative)
     right = _horner(coefficients[1:], np.zeros((len(h) - 1, 1)), derivative)
-    level = np.max(np.abs(coefficients[:, :, 0]), axis=0)
-    largest = np.max(np.abs(_FALLING[derivative, derivative] * coefficients[:, :, derivative]), axis=0)
+    level = _vector_sizes(coefficients[:, :, 0])
+    largest = _FALLING[derivative, derivative] * _vector_sizes(coefficients[:, :, derivative])
     short = np.minimum(h[:-1], h[1:])[:, None]
     allowance = 1e-9 * largest + 64 * np.finfo(float).eps * level / short**derivative
     return right - left, allowance
+
+
+def _vector_sizes(values: Array) -> Array:
+    """Largest component of each vector over the pieces, (k, channels), said for each of its components, (channels,)."""
+    largest = np.abs(values).max(axis=0)
+    return np.repeat(largest.reshape(-1, 3).max(axis=1), 3)
 
 
 def azimuth(knots: Array, horizontal: Array) -> float | None:
