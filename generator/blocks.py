@@ -119,7 +119,9 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("N", "N", "normal force").scalar("sp", "-", "sin psi~", 0).scalar("cp", "-", "cos psi~", 1)
         .scalar("st", "-", "sin theta~").scalar("ct", "-", "cos theta~")
         .scalar("u", "m/s", "slip velocity along t~1 (2.98)").scalar("v", "m/s", "slip velocity along t~2 (2.98)", 0)
-        .scalar("drill", "W", "power of the drilling moment", 0).build(),
+        .scalar("drill", "W", "power of the drilling moment", 0)
+        .scalar("YY", "1/s", "d(dY/dt)/dY at constant slip velocity").scalar("YZ", "1/s", "d(dY/dt)/dZ", 0)
+        .scalar("ZY", "1/s", "d(dZ/dt)/dY", 0).scalar("ZZ", "1/s", "d(dZ/dt)/dZ", 0).build(),
         report_contact=new("report_contact").vector("p", "N", "N + F_f, basis of the body below (3.15)-(3.17)", POLAR)
         .vector("M", "N m", "moment about the sphere centre, same basis", AXIAL)
         .scalar("dY", "1/s", "dY/dt (3.18)").scalar("dZ", "1/s", "dZ/dt (3.18)", 0).build(),

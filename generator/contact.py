@@ -75,14 +75,19 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
     return t1, t2, t3
 
 
-def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the isotropic law has one switch on f . v."""
+def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
+    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the isotropic law has one switch on f . v.
+
+    YY, YZ, ZY, ZZ are their derivatives at constant slip velocity: what solves a stage for Y and Z.
+    """
     yu, zv = p.let(Y * u), p.let(Z * v)
     if law.bouc_wen == "report":
-        drive = p.let(Step(yu) * yu + Step(zv) * zv)
+        a, b = p.let(Step(yu)), p.let(Step(zv))
     else:
-        drive = p.let(Step(p.let(yu + zv)) * (yu + zv))
-    return p.let((u - Y * drive) / dy, "dY"), p.let((v - Z * drive) / dy, "dZ")
+        a = b = p.let(Step(p.let(yu + zv)))
+    drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
+    return {"dY": p.let((u - Y * drive) / dy, "dY"), "dZ": p.let((v - Z * drive) / dy, "dZ"),
+            "YY": -(drive + Y * au) / dy, "YZ": -Y * bv / dy, "ZY": -Z * au / dy, "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z}
 
 
 def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector) -> Symbols:
@@ -91,7 +96,7 @@ def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Sym
     sliding = p.let(par["sign"] * par["R"])
     # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
     u, v = p.let(-sliding * dot(dw, t2), "u"), p.let(sliding * dot(dw, t1), "v")
-    dY, dZ = bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"])
+    rates = bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"])
     # (3.14)-(3.17): the normal force passes through the centre; -sign R t~_3 x F_f is what is left.
     arm = p.let(sliding * par["mu"] * N)
     moment = add(scale(p.let(arm * f["Y"]), t2), scale(p.let(-arm * f["Z"]), t1))
@@ -101,7 +106,7 @@ def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Sym
         size = p.let(-sp.Rational(2, 3) * par["mu"] * par["rs"] * N * spin / sp.sqrt(spin**2 + SPIN_SMOOTHING**2))
         moment = add(moment, scale(size, t3))
         drill = p.let(size * spin)
-    return {"M": p.let_vector(moment, "M"), "dY": dY, "dZ": dZ, "u": u, "v": v, "drill": drill}
+    return {"M": p.let_vector(moment, "M"), **rates, "u": u, "v": v, "drill": drill}
 
 
 def report_contact(b: Blocks, law: Law) -> Program:

@@ -19,6 +19,7 @@ from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.model import Model
+    from msfp_gen.motion import Motion
     from msfp_gen.result import Result
     from msfp_gen.scene import Scene
 
@@ -113,8 +114,13 @@ def _start(scene: Scene, model: Model) -> tuple[Any, float]:
         np.array(motion.jumps, dtype=float), q, v, h, method=solver.method, rtol=solver.rtol, atol_angle=solver.angle_tolerance,
         max_step=max_step, first_step=solver.first_step or 0.0, max_steps=float(solver.max_steps), duration=scene.end,
         output_step=scene.output_step or 0.0, stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
-        stop_all_rims=bool(stop and stop.all_rims))
+        stop_all_rims=bool(stop and stop.all_rims), stop_at_knots=_sampled(motion))
     return run, azimuth
+
+
+def _sampled(motion: Motion) -> bool:
+    """Whether every knot is a sample, where the acceleration has a kink; a sine has many knots to a longest step."""
+    return motion.max_step is not None and motion.max_step <= 2.001 * float(np.median(np.diff(motion.knots)))
 
 
 def _history(model: Model, rows: Array, azimuth: float) -> History:

@@ -92,6 +92,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     slope k[STAGES];
     msfp_point at;
     double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    run->middle.share = 0.0;
     memset(&at, 0, sizeof at);
     memcpy(k[0].v, run->now.v, sizeof k[0].v);
     memcpy(k[0].a, run->now.a, sizeof k[0].a);

@@ -183,6 +183,12 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         return status;
     memcpy(s->v[i], s->at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->at.a, sizeof s->a[i]);
+    if (i == 1) {
+        run->middle.share = method.c[i];
+        memcpy(run->middle.q, s->at.q, sizeof run->middle.q);
+        memcpy(run->middle.v, s->at.v, sizeof run->middle.v);
+        memcpy(run->middle.f, s->f, sizeof run->middle.f);
+    }
     msfp_friction_rates(&run->work, s->df[i]);
     msfp_powers(&run->parameters, &s->at, s->f, &run->work, s->power[i]);
     return MSFP_OK;

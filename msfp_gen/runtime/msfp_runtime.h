@@ -137,6 +137,7 @@ typedef struct {
     double duration, output_step; /* output_step 0: the solver's own steps */
     double stop_displacement;     /* 0: none */
     int stop_all_rims;
+    int stop_at_knots;            /* the acceleration of the base has a kink at every knot: land on each */
 } msfp_options;
 
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
@@ -171,6 +172,12 @@ typedef struct {
     double gap[MSFP_NB];
 } msfp_state;
 
+/* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
+typedef struct {
+    double share; /* of the step */
+    double q[MSFP_NB][3], v[MSFP_NB][3], f[MSFP_NB][2];
+} msfp_middle;
+
 typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
@@ -178,6 +185,7 @@ typedef struct {
     int jump_count, next_jump;
     msfp_options options;
     msfp_state now, next;
+    msfp_middle middle;
     msfp_work work;
     double h, previous_error, output_time;
     double start[3]; /* r_01 - r_nn at the start */
@@ -209,7 +217,6 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */
 double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const double dv[MSFP_NB][3], const double df[MSFP_NB][2]);
-void msfp_interpolate(const msfp_state *a, const msfp_state *b, double theta, msfp_state *out);
 /* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
 int msfp_step_implicit(msfp_run *run, double h, double *error);
 int msfp_step_dopri5(msfp_run *run, double h, double *error);

@@ -228,15 +228,13 @@ static int solve_small(const double *a, double *b)
     return determinant != 0.0;
 }
 
-/* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation.
- * Newton from the last value, halved while it does not help. Leaves the contact and, condensed,
- * the Jacobian of its moment and normal force [ACTIONS][MSFP_LOCAL_SIZE]. */
-static int friction_stage(const double *par, const double *local, const double *fp, double beta, double *f, double *out, double *condensed)
+/* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation. Newton with the
+ * derivative at constant slip velocity (the contact point hardly moves with Y, Z), halved while it does not help. */
+static int friction_stage(const double *par, const double *local, const double *fp, double beta, double *f, double *out)
 {
-    double jacobian[ROWS * MSFP_LOCAL], g[FRICTION], best = INFINITY, step[FRICTION] = { 0 };
-    int i = 0;
-    for (; i < 60; ++i) {
-        contact_tangent(par, local, f, out, jacobian);
+    double g[FRICTION], a[FRICTION * FRICTION], step[FRICTION] = { 0 }, best = INFINITY;
+    for (int i = 0; i < 60; ++i) {
+        msfp_contact(par, local, f, out);
         double size = 0.0;
         for (int r = 0; r < FRICTION; ++r) {
             g[r] = f[r] - fp[r] - beta * out[MSFP_CONTACT_DY + r];
@@ -244,45 +242,47 @@ static int friction_stage(const double *par, const double *local, const double *
         }
         if (!(size < INFINITY))
             return MSFP_E_FINITE;
-        if (size > best && size > 1e-12) { /* overshot a switch: half the step back */
-            for (int r = 0; r < FRICTION; ++r) {
+        if (size <= 1e-11 * (1.0 + fabs(beta * out[MSFP_CONTACT_DY])))
+            return MSFP_OK;
+        const int overshot = size > best;
+        for (int r = 0; r < FRICTION; ++r) {
+            if (overshot)
                 step[r] *= 0.5;
-                f[r] += step[r];
-            }
-            continue;
+            else
+                step[r] = g[r];
+            for (int c = 0; c < FRICTION; ++c)
+                a[r * FRICTION + c] = (r == c) - beta * out[MSFP_CONTACT_YY + r * FRICTION + c];
         }
-        if (size <= 1e-12 * (1.0 + fabs(beta * out[MSFP_CONTACT_DY])))
-            break;
-        best = size;
-        double a[FRICTION * FRICTION];
-        for (int r = 0; r < FRICTION; ++r)
-            for (int c = 0; c < FRICTION; ++c)
-                a[r * FRICTION + c] = (r == c) - beta * jacobian[(MOMENT + r) * MSFP_LOCAL + MSFP_LOCAL_SIZE + c];
-        memcpy(step, g, sizeof step);
-        if (!solve_small(a, step))
-            return MSFP_E_NEWTON;
-        for (int r = 0; r < FRICTION; ++r)
-            f[r] -= step[r];
-    }
-    if (i == 60)
-        return MSFP_E_NEWTON;
-    if (condensed) {
-        double a[FRICTION * FRICTION], b[FRICTION];
-        for (int r = 0; r < FRICTION; ++r)
-            for (int c = 0; c < FRICTION; ++c)
-                a[r * FRICTION + c] = (r == c) - beta * jacobian[(MOMENT + r) * MSFP_LOCAL + MSFP_LOCAL_SIZE + c];
-        for (int k = 0; k < MSFP_LOCAL_SIZE; ++k) {
-            for (int r = 0; r < FRICTION; ++r)
-                b[r] = beta * jacobian[(MOMENT + r) * MSFP_LOCAL + k];
-            if (!solve_small(a, b))
+        if (!overshot) {
+            best = size;
+            if (!solve_small(a, step))
                 return MSFP_E_NEWTON;
-            for (int r = 0; r < ACTIONS; ++r) {
-                const double *row = jacobian + (r < MOMENT ? r : MOMENT + FRICTION) * MSFP_LOCAL;
-                double sum = row[k];
-                for (int c = 0; c < FRICTION; ++c)
-                    sum += row[MSFP_LOCAL_SIZE + c] * b[c];
-                condensed[r * MSFP_LOCAL_SIZE + k] = sum;
-            }
+        }
+        for (int r = 0; r < FRICTION; ++r) /* past a switch: half the step back */
+            f[r] += overshot ? step[r] : -step[r];
+    }
+    return MSFP_E_NEWTON;
+}
+
+/* Jacobian of the moment and of N with Y, Z following their stage formula: [ACTIONS][MSFP_LOCAL_SIZE]. */
+static int condense(const double *par, const double *local, const double *f, double beta, double *out, double *condensed)
+{
+    double jacobian[ROWS * MSFP_LOCAL], a[FRICTION * FRICTION], b[FRICTION];
+    contact_tangent(par, local, f, out, jacobian);
+    for (int r = 0; r < FRICTION; ++r)
+        for (int c = 0; c < FRICTION; ++c)
+            a[r * FRICTION + c] = (r == c) - beta * jacobian[(MOMENT + r) * MSFP_LOCAL + MSFP_LOCAL_SIZE + c];
+    for (int k = 0; k < MSFP_LOCAL_SIZE; ++k) {
+        for (int r = 0; r < FRICTION; ++r)
+            b[r] = beta * jacobian[(MOMENT + r) * MSFP_LOCAL + k];
+        if (!solve_small(a, b))
+            return MSFP_E_NEWTON;
+        for (int r = 0; r < ACTIONS; ++r) {
+            const double *row = jacobian + (r < MOMENT ? r : MOMENT + FRICTION) * MSFP_LOCAL;
+            double sum = row[k];
+            for (int c = 0; c < FRICTION; ++c)
+                sum += row[MSFP_LOCAL_SIZE + c] * b[c];
+            condensed[r * MSFP_LOCAL_SIZE + k] = sum;
         }
     }
     return MSFP_OK;
@@ -302,7 +302,9 @@ static int surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed
                                    w->dbody[j], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
         msfp_surface_local(w->body[j], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
-    const int status = friction_stage(par, w->local[j], fp, seed->beta, f, w->contact[j], tangent ? condensed : NULL);
+    int status = friction_stage(par, w->local[j], fp, seed->beta, f, w->contact[j]);
+    if (status == MSFP_OK && tangent)
+        status = condense(par, w->local[j], f, seed->beta, w->contact[j], condensed);
     if (status)
         return status;
     for (int r = 0; r < MOMENT; ++r)
