@@ -191,3 +191,33 @@ def test_slip_3_29_spin_of_the_top_plate_counts(triple: tuple[Stack, State, Arra
     without = balances(stack, state, h, np.zeros((4, 2)), np.zeros(4), Load(np.zeros(3), np.zeros(3)), rims=False)
     assert without.angular[3] == pytest.approx(rate(lambda s: momentum(s, True), state), abs=1e-12)
     assert np.abs(without.angular[3] - rate(lambda s: momentum(s, False), state)).max() > 1e-4
+
+
+def test_slip_2_85_one_contact_basis_per_surface(triple: tuple[Stack, State, Array, Load]) -> None:
+    """Four surfaces, four bases t~: only then do (2.110)-(2.117) hold as many equations as unknowns (2.119)."""
+    stack, state, h, _ = triple
+    touch = forces.contact(stack, rotation(state), points(stack, state).r, np.zeros((4, 2)))
+    assert touch.basis.shape == (4, 3, 3)
+    found = balances(stack, state, h, np.zeros((4, 2)), np.ones(4), Load(np.zeros(3), np.zeros(3)), rims=False)
+    assert found.linear.size + found.angular.size == 3 * 4 + 2 * len(touch.basis) + 4
+
+
+def test_slip_stage_v_slides_on_two_and_three() -> None:
+    """With surfaces 1 and 4 at their rims nothing else is left; the text of section 4.1 says 3 and 4."""
+    from msfp_gen import load_scene, simulate
+
+    result = simulate(load_scene("fenz-monotonic"))
+    first = {e.surface: e.time for e in reversed(result.events) if e.kind == "rim_contact"}
+    history = result.history
+    before = np.array([np.interp(first[4], history.time, column) for column in history.sliding.T])
+    moved = history.sliding[-1] - before
+    assert moved[[1, 2]].min() > 5 * moved[[0, 3]].max() > 0  # the rims give a little
+
+
+def test_slip_4_1_weight_belongs_to_9_81() -> None:
+    from msfp_gen import presets
+
+    bearing = presets.bearing("fenz-tfp")
+    mass = sum(body.mass for body in bearing.bodies)
+    assert mass * 9.81 == pytest.approx(90.64, abs=0.005)
+    assert mass * bearing.gravity == pytest.approx(90.55, abs=0.005)  # appendix A: g = 9.8
