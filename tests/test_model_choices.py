@@ -86,12 +86,11 @@ def test_pulling_apart_stops_the_run_with_a_name():
 
 def test_planar_model_holds_in_any_vertical_plane():
     scene = load_scene("fenz-test2")
-    flat = replace(scene, effects=Effects(dimension="planar"))
+    flat = replace(scene, effects=Effects(dimension="planar"), output_step=0.1)
     straight, turned = (simulate(replace(flat, motion=flat.motion.rotated(a))).history for a in (0.0, 0.7))
-    t = np.linspace(0.0, scene.end, 400)
-    want = np.interp(t, straight.time, straight.top_force[:, 0])
-    along = np.interp(t, turned.time, turned.top_force[:, :2] @ [np.cos(0.7), np.sin(0.7)])
-    assert along == pytest.approx(want, abs=2e-3 * np.abs(want).max())
+    want = straight.top_force[:, 0]
+    along = turned.top_force[:, :2] @ [np.cos(0.7), np.sin(0.7)]
+    assert along == pytest.approx(want, abs=1e-3 * np.abs(want).max())  # rounding may change the steps
     assert np.abs(turned.top_force[:, :2] @ [-np.sin(0.7), np.cos(0.7)]).max() < 1e-9 * np.abs(want).max()
 
 
