@@ -105,7 +105,9 @@ def make_blocks(planar: bool) -> Blocks:
         .vector("V", "m/s", "its velocity", POLAR).vector("A", "m/s^2", "its acceleration", POLAR)
         .vector("ac", "m/s^2", "acceleration of the centre of mass", POLAR)
         .vector("vc", "m/s", "velocity of the centre of mass", POLAR)
-        .vector("rc", "m", "centre of mass (3.6), (3.10)", POLAR).build(),
+        .vector("rc", "m", "centre of mass (3.6), (3.10)", POLAR)
+        .scalar("sp", "-", "sin psi", 0).scalar("cp", "-", "cos psi", 1)
+        .scalar("st", "-", "sin theta").scalar("ct", "-", "cos theta").build(),
         vector=new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
         moment=new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
         local=new("local")

@@ -29,10 +29,15 @@ def arms(b: Blocks) -> Program:
     return p
 
 
-def basis(p: Program, parent: Symbols, x: Symbols) -> tuple[Vector, Vector, Vector]:
+def sines(p: Program, x: Symbols) -> Symbols:
+    """Sines and cosines of psi and theta: computed once a body, everything else reads them."""
+    return {"sp": p.let(sp.sin(x["psi"])), "cp": p.let(sp.cos(x["psi"])),
+            "st": p.let(sp.sin(x["theta"])), "ct": p.let(sp.cos(x["theta"]))}
+
+
+def basis(p: Program, parent: Symbols, trig: Symbols) -> tuple[Vector, Vector, Vector]:
     """Co-rotational basis of a body from its parent's: (2.1)-(2.6)."""
-    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
-    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    sin_psi, cos_psi, sin_theta, cos_theta = trig["sp"], trig["cp"], trig["st"], trig["ct"]
     t1, t2, t3 = parent["t1"], parent["t2"], parent["t3"]
     t2_new = p.let_vector(add(scale(cos_psi, t2), scale(sin_psi, t3)), "t2")  # (2.4): t'_2 = t_2 of the body
     t3_mid = p.let_vector(add(scale(-sin_psi, t2), scale(cos_psi, t3)), "tm")  # (2.4), (2.6)
@@ -43,7 +48,8 @@ def basis(p: Program, parent: Symbols, x: Symbols) -> tuple[Vector, Vector, Vect
 
 def turn(p: Program, parent: Symbols, x: Symbols) -> Symbols:
     """Basis, angular velocities (3.12) and their derivatives; declares the rates of everything."""
-    t1, t2, t3 = basis(p, parent, x)
+    trig = sines(p, x)
+    t1, t2, t3 = basis(p, parent, trig)
     w = p.let_vector(add(parent["w"], scale(x["psi1"], parent["t1"]), scale(x["theta1"], t2)), "w")  # (3.12)
     wp = p.let_vector(add(w, scale(x["phi1"], t3)), "wp")  # (3.12), (2.29)
     for angle in ("psi", "theta", "phi"):
@@ -56,7 +62,7 @@ def turn(p: Program, parent: Symbols, x: Symbols) -> Symbols:
     # omega follows from its own statement, not from a declared rate: d omega/dt is derived, not typed.
     al = p.rate_vector(w)
     alp = p.rate_vector(wp)
-    return {"t1": t1, "t2": t2, "t3": t3, "w": w, "wp": wp, "al": al, "alp": alp}
+    return {"t1": t1, "t2": t2, "t3": t3, "w": w, "wp": wp, "al": al, "alp": alp, **trig}
 
 
 def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Vector, Vector, Vector]:
@@ -207,12 +213,12 @@ def to_local(b: Blocks) -> Program:
     """Contact force and relative angular velocity of a surface in the basis of the body below it."""
     p = Program("surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)")
     body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
-    x: Symbols = p.read(b.coordinates, "x", active=("psi", "theta", "psi1", "theta1", "phi1"))
+    above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
+    x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
     lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
     total: Symbols = p.read(b.vector, "tot")
     rim: Symbols = p.read(b.vector, "rim")
-    sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
-    sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
+    sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
     zero = sp.Integer(0)
     t2: Vector = (zero, cos_psi, sin_psi)
     t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))

@@ -29,7 +29,7 @@ EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
 PLATFORM_COMPILERS = ("cc", "gcc", "clang")
 
 FLAGS: dict[str, tuple[str, ...]] = {
-    "c": ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-fvisibility=hidden", "-O2"),
+    "c": ("-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-fvisibility=hidden", "-O2", "-fno-math-errno", "-fno-trapping-math"),
     # Cython's own output is not ours to keep free of warnings, and it is not where the time goes.
     "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
     "libraries": ("-lm",),

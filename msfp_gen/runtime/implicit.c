@@ -42,8 +42,6 @@ typedef struct {
     msfp_seed seed;
     msfp_point at;
     double f[NB][2];
-    double factors[DOF * DOF]; /* LU of the last tangent */
-    int pivots[DOF], factored;
 } stages;
 
 /* What the stages before leave: q = Q + beta v, v = V + beta a, f = fp + beta df. */
@@ -77,7 +75,9 @@ static void place(stages *s)
             s->at.a[k][angles[i]] = (s->at.v[k][angles[i]] - s->V[k][angles[i]]) / s->beta;
 }
 
-/* Residual at the present rates relative to its natural size; infinite where it cannot be formed. */
+static void over_normal(const msfp_work *w, double *residual);
+
+/* Residual over N at the present rates, and its largest entry relative to its natural size; infinite where it cannot be formed. */
 static double size_of(msfp_run *run, stages *s, double *residual)
 {
     double scale[DOF], size = 0.0;
@@ -88,6 +88,7 @@ static double size_of(msfp_run *run, stages *s, double *residual)
     msfp_residual_scale(&run->parameters, &run->work, scale);
     for (int i = 0; i < DOF; ++i)
         size = fmax(size, fabs(residual[i]) / scale[i]);
+    over_normal(&run->work, residual);
     return size < INFINITY ? size : INFINITY;
 }
 
@@ -100,59 +101,83 @@ static void move(stages *s, const double *step, double factor)
 
 /* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that
  * nearly vanishes, and a heavy top makes N itself depend strongly on the rates. Dividing removes that product. */
-static void relative_to_normal(const msfp_work *w, double *residual, double *tangent)
+static void over_normal(const msfp_work *w, double *residual)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int i = k * ND; i < (k + 1) * ND; ++i)
+            residual[i] /= w->contact[k][MSFP_CONTACT_N];
+}
+
+static void tangent_over_normal(const msfp_work *w, const double *residual, double *tangent)
 {
     for (int k = 0; k < NB; ++k) {
         const double inverse = 1.0 / w->contact[k][MSFP_CONTACT_N];
-        for (int i = k * ND; i < (k + 1) * ND; ++i) {
-            residual[i] *= inverse;
+        for (int i = k * ND; i < (k + 1) * ND; ++i)
             for (int c = 0; c < DOF; ++c)
                 tangent[i * DOF + c] = inverse * (tangent[i * DOF + c] - residual[i] * w->dnormal[k][c]);
-        }
     }
 }
 
-/* Newton direction at the present rates, in place of the residual. */
-static int direction(msfp_run *run, stages *s, double *residual)
+/* Factors of the tangent at the present rates. */
+static int factorise(msfp_run *run, stages *s)
 {
+    double residual[DOF];
     ++run->counts[MSFP_COUNT_EVALUATIONS];
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, s->factors);
-    s->factored = 0;
+    ++run->counts[MSFP_COUNT_FACTORISATIONS];
+    run->factored_beta = 0.0;
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, run->factors);
     if (status)
         return status;
-    relative_to_normal(&run->work, residual, s->factors);
-    ++run->counts[MSFP_COUNT_FACTORISATIONS];
-    const int sign = msfp_lu(s->factors, DOF, s->pivots);
-    if (sign == 0)
+    over_normal(&run->work, residual);
+    tangent_over_normal(&run->work, residual, run->factors);
+    run->work_sign = msfp_lu(run->factors, DOF, run->pivots);
+    if (run->work_sign == 0)
         return MSFP_E_IRREGULAR;
-    s->factored = 1;
-    run->work_sign = sign;
-    msfp_lu_solve(s->factors, DOF, s->pivots, residual);
+    run->factored_beta = s->beta;
     return MSFP_OK;
 }
 
-/* Newton with backtracking on the residual; the switches of friction and rims make it semi-smooth. */
+/* Newton step from the residual at hand (scaled in place). Where a full step does not reduce the residual, halve it. */
+static double take_step(msfp_run *run, stages *s, double *residual, double size, int fresh)
+{
+    double step[DOF], factor = 1.0;
+    memcpy(step, residual, sizeof step);
+    msfp_lu_solve(run->factors, DOF, run->pivots, step);
+    move(s, step, 1.0);
+    double next = size_of(run, s, residual);
+    while (fresh && next > size && factor > 0.05) {
+        move(s, step, -0.5 * factor);
+        factor *= 0.5;
+        next = size_of(run, s, residual);
+    }
+    if (!fresh && !(next < size)) { /* old factors mislead: back to where they were */
+        move(s, step, -1.0);
+        next = size_of(run, s, residual);
+    }
+    return next;
+}
+
+/* Newton on the residual. Factors serve as long as they at least quarter it: other stages, other steps of like size. The
+ * switches of friction and rims make it semi-smooth. */
 static int solve_stage(msfp_run *run, stages *s)
 {
     const double goal = fmin(1e-4, fmax(1e-10, 1e-2 * run->options.rtol));
-    double residual[DOF], step[DOF];
+    double residual[DOF];
+    int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = size_of(run, s, residual);
     for (int i = 0; size > goal; ++i) {
-        if (i == 20 || !(size < INFINITY))
+        if (i == 30 || !(size < INFINITY))
             return MSFP_E_NEWTON;
         ++run->counts[MSFP_COUNT_NEWTON];
-        const int status = direction(run, s, step);
-        if (status)
-            return status;
-        const double before = size;
-        double factor = 1.0;
-        move(s, step, 1.0);
-        size = size_of(run, s, residual);
-        while (size > before && factor > 0.05) {
-            move(s, step, -0.5 * factor);
-            factor *= 0.5;
-            size = size_of(run, s, residual);
+        fresh = !good;
+        if (fresh) {
+            const int status = factorise(run, s);
+            if (status)
+                return status;
         }
+        const double before = size;
+        size = take_step(run, s, residual, size, fresh);
+        good = size < 0.25 * before;
     }
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
@@ -210,7 +235,7 @@ static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3],
 {
     stages moved = *s;
     double residual[DOF];
-    if (!s->factored)
+    if (run->factored_beta != s->beta)
         return;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < 3; ++d) {
@@ -222,9 +247,7 @@ static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3],
     }
     if (!(size_of(run, &moved, residual) < INFINITY))
         return;
-    for (int i = 0; i < DOF; ++i)
-        residual[i] /= run->work.contact[i / ND][MSFP_CONTACT_N];
-    msfp_lu_solve(s->factors, DOF, s->pivots, residual);
+    msfp_lu_solve(run->factors, DOF, run->pivots, residual);
     move(&moved, residual, 1.0);
     if (!(size_of(run, &moved, residual) < INFINITY))
         return;
@@ -247,12 +270,12 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     s.seed.cv = 1.0;
     s.seed.ca = 1.0 / s.beta;
     s.seed.beta = s.beta;
+    s.seed.accuracy = 1e-5 * run->options.rtol;
     memset(&s.at, 0, sizeof s.at);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
     memcpy(s.power[0], now->power, sizeof s.power[0]);
-    s.factored = 0;
     double disc = 0.0;
     for (int i = 1; i < STAGES; ++i) {
         const int status = stage(run, &s, i, h);

@@ -21,6 +21,7 @@ typedef struct {
     double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE];
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
     double top[MSFP_TOP_PARAMETERS_SIZE];
+    double rim_cosine[MSFP_NB]; /* cos(s_c/R) */
 } msfp_parameters;
 
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies /* [N][7] */,
@@ -40,6 +41,7 @@ typedef struct {
  * f = fp + beta df/dt. beta = 0 holds Y, Z at fp. */
 typedef struct {
     double cq, cv, ca, beta;
+    double accuracy; /* of Y, Z; 0: all there is */
     double fp[MSFP_NB][2];
 } msfp_seed;
 
@@ -51,7 +53,6 @@ typedef struct {
     double local[MSFP_NB][MSFP_LOCAL_SIZE];
     double contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
-    double sliding[MSFP_NB][MSFP_GAP_SIZE];
     int rim_active[MSFP_NB];
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
@@ -103,6 +104,9 @@ void msfp_report(const msfp_parameters *p, const msfp_point *at, const double *u
                  double *residual, const msfp_variable *variables, int count, double *jacobian /* [UNKNOWNS][count] */,
                  double *rates /* derivatives of dY/dt, dZ/dt [2 NB][count], zeroed by the caller, or NULL */);
 int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm, msfp_solution *out);
+
+/* Sliding displacements and gaps (3.20), (3.21). */
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
 
@@ -169,7 +173,6 @@ typedef struct {
     double t;
     double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2], df[MSFP_NB][2];
     double work[MSFP_WORKS], power[MSFP_WORKS];
-    double gap[MSFP_NB];
 } msfp_state;
 
 /* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
@@ -189,6 +192,9 @@ typedef struct {
     msfp_work work;
     double h, previous_error, output_time;
     double start[3]; /* r_01 - r_nn at the start */
+    double events_now[MSFP_NB + 1]; /* event functions at the present state */
+    double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
+    int pivots[MSFP_DOF];
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
     long counts[MSFP_COUNTS];
@@ -213,6 +219,8 @@ const char *msfp_status_name(int status);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
+/* The same from an evaluation at hand. */
+void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row);
 /* Whether the model holds at a state: no interface pulls, no angle is singular. 0 or a status. */
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */

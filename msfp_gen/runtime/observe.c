@@ -108,12 +108,12 @@ static double restraint_energy(const msfp_parameters *p, const msfp_work *w)
     return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean;
 }
 
-static double rim_energy(const msfp_parameters *p, const msfp_work *w)
+static double rim_energy(const msfp_parameters *p, const msfp_work *w, const double *gap)
 {
     double total = 0.0;
     for (int j = 0; j < NB; ++j)
         if (w->rim_active[j]) {
-            const double *par = p->surface[j], g = w->sliding[j][MSFP_GAP_G];
+            const double *par = p->surface[j], g = gap[j];
             /* the force acts at R - p from the centre, the gap is measured at R (3.20), (3.25) */
             total += 0.5 * par[MSFP_SURFACE_PARAMETERS_KC] * g * g * (1.0 - par[MSFP_SURFACE_PARAMETERS_PR] / par[MSFP_SURFACE_PARAMETERS_R]);
         }
@@ -122,11 +122,18 @@ static double rim_energy(const msfp_parameters *p, const msfp_work *w)
 
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
-    double residual[MSFP_DOF], f[NB][2], total[3];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    double residual[MSFP_DOF], f[NB][2];
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } } };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
     msfp_condensed(p, at, &seed, w, f, residual, NULL);
+    msfp_record(p, at, w, row);
+}
+
+void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row)
+{
+    double total[3], sliding[NB][MSFP_GAP_SIZE];
+    msfp_gaps(p, at->q, sliding);
     memcpy(row->q, at->q, sizeof row->q);
     memcpy(row->v, at->v, sizeof row->v);
     memcpy(row->a, at->a, sizeof row->a);
@@ -136,8 +143,8 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
         row->normal[j] = contact[MSFP_CONTACT_N];
         row->angles[j][0] = atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
         row->angles[j][1] = atan2(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
-        row->sliding[j] = w->sliding[j][MSFP_GAP_S];
-        row->gap[j] = w->sliding[j][MSFP_GAP_G];
+        row->sliding[j] = sliding[j][MSFP_GAP_S];
+        row->gap[j] = sliding[j][MSFP_GAP_G];
         row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;
         row->slip[j][0] = contact[MSFP_CONTACT_U];
         row->slip[j][1] = msfp_contact_v(contact);
@@ -152,5 +159,5 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
     row->kinetic = total[0];
     row->potential = total[1];
     row->restraint = restraint_energy(p, w);
-    row->rim_stored = rim_energy(p, w);
+    row->rim_stored = rim_energy(p, w, row->gap);
 }

@@ -189,8 +189,17 @@ static int write_between(msfp_run *run, double last)
 static int write_step(msfp_run *run)
 {
     const double last = run->next.t * (1.0 + 1e-14);
-    if (run->options.output_step <= 0.0)
-        return write_row(run, &run->next);
+    if (run->options.output_step <= 0.0) { /* the evaluation that ended the step is still there */
+        msfp_row *row = new_row(run);
+        msfp_point at;
+        if (!row)
+            return MSFP_E_MEMORY;
+        to_point(run, &run->next, &at);
+        msfp_record(&run->parameters, &at, &run->work, row);
+        row->time = run->next.t;
+        memcpy(row->work, run->next.work, sizeof row->work);
+        return MSFP_OK;
+    }
     return run->output_time <= last ? write_between(run, last) : MSFP_OK;
 }
 
@@ -225,13 +234,17 @@ static int write_event(msfp_run *run, const msfp_state *s, int surface, int kind
 /* Event functions of a state: the gaps, and what is left to the stop displacement. */
 static void event_values(msfp_run *run, const msfp_state *s, double *g)
 {
+    double sliding[NB][MSFP_GAP_SIZE], u[3];
     msfp_row row;
-    double u[3];
-    observe(run, s, &row);
-    across(run, &row, u);
+    msfp_gaps(&run->parameters, s->q, sliding);
     for (int j = 0; j < NB; ++j)
-        g[j] = row.gap[j];
-    g[NB] = run->options.stop_displacement > 0.0 ? run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]) : 1.0;
+        g[j] = sliding[j][MSFP_GAP_G];
+    g[NB] = 1.0;
+    if (run->options.stop_displacement > 0.0) {
+        observe(run, s, &row);
+        across(run, &row, u);
+        g[NB] = run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]);
+    }
 }
 
 static double event_tolerance(const msfp_run *run, int i)
@@ -245,7 +258,9 @@ static double first_event(msfp_run *run, const double *before, const double *aft
     double first = 1.0, g[EVENTS];
     for (int i = 0; i < EVENTS; ++i) {
         const double tolerance = event_tolerance(run, i);
-        if (!(before[i] > tolerance && after[i] < -tolerance) || (i < NB && !MSFP_RIMS))
+        const int met = before[i] > tolerance && after[i] < -tolerance;
+        const int left = i < NB && before[i] < -tolerance && after[i] > tolerance;
+        if (!(met || left) || (i < NB && !MSFP_RIMS))
             continue;
         double low = 0.0, high = 1.0;
         for (int n = 0; n < 40; ++n) {
@@ -253,7 +268,7 @@ static double first_event(msfp_run *run, const double *before, const double *aft
             const double middle = 0.5 * (low + high);
             interpolate(run, middle, &s);
             event_values(run, &s, g);
-            *(g[i] > 0.0 ? &low : &high) = middle;
+            *((g[i] > 0.0) == met ? &low : &high) = middle;
         }
         first = fmin(first, high);
     }
@@ -293,7 +308,7 @@ static int settle(msfp_run *run)
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } } };
     to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
@@ -341,6 +356,7 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
         run->start[i] = row.base[i] - row.top[i];
     run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * options->duration);
     run->previous_error = 1.0;
+    event_values(run, &run->now, run->events_now);
     run->status = write_row(run, &run->now);
     run->output_time = options->output_step;
     return run->status;
@@ -402,6 +418,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     if (run->status)
         return 0;
     run->now = run->next;
+    memcpy(run->events_now, after, sizeof run->events_now);
     if (stop) {
         if (run->options.output_step > 0.0)
             write_row(run, &run->now);
@@ -435,7 +452,7 @@ static int one_step(msfp_run *run)
             ++run->counts[MSFP_COUNT_REJECTED];
             return !shrink(run, h, fmax(0.1, 0.9 * pow(error, run->options.method == MSFP_DOPRI5 ? -0.2 : -1.0 / 3.0)), MSFP_E_STEP);
         }
-        event_values(run, &run->now, before);
+        memcpy(before, run->events_now, sizeof before);
         event_values(run, &run->next, after);
         const double share = relocations < 4 ? first_event(run, before, after) : 1.0;
         if (share >= 1.0)

@@ -54,6 +54,7 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         out[MSFP_SURFACE_PARAMETERS_CC] = s[5];
         out[MSFP_SURFACE_PARAMETERS_RS] = slider[5];
         out[MSFP_SURFACE_PARAMETERS_PR] = slider[6];
+        p->rim_cosine[j] = cos(s[1] / s[0]);
     }
     double *t = p->top;
     t[MSFP_TOP_PARAMETERS_K] = top[0];
@@ -154,15 +155,14 @@ static void rim_coordinates(const msfp_work *w, int j, double *x)
 /* Rim force of surface j; drim (or NULL): its local Jacobian [f, M][psi, theta and rates]. */
 static void rim(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 {
-    double x[MSFP_RIM_LOCAL];
-    rim_coordinates(w, j, x);
-    msfp_gap(p->surface[j], x, w->sliding[j]);
     memset(w->rim[j], 0, sizeof w->rim[j]);
     w->rim_active[j] = 0;
 #if MSFP_RIMS
-    if (w->sliding[j][MSFP_GAP_G] > 0.0)
+    /* t_3 . t_3' against the cosine at capacity: no arc cosine while the rim is away */
+    if (msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j])
         return;
-    double out[MSFP_RIM_SIZE];
+    double x[MSFP_RIM_LOCAL], out[MSFP_RIM_SIZE];
+    rim_coordinates(w, j, x);
     if (drim) {
         double seed[MSFP_RIM_LOCAL * MSFP_RIM_LOCAL] = { 0 };
         for (int i = 0; i < MSFP_RIM_LOCAL; ++i)
@@ -175,8 +175,19 @@ static void rim(const msfp_parameters *p, msfp_work *w, int j, double *drim)
         w->rim_active[j] = 1;
     }
 #else
+    (void)p;
     (void)drim;
 #endif
+}
+
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE])
+{
+    for (int j = 0; j < NB; ++j) {
+        double x[MSFP_RIM_LOCAL] = { 0 };
+        for (int i = 0; i < PAIR; ++i)
+            x[i] = q[j][MSFP_PLANAR ? 1 : i];
+        msfp_gap(p->surface[j], x, sliding[j]);
+    }
 }
 
 /* Columns of the rim force and moment from the local Jacobian. */
@@ -230,7 +241,7 @@ static int solve_small(const double *a, double *b)
 
 /* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation. Newton with the
  * derivative at constant slip velocity (the contact point hardly moves with Y, Z), halved while it does not help. */
-static int friction_stage(const double *par, const double *local, const double *fp, double beta, double *f, double *out)
+static int friction_stage(const double *par, const double *local, const double *fp, double beta, double accuracy, double *f, double *out)
 {
     double g[FRICTION], a[FRICTION * FRICTION], step[FRICTION] = { 0 }, best = INFINITY;
     for (int i = 0; i < 60; ++i) {
@@ -242,7 +253,7 @@ static int friction_stage(const double *par, const double *local, const double *
         }
         if (!(size < INFINITY))
             return MSFP_E_FINITE;
-        if (size <= 1e-11 * (1.0 + fabs(beta * out[MSFP_CONTACT_DY])))
+        if (size <= accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY])))
             return MSFP_OK;
         const int overshot = size > best;
         for (int r = 0; r < FRICTION; ++r) {
@@ -298,11 +309,11 @@ static int surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed
     rim(p, w, j, tangent ? drim : NULL);
     if (tangent) {
         rim_columns(w, j, drim, drf, dmoment);
-        msfp_surface_local_tangent(w->body[j], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j],
-                                   w->dbody[j], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
+        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j],
+                                   w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
-        msfp_surface_local(w->body[j], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
-    int status = friction_stage(par, w->local[j], fp, seed->beta, f, w->contact[j]);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
+    int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f, w->contact[j]);
     if (status == MSFP_OK && tangent)
         status = condense(par, w->local[j], f, seed->beta, w->contact[j], condensed);
     if (status)
@@ -396,7 +407,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], scale[DOF], f[NB][2];
     int pivots[DOF];
-    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, { { 0 } } };
+    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } } };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     double last = INFINITY;
     out->determinant = 1;
@@ -495,7 +506,7 @@ static void report_surface(const msfp_parameters *p, const msfp_point *at, msfp_
     double drim[(VECTOR + MOMENT + 3) * MSFP_RIM_LOCAL] = { 0 }, drf[VECTOR * DOF], drm[MOMENT * DOF];
     rim(p, w, j, tangent ? drim : NULL);
     if (!tangent) {
-        msfp_surface_local(w->body[j], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j]);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j]);
         msfp_report_contact(p->surface[j], s->contact[j], f, w->local[j], out);
         memcpy(w->contact[j] + MSFP_CONTACT_DY, out + MSFP_REPORT_CONTACT_DY, FRICTION * sizeof *out);
     }
@@ -503,8 +514,8 @@ static void report_surface(const msfp_parameters *p, const msfp_point *at, msfp_
     if (tangent) {
         rim_columns(w, j, drim, drf, drm);
         /* Only the slip rotation of the local block is used here: the force is made from the unknowns. */
-        msfp_surface_local_tangent(w->body[j], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j],
-                                   w->dbody[j], w->dx[j + 1], w->dx[j], w->dforce[NB], drf, dlocal);
+        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j],
+                                   w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[NB], drf, dlocal);
         msfp_report_contact_tangent(p->surface[j], s->contact[j], f, w->local[j], out, s->dcontact[j], s->dfriction[j], dlocal, dout);
     }
     for (int r = 0; r < VECTOR; ++r)

@@ -1,0 +1,60 @@
+"""What several test files share: models, bearings of reference stacks, numerical differences, runs that may fail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from msfp_gen import Bearing, Body, Effects, Layout, RunError, Scene, Surface, build_model, load_scene, simulate
+from msfp_gen.model import Model
+from msfp_gen.result import Result
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def bearing_of(values: Any) -> Bearing:
+    """The public Bearing with the numbers of a reference stack."""
+    layout = Layout(values.layout.n, values.layout.m, values.layout.p)
+    return Bearing(
+        layout=layout, base_height=values.base_height, gravity=values.gravity, base_rim_radius=values.base_rim_radius,
+        base_rim_offset=values.base_rim_offset, base_centroid=values.base_centroid,
+        surfaces=[Surface(**vars(s)) for s in values.surfaces], bodies=[Body(**vars(b)) for b in values.bodies])
+
+
+@cache
+def model_of(layout: tuple[int, int, int], **effects: Any) -> Model:
+    return build_model(Layout(*layout), Effects(**effects))
+
+
+def differences(function: Any, x: Array, steps: Array) -> Array:
+    """Jacobian by eighth-order central differences."""
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    columns = []
+    for i, h in enumerate(steps):
+        unit = np.eye(len(x))[i] * h
+        columns.append(sum(w * (function(x + k * unit) - function(x - k * unit)) for k, w in weights.items()) / h)
+    return np.array(columns).T
+
+
+def scene_of(name: str, effects: dict[str, Any] | None = None, solver: dict[str, Any] | None = None, **changes: Any) -> Scene:
+    """A preset scene with some effects, settings of the solver and other parts changed."""
+    scene = load_scene(name)
+    return replace(scene, effects=replace(scene.effects, **(effects or {})), solver=replace(scene.solver, **(solver or {})), **changes)
+
+
+@cache
+def preset_run(name: str, **effects: Any) -> Result:
+    """A preset scene as it stands, apart from effects; run once for all tests."""
+    return simulate(scene_of(name, effects))
+
+
+def failure_of(scene: Scene) -> RunError:
+    """The RunError that a scene ends in."""
+    try:
+        simulate(scene)
+    except RunError as error:
+        return error
+    raise AssertionError("the run did not fail")
