@@ -39,10 +39,15 @@ def differences(function: Any, x: Array, steps: Array) -> Array:
     return np.array(columns).T
 
 
-def scene_of(name: str, effects: dict[str, Any] | None = None, solver: dict[str, Any] | None = None, **changes: Any) -> Scene:
+Changes = dict[str, Any]
+
+
+def scene_of(name: str, effects: Changes | None = None, solver: Changes | None = None, **changes: Any) -> Scene:
     """A preset scene with some effects, settings of the solver and other parts changed."""
     scene = load_scene(name)
-    return replace(scene, effects=replace(scene.effects, **(effects or {})), solver=replace(scene.solver, **(solver or {})), **changes)
+    changes["effects"] = replace(scene.effects, **(effects or {}))
+    changes["solver"] = replace(scene.solver, **(solver or {}))
+    return replace(scene, **changes)
 
 
 @cache
