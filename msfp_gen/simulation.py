@@ -28,7 +28,7 @@ CHUNK = 4000  # steps between two looks at Ctrl-C and at the progress
 
 EVENT_KINDS = ("rim_contact", "rim_release", "stop")
 FAILURES = {
-    "newton": "Newton's method did not converge at the smallest step; loosen nothing, check loads and friction at this state",
+    "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); lower the friction or the motion",
     "step": "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
     "irregular": "the equations lost regularity (the determinant changed sign): friction is too high for a unique motion here",
     "uplift": "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion",
@@ -67,6 +67,8 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
     if status is None:
         status = run.status[0]
     wall = time.perf_counter() - ready
+    if not len(run.rows):
+        raise RunError(_message(scene, run, status), status=status)
     result = _result(scene, model, run, azimuth, status, wall, ready - begin)
     if not result.succeeded:
         raise RunError(result.message, status=status, result=result)
@@ -125,7 +127,8 @@ def _sampled(motion: Motion) -> bool:
 
 def _history(model: Model, rows: Array, azimuth: float) -> History:
     """Named arrays in the user's frame."""
-    f = model.unpack(rows)
+    finite = np.isfinite(rows).all(axis=1)
+    f = model.unpack(rows if finite.all() else rows[:int(finite.argmin())])
     turn = azimuth
     base, top = out_of_plane(f["base"], turn, "vector"), out_of_plane(f["top"], turn, "vector")
     across = base - top
@@ -154,14 +157,22 @@ def _events(model: Model, run: Any, azimuth: float) -> tuple[Event, ...]:
         for t, surface, kind, u, force in run.events)
 
 
+# What the number beside a failure is.
+QUANTITIES = {"newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]"}
+
+
+def _message(scene: Scene, run: Any, status: str) -> str:
+    """One line: when, where, why, and the quantity."""
+    _, surface, value = run.status
+    known = surface and status in QUANTITIES
+    where = f", surface {surface}, {QUANTITIES[status]} = {value:.4g}" if known else f", surface {surface}" if surface else ""
+    return f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {FAILURES.get(status, status)}"
+
+
 def _result(scene: Scene, model: Model, run: Any, azimuth: float, status: str, wall: float, setup: float) -> Result:
     from msfp_gen.result import Result
 
-    _, surface, value = run.status
-    where = f", surface {surface}" if surface else ""
-    quantity = f" ({value:.4g})" if surface and value else ""
-    message = "" if status in ("ok", "stopped") else (
-        f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {FAILURES.get(status, status)}{quantity}")
+    message = "" if status in ("ok", "stopped") else _message(scene, run, status)
     counts = {k: int(n) for k, n in run.counts.items()}
     provenance = {"msfp_gen": __version__, "model": model.spec.key, "python": platform.python_version(), "numpy": np.__version__,
                   "method": scene.solver.method, "rtol": f"{scene.solver.rtol:g}", "build_seconds": f"{setup:.3g}"}

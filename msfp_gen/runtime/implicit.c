@@ -87,7 +87,10 @@ static double size_of(msfp_run *run, stages *s, double *residual)
         return INFINITY;
     msfp_residual_scale(&run->parameters, &run->work, scale);
     for (int i = 0; i < DOF; ++i)
-        size = fmax(size, fabs(residual[i]) / scale[i]);
+        if (!(fabs(residual[i]) / scale[i] <= size)) {
+            size = fabs(residual[i]) / scale[i];
+            run->worst_surface = i / ND + 1;
+        }
     over_normal(&run->work, residual);
     return size < INFINITY ? size : INFINITY;
 }
@@ -166,8 +169,11 @@ static int solve_stage(msfp_run *run, stages *s)
     int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = size_of(run, s, residual);
     for (int i = 0; size > goal; ++i) {
-        if (i == 30 || !(size < INFINITY))
+        if (i == 30 || !(size < INFINITY)) {
+            run->status_surface = run->worst_surface;
+            run->status_value = size;
             return MSFP_E_NEWTON;
+        }
         ++run->counts[MSFP_COUNT_NEWTON];
         fresh = !good;
         if (fresh) {
@@ -181,7 +187,11 @@ static int solve_stage(msfp_run *run, stages *s)
     }
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
-    return run->work_sign && run->work_sign != run->determinant ? MSFP_E_IRREGULAR : MSFP_OK;
+    if (!run->work_sign || run->work_sign == run->determinant)
+        return MSFP_OK;
+    run->status_surface = run->worst_surface;
+    run->status_value = size;
+    return MSFP_E_IRREGULAR;
 }
 
 static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)

@@ -198,7 +198,7 @@ typedef struct {
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
     long counts[MSFP_COUNTS];
-    int status, status_surface;
+    int status, status_surface, worst_surface;
     double status_value;
     msfp_row *rows;
     size_t row_count, row_capacity;

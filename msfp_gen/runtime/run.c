@@ -5,8 +5,7 @@
 #include "msfp_kernels.h"
 
 #define NB MSFP_NB
-#define SMALLEST_STEP 1e-12
-#define RATE_SCALE 1e3 /* error weight of a rate against that of its angle, where rates count [1/s] */
+#define SMALLEST_STEP 1e-9 /* [s], far below any period of a bearing */
 
 static const int angles[MSFP_ND] = MSFP_ANGLES;
 
@@ -35,7 +34,7 @@ double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const d
             const double q = fmax(fabs(run->now.q[k][d]), fabs(run->next.q[k][d]));
             worst = fmax(worst, fabs(dq[k][d]) / (atol + rtol * q));
             if (dv)
-                worst = fmax(worst, fabs(dv[k][d]) / (RATE_SCALE * atol + rtol * fabs(run->now.v[k][d])));
+                worst = fmax(worst, fabs(dv[k][d]) / (atol + rtol * fabs(run->now.v[k][d])));
         }
         for (int d = 0; d < 2; ++d)
             worst = fmax(worst, fabs(df[k][d]) / (10.0 * rtol));

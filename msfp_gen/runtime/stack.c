@@ -145,12 +145,14 @@ static void top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_wor
 
 /* ---- rims ----------------------------------------------------------------------------------------- */
 
+#if MSFP_RIMS
 static void rim_coordinates(const msfp_work *w, int j, double *x)
 {
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < PAIR; ++i)
             x[order * PAIR + i] = w->x[j + 1][coordinate(order, i)];
 }
+#endif
 
 /* Rim force of surface j; drim (or NULL): its local Jacobian [f, M][psi, theta and rates]. */
 static void rim(const msfp_parameters *p, msfp_work *w, int j, double *drim)
