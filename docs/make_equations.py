@@ -45,6 +45,7 @@ every stack.
 - $P_k, M_k$ is the wrench through interface $k$ on the body above, the moment about the sphere centre; $P_n, M_n$ is
   $-F_{top}, -M_{top}$. $F_E, M_E$ is what the outside prescribes of it.
 - $r_{s\gamma}, p_{s\gamma}$ are rim radius and rim offset of the slider of surface $\gamma$.
+- $S_{\psi_k}, C_{\psi_k}, S_{\theta_k}, C_{\theta_k}$ are sines and cosines of the angles of body $k$.
 - $x_1, x_2, \dots$ are numbers that a program keeps to itself."""
 
 TITLES = {

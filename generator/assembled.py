@@ -78,7 +78,7 @@ def assembled() -> dict[str, sp.Expr]:
     base = evaluated(p["forward"], par=lower, u=ground(), x=angles(1))
     body = evaluated(p["forward"], par=plate, u=base, x=angles(2))
 
-    local = evaluated(p["surface_local"], b=base, x=angles(2), y=angles(1), tot=NO_FORCE, rim=NO_FORCE)
+    local = evaluated(p["surface_local"], b=base, a=body, x=angles(2), y=angles(1), tot=NO_FORCE, rim=NO_FORCE)
     surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1")}
     touch = evaluated(p["report_contact"], par=surface, x={"theta": symbol("thetat_1"), "N": symbol("N_1")},
                       f={"Y": symbol("Y_1")}, loc=local)
