@@ -56,17 +56,20 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("sign_lower", "-", "+1: the surface below is concave up, -1: down")
         .scalar("sign_upper", "-", "+1: the surface above is concave up, -1: down")
         .scalar("radius_lower", "m", "R of the surface below; 0 under the base")
-        .scalar("radius_upper", "m", "R of the surface above; 0 on the top plate").build(),
+        .scalar("radius_upper", "m", "R of the surface above; 0 on the top plate")
+        .build(),
         arms=new("arms")
         .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
-        .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3").build(),
+        .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
+        .build(),
         body_parameters=new("body_parameters")
         .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
         .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
         .scalar("m", "kg", "mass")
         .scalar("jt", "kg m^2", "lambda_1 = lambda_2, transverse moment of inertia (2.118)")
         .scalar("ja", "kg m^2", "lambda_3, axial moment of inertia (2.118)")
-        .scalar("g", "m/s^2", "gravitational acceleration").build(),
+        .scalar("g", "m/s^2", "gravitational acceleration")
+        .build(),
         surface_parameters=new("surface_parameters")
         .scalar("sign", "-", "+1 concave up, -1 concave down")
         .scalar("R", "m", "radius of the sliding surface")
@@ -76,7 +79,8 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("kc", "N/m", "rim stiffness (3.23)")
         .scalar("cc", "N s/m", "rim damping (3.23)")
         .scalar("rs", "m", "radius of the slider that carries the contact patch")
-        .scalar("pr", "m", "p, height of the rim contact above the slider's face (3.25)").build(),
+        .scalar("pr", "m", "p, height of the rim contact above the slider's face (3.25)")
+        .build(),
         top_parameters=new("top_parameters")
         .scalar("k", "N/m", "horizontal stiffness of the rig")
         .scalar("c", "N s/m", "horizontal damping of the rig")
@@ -87,70 +91,119 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("ja", "kg m^2", "its axial moment of inertia")
         .scalar("h", "m", "height of its centre above r_nn")
         .scalar("g", "m/s^2", "gravitational acceleration")
-        .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR).build(),
+        .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR)
+        .build(),
         coordinates=new("coordinates")
-        .scalar("psi", "rad", "psi, first Euler angle", 0).scalar("theta", "rad", "theta, second Euler angle")
+        .scalar("psi", "rad", "psi, first Euler angle", 0)
+        .scalar("theta", "rad", "theta, second Euler angle")
         .scalar("phi", "rad", "phi, spin", 0)
-        .scalar("psi1", "rad/s", "d psi/dt", 0).scalar("theta1", "rad/s", "d theta/dt")
+        .scalar("psi1", "rad/s", "d psi/dt", 0)
+        .scalar("theta1", "rad/s", "d theta/dt")
         .scalar("phi1", "rad/s", "d phi/dt", 0)
-        .scalar("psi2", "rad/s^2", "second derivative of psi", 0).scalar("theta2", "rad/s^2", "second derivative of theta")
-        .scalar("phi2", "rad/s^2", "second derivative of phi", 0).build(),
+        .scalar("psi2", "rad/s^2", "second derivative of psi", 0)
+        .scalar("theta2", "rad/s^2", "second derivative of theta")
+        .scalar("phi2", "rad/s^2", "second derivative of phi", 0)
+        .build(),
         body=new("body")
-        .vector("t1", "-", "t_1 (2.1)", POLAR).vector("t2", "-", "t_2 (2.1)", (0, 1, 0))
+        .vector("t1", "-", "t_1 (2.1)", POLAR)
+        .vector("t2", "-", "t_2 (2.1)", (0, 1, 0))
         .vector("t3", "-", "t_3, axis of symmetry (2.1)", POLAR)
         .vector("w", "rad/s", "omega without spin (3.12)", AXIAL)
         .vector("wp", "rad/s", "omega', with spin (3.12)", AXIAL)
-        .vector("al", "rad/s^2", "d omega/dt", AXIAL).vector("alp", "rad/s^2", "d omega'/dt", AXIAL)
+        .vector("al", "rad/s^2", "d omega/dt", AXIAL)
+        .vector("alp", "rad/s^2", "d omega'/dt", AXIAL)
         .vector("C", "m", "sphere centre above (3.4), (3.8); top plate: r_nn (3.11)", POLAR)
-        .vector("V", "m/s", "its velocity", POLAR).vector("A", "m/s^2", "its acceleration", POLAR)
+        .vector("V", "m/s", "its velocity", POLAR)
+        .vector("A", "m/s^2", "its acceleration", POLAR)
         .vector("ac", "m/s^2", "acceleration of the centre of mass", POLAR)
         .vector("vc", "m/s", "velocity of the centre of mass", POLAR)
         .vector("rc", "m", "centre of mass (3.6), (3.10)", POLAR)
-        .scalar("sp", "-", "sin psi", 0).scalar("cp", "-", "cos psi", 1)
-        .scalar("st", "-", "sin theta").scalar("ct", "-", "cos theta").build(),
+        .scalar("sp", "-", "sin psi", 0)
+        .scalar("cp", "-", "cos psi", 1)
+        .scalar("st", "-", "sin theta")
+        .scalar("ct", "-", "cos theta")
+        .build(),
         vector=new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
         moment=new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
         local=new("local")
         .vector("p", "N", "contact force (normal and friction) in the basis of the body below", POLAR)
-        .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL).build(),
+        .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL)
+        .build(),
         friction=new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
-        unknowns=new("unknowns").scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
-        .scalar("theta", "rad", "theta~, second angle of the normal's position").scalar("N", "N", "normal force").build(),
-        contact=new("contact").vector("M", "N m", "moment about the sphere centre, basis of the body below", AXIAL)
-        .scalar("dY", "1/s", "dY/dt (3.18)").scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
-        .scalar("N", "N", "normal force").scalar("sp", "-", "sin psi~", 0).scalar("cp", "-", "cos psi~", 1)
-        .scalar("st", "-", "sin theta~").scalar("ct", "-", "cos theta~")
-        .scalar("u", "m/s", "slip velocity along t~1 (2.98)").scalar("v", "m/s", "slip velocity along t~2 (2.98)", 0)
+        unknowns=new("unknowns")
+        .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
+        .scalar("theta", "rad", "theta~, second angle of the normal's position")
+        .scalar("N", "N", "normal force")
+        .build(),
+        contact=new("contact")
+        .vector("M", "N m", "moment about the sphere centre, basis of the body below", AXIAL)
+        .scalar("dY", "1/s", "dY/dt (3.18)")
+        .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
+        .scalar("N", "N", "normal force")
+        .scalar("sp", "-", "sin psi~", 0)
+        .scalar("cp", "-", "cos psi~", 1)
+        .scalar("st", "-", "sin theta~")
+        .scalar("ct", "-", "cos theta~")
+        .scalar("u", "m/s", "slip velocity along t~1 (2.98)")
+        .scalar("v", "m/s", "slip velocity along t~2 (2.98)", 0)
         .scalar("drill", "W", "power of the drilling moment", 0)
-        .scalar("YY", "1/s", "d(dY/dt)/dY at constant slip velocity").scalar("YZ", "1/s", "d(dY/dt)/dZ", 0)
-        .scalar("ZY", "1/s", "d(dZ/dt)/dY", 0).scalar("ZZ", "1/s", "d(dZ/dt)/dZ", 0).build(),
-        report_contact=new("report_contact").vector("p", "N", "N + F_f, basis of the body below (3.15)-(3.17)", POLAR)
+        .scalar("YY", "1/s", "d(dY/dt)/dY at constant slip velocity")
+        .scalar("YZ", "1/s", "d(dY/dt)/dZ", 0)
+        .scalar("ZY", "1/s", "d(dZ/dt)/dY", 0)
+        .scalar("ZZ", "1/s", "d(dZ/dt)/dZ", 0)
+        .build(),
+        report_contact=new("report_contact")
+        .vector("p", "N", "N + F_f, basis of the body below (3.15)-(3.17)", POLAR)
         .vector("M", "N m", "moment about the sphere centre, same basis", AXIAL)
-        .scalar("dY", "1/s", "dY/dt (3.18)").scalar("dZ", "1/s", "dZ/dt (3.18)", 0).build(),
-        rim=new("rim").vector("f", "N", "F_c (3.22), basis of the body below", POLAR)
+        .scalar("dY", "1/s", "dY/dt (3.18)")
+        .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
+        .build(),
+        rim=new("rim")
+        .vector("f", "N", "F_c (3.22), basis of the body below", POLAR)
         .vector("M", "N m", "its moment about the sphere centre, same basis", AXIAL)
-        .scalar("g", "m", "gap (3.21)").scalar("dg", "m/s", "d gap/dt (2.102)")
-        .scalar("fc", "N", "signed magnitude k g + c dg/dt (3.23)").build(),
+        .scalar("g", "m", "gap (3.21)")
+        .scalar("dg", "m/s", "d gap/dt (2.102)")
+        .scalar("fc", "N", "signed magnitude k g + c dg/dt (3.23)")
+        .build(),
         rim_coordinates=new("rim_coordinates")
-        .scalar("psi", "rad", "psi of the body above", 0).scalar("theta", "rad", "theta of the body above")
-        .scalar("psi1", "rad/s", "its rate", 0).scalar("theta1", "rad/s", "its rate").build(),
+        .scalar("psi", "rad", "psi of the body above", 0)
+        .scalar("theta", "rad", "theta of the body above")
+        .scalar("psi1", "rad/s", "its rate", 0)
+        .scalar("theta1", "rad/s", "its rate")
+        .build(),
         gap=new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
-        top_wrench=new("top_wrench").vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
-        .vector("M", "N m", "-M_top about r_nn", AXIAL).build(),
-        linear=new("linear").vector("r", "N", "(3.26), (3.28): left side less right side, along E1, E2, E3", POLAR).build(),
-        angular=new("angular").vector("r", "N m", "(3.27), (3.29): left side less right side, along t_1, t_2, t_3", AXIAL).build(),
+        top_wrench=new("top_wrench")
+        .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
+        .vector("M", "N m", "-M_top about r_nn", AXIAL)
+        .build(),
+        linear=new("linear")
+        .vector("r", "N", "(3.26), (3.28): left side less right side, along E1, E2, E3", POLAR)
+        .build(),
+        angular=new("angular")
+        .vector("r", "N m", "(3.27), (3.29): left side less right side, along t_1, t_2, t_3", AXIAL)
+        .build(),
         points=_points(planar),
-        base_motion=new("base_motion").vector("U", "m/s", "velocity of the base", POLAR)
-        .vector("B", "m/s^2", "acceleration of the base", POLAR).vector("O", "m", "displacement of the base", POLAR).build(),
-        energy=new("energy").scalar("kinetic", "J", "kinetic energy relative to the moving base")
-        .scalar("potential", "J", "m g times height above the base").scalar("power", "W", "power of the base acceleration").build(),
+        base_motion=new("base_motion")
+        .vector("U", "m/s", "velocity of the base", POLAR)
+        .vector("B", "m/s^2", "acceleration of the base", POLAR)
+        .vector("O", "m", "displacement of the base", POLAR)
+        .build(),
+        energy=new("energy")
+        .scalar("kinetic", "J", "kinetic energy relative to the moving base")
+        .scalar("potential", "J", "m g times height above the base")
+        .scalar("power", "W", "power of the base acceleration")
+        .build(),
     )
 
 
 def _points(planar: bool) -> Block:
     builder = BlockBuilder("points", planar)
-    for name, meaning in (("lo", "r_k-1,k bottom centre"), ("cm", "r_k centre of mass"), ("up", "r_k,k top centre"),
-                          ("sc", "r_kc sphere centre above")):
+    for name, meaning in (
+        ("lo", "r_k-1,k bottom centre"),
+        ("cm", "r_k centre of mass"),
+        ("up", "r_k,k top centre"),
+        ("sc", "r_kc sphere centre above"),
+    ):
         for order, unit in (("r", "m"), ("v", "m/s"), ("a", "m/s^2")):
             builder.vector(f"{order}_{name}", unit, f"{meaning}: {order}", POLAR)
     return builder.build()

@@ -24,15 +24,22 @@ def arms(b: Blocks) -> Program:
     up = (1 + d["sign_lower"]) / 2
     bottom = -d["sign_lower"] * d["radius_lower"]  # (3.5), (3.9)
     centroid = up * d["centroid"] + (1 - up) * (d["height"] - d["centroid"])  # (3.6), (3.10)
-    p.write(b.arms, {"c": bottom + centroid,
-                     "e": bottom + d["height"] + d["sign_upper"] * d["radius_upper"]}, tangents=False)  # (3.4), (3.8)
+    p.write(
+        b.arms,
+        {"c": bottom + centroid, "e": bottom + d["height"] + d["sign_upper"] * d["radius_upper"]},
+        tangents=False,
+    )  # (3.4), (3.8)
     return p
 
 
 def sines(p: Program, x: Symbols) -> Symbols:
     """Sines and cosines of psi and theta: computed once a body, everything else reads them."""
-    return {"sp": p.let(sp.sin(x["psi"])), "cp": p.let(sp.cos(x["psi"])),
-            "st": p.let(sp.sin(x["theta"])), "ct": p.let(sp.cos(x["theta"]))}
+    return {
+        "sp": p.let(sp.sin(x["psi"])),
+        "cp": p.let(sp.cos(x["psi"])),
+        "st": p.let(sp.sin(x["theta"])),
+        "ct": p.let(sp.cos(x["theta"])),
+    }
 
 
 def basis(p: Program, parent: Symbols, trig: Symbols) -> tuple[Vector, Vector, Vector]:
@@ -74,7 +81,10 @@ def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Ve
 
 def forward(b: Blocks) -> Program:
     """Body k from body k-1: (2.1)-(2.6), (3.4)-(3.12) and their derivatives."""
-    p = Program("forward", "kinematics of body k from body k-1: (2.1)-(2.6), (3.4)-(3.12), velocities and accelerations by differentiation")
+    p = Program(
+        "forward",
+        "body k from body k-1: (2.1)-(2.6), (3.4)-(3.12), rates by differentiation",
+    )
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=True)
@@ -109,7 +119,7 @@ def named_points(b: Blocks) -> Program:
 
 
 def weight_and_inertia(p: Program, par: Symbols, body: Symbols, massless: bool) -> Vector:
-    """m (a + g E3): what the interface below must carry more than the one above."""
+    """M (a + g E3): what the interface below must carry more than the one above."""
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
     acceleration = gravity if massless else add(body["ac"], gravity)
     return p.let_vector(scale(par["m"], acceleration), "inertia")
@@ -142,7 +152,10 @@ def angular_balance(b: Blocks, massless: bool) -> Program:
     The wrench of an interface is (F, M) with M about its sphere centre; r_gc - r_k = -c t3 below and
     (e - c) t3 above, so that the moments of both forces share one product with t3.
     """
-    p = Program("angular_balance", "balance of angular momentum (3.27), (3.29) about the centre of mass: left side less right side, along t_i")
+    p = Program(
+        "angular_balance",
+        "balance of angular momentum (3.27), (3.29) about the centre of mass: left side less right side, along t_i",
+    )
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     active = ("t1", "t2", "t3") if massless else ("t1", "t2", "t3", "wp", "alp")
     body: Symbols = p.read(b.body, "b", active=active)
@@ -167,8 +180,12 @@ def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
     difference = p.let(par["ja"] - par["jt"])
     spin, spin_rate = p.let(dot(t3, wp)), p.let(dot(t3, alp))
     gyroscopic = p.let_vector(cross(wp, t3), "gy")
-    return p.let_vector(add(scale(par["jt"], alp), scale(p.let(difference * spin_rate), t3),
-                            scale(p.let(difference * spin), gyroscopic)), "hdot")
+    return p.let_vector(
+        add(
+            scale(par["jt"], alp), scale(p.let(difference * spin_rate), t3), scale(p.let(difference * spin), gyroscopic)
+        ),
+        "hdot",
+    )
 
 
 def body_energy(b: Blocks) -> Program:
@@ -186,9 +203,11 @@ def energy_terms(p: Program, par: Symbols, body: Symbols, r: Vector, v: Vector, 
     relative = p.let_vector(subtract(v, base["U"]), "v")
     spin = p.let(dot(body["t3"], body["wp"]))
     rotation = (par["jt"] * dot(body["wp"], body["wp"]) + (par["ja"] - par["jt"]) * spin**2) / 2
-    return {"kinetic": par["m"] * dot(relative, relative) / 2 + rotation,
-            "potential": par["m"] * par["g"] * (r[2] - base["O"][2]),
-            "power": -par["m"] * dot(base["B"], relative)}
+    return {
+        "kinetic": par["m"] * dot(relative, relative) / 2 + rotation,
+        "potential": par["m"] * par["g"] * (r[2] - base["O"][2]),
+        "power": -par["m"] * dot(base["B"], relative),
+    }
 
 
 def to_world(b: Blocks) -> Program:
@@ -211,7 +230,9 @@ def force_to_world(b: Blocks) -> Program:
 
 def to_local(b: Blocks) -> Program:
     """Contact force and relative angular velocity of a surface in the basis of the body below it."""
-    p = Program("surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)")
+    p = Program(
+        "surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)"
+    )
     body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
     above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
     x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
@@ -223,5 +244,7 @@ def to_local(b: Blocks) -> Program:
     t2: Vector = (zero, cos_psi, sin_psi)
     t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
     relative = add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
-    p.write(b.local, {"p": subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"]), "dw": relative})
+    p.write(
+        b.local, {"p": subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"]), "dw": relative}
+    )
     return p

@@ -86,8 +86,14 @@ def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: 
     else:
         a = b = p.let(Step(p.let(yu + zv)))
     drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
-    return {"dY": p.let((u - Y * drive) / dy, "dY"), "dZ": p.let((v - Z * drive) / dy, "dZ"),
-            "YY": -(drive + Y * au) / dy, "YZ": -Y * bv / dy, "ZY": -Z * au / dy, "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z}
+    return {
+        "dY": p.let((u - Y * drive) / dy, "dY"),
+        "dZ": p.let((v - Z * drive) / dy, "dZ"),
+        "YY": -(drive + Y * au) / dy,
+        "YZ": -Y * bv / dy,
+        "ZY": -Z * au / dy,
+        "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z,
+    }
 
 
 def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector) -> Symbols:
@@ -147,15 +153,21 @@ def closed_form(p: Program, par: Symbols, force: Vector, f: Symbols) -> tuple[sp
 
 def contact(b: Blocks, law: Law) -> Program:
     """Contact moment, N and position of the normal at a given contact force (closed form) with the Bouc-Wen rates."""
-    p = Program("contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)")
+    p = Program(
+        "contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)"
+    )
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     loc: Symbols = p.read(b.local, "loc")
     f: Symbols = p.read(b.friction, "f")
     N, (sp_, cp_, st_, ct_) = closed_form(p, par, loc["p"], f)
     base = contact_basis(p, sp_, cp_, st_, ct_)
     out = friction(p, law, par, base, N, f, loc["dw"])
-    p.write(b.contact, {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
-            tangents=("M", "dY", "dZ", "N"), columns="MSFP_LOCAL")
+    p.write(
+        b.contact,
+        {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
+        tangents=("M", "dY", "dZ", "N"),
+        columns="MSFP_LOCAL",
+    )
     return p
 
 
@@ -199,7 +211,21 @@ def rim(b: Blocks) -> Program:
     force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
     slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
     arm = p.let(-par["sign"] * (par["R"] - par["pr"]))  # (3.25); the part r f_b is along the force
-    moment = p.let_vector(scale(arm, (slider[1] * force[2] - slider[2] * force[1], slider[2] * force[0] - slider[0] * force[2],
-                                      slider[0] * force[1] - slider[1] * force[0])), "M")
-    p.write(b.rim, {"f": force, "M": moment, "g": gap, "dg": gap_rate, "fc": size}, tangents=("f", "M"), columns="MSFP_RIM_LOCAL")
+    moment = p.let_vector(
+        scale(
+            arm,
+            (
+                slider[1] * force[2] - slider[2] * force[1],
+                slider[2] * force[0] - slider[0] * force[2],
+                slider[0] * force[1] - slider[1] * force[0],
+            ),
+        ),
+        "M",
+    )
+    p.write(
+        b.rim,
+        {"f": force, "M": moment, "g": gap, "dg": gap_rate, "fc": size},
+        tangents=("f", "M"),
+        columns="MSFP_RIM_LOCAL",
+    )
     return p

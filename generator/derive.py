@@ -33,11 +33,23 @@ def derive(spec: ModelSpec) -> Equations:
     blocks = make_blocks(planar=effects.dimension == "planar")
     law = contact.Law(effects.bouc_wen, patch=effects.spin == "patch" and effects.dimension == "spatial")
     massless = effects.sliders == "massless"
-    programs = [body.arms(blocks), body.forward(blocks), body.named_points(blocks), body.to_local(blocks),
-                contact.contact(blocks, law), contact.report_contact(blocks, law), body.to_world(blocks),
-                body.force_to_world(blocks), body.interface_force(blocks, massless), body.linear_balance(blocks, massless),
-                body.angular_balance(blocks, massless), body.body_energy(blocks), top.top_wrench(blocks, massless),
-                top.top_energy(blocks), contact.gap(blocks)]
+    programs = [
+        body.arms(blocks),
+        body.forward(blocks),
+        body.named_points(blocks),
+        body.to_local(blocks),
+        contact.contact(blocks, law),
+        contact.report_contact(blocks, law),
+        body.to_world(blocks),
+        body.force_to_world(blocks),
+        body.interface_force(blocks, massless),
+        body.linear_balance(blocks, massless),
+        body.angular_balance(blocks, massless),
+        body.body_energy(blocks),
+        top.top_wrench(blocks, massless),
+        top.top_energy(blocks),
+        contact.gap(blocks),
+    ]
     if effects.rims:
         programs.append(contact.rim(blocks))
     return Equations(spec, blocks, tuple(programs))

@@ -55,8 +55,11 @@ def arguments(kernel: Kernel) -> Iterator[Argument]:
     for use in kernel.program.inputs:
         names = [f"{use.alias}_{f.name}" for f in use.block.fields]
         loads = tuple((name, i) for i, name in enumerate(names) if name in used)
-        moving = tuple((f"d_{name}", i) for i, name in enumerate(names)
-                       if name in sources and use.block.fields[i].name in use.active)
+        moving = tuple(
+            (f"d_{name}", i)
+            for i, name in enumerate(names)
+            if name in sources and use.block.fields[i].name in use.active
+        )
         yield Argument(use.alias, use.block, loads, moving, use.moving)
 
 
@@ -89,30 +92,54 @@ def function(kernel: Kernel) -> Function:
     index = {f.name: i for i, f in enumerate(output.block.fields)}
     moving = {t.target.name for t in kernel.tangents} | {f"{u.alias}_{n}" for u in program.inputs for n in u.active}
     return Function(
-        name=program.name, summary=program.summary, output=output.block, columns=program.columns,
-        operations=kernel.operations, arguments=tuple(arguments(kernel)),
+        name=program.name,
+        summary=program.summary,
+        output=output.block,
+        columns=program.columns,
+        operations=kernel.operations,
+        arguments=tuple(arguments(kernel)),
         values=tuple(f"{s.target} = {to_c(s.expression)}" for s in kernel.values),
         partials=tuple(f"{s.target} = {to_c(s.expression)}" for s in kernel.partials),
         tangents=tuple(f"d_{t.target} = {tangent_sum(t.terms)}" for t in kernel.tangents),
         stores=tuple((index[name], to_c(e), name) for name, e in program.results.items()),
-        tangent_stores=tuple((index[n], linear(program.results[n], moving))
-                             for n in program.results if n in program.tangents))
+        tangent_stores=tuple(
+            (index[n], linear(program.results[n], moving)) for n in program.results if n in program.tangents
+        ),
+    )
 
 
 def vector_quantities(block: Block) -> list[tuple[str, list[tuple[int, int | None, str]]]]:
     """For each vector of a block: axis, index (None: constant) and constant value."""
     index = {f.name: i for i, f in enumerate(block.fields)}
-    return [(name, [(axis, index.get(part) if isinstance(part, str) else None, "0.0" if isinstance(part, str) else to_c(sp.Float(part)))
-                    for axis, part in enumerate(parts)])
-            for name, parts in block.quantities.items() if len(parts) == 3]
+    return [
+        (
+            name,
+            [
+                (
+                    axis,
+                    index.get(part) if isinstance(part, str) else None,
+                    "0.0" if isinstance(part, str) else to_c(sp.Float(part)),
+                )
+                for axis, part in enumerate(parts)
+            ],
+        )
+        for name, parts in block.quantities.items()
+        if len(parts) == 3
+    ]
 
 
 def scalar_quantities(block: Block) -> list[tuple[str, int | None, str]]:
     """For each scalar of a block: index (None: constant) and constant value."""
     index = {f.name: i for i, f in enumerate(block.fields)}
-    return [(name, index.get(parts[0]) if isinstance(parts[0], str) else None,
-             "0.0" if isinstance(parts[0], str) else to_c(sp.Float(parts[0])))
-            for name, parts in block.quantities.items() if len(parts) == 1]
+    return [
+        (
+            name,
+            index.get(parts[0]) if isinstance(parts[0], str) else None,
+            "0.0" if isinstance(parts[0], str) else to_c(sp.Float(parts[0])),
+        )
+        for name, parts in block.quantities.items()
+        if len(parts) == 1
+    ]
 
 
 def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
@@ -120,18 +147,35 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = resources.files("msfp_gen.templates")
-    environment = Environment(loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
-                              undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-                              keep_trailing_newline=True, autoescape=False)
+    environment = Environment(
+        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
     spec = equations.spec
     blocks = [getattr(equations.blocks, f.name) for f in fields(equations.blocks)]
     context = {
-        "version": __version__, "spec": spec, "module": module, "layout": spec.layout, "effects": spec.effects,
-        "blocks": blocks, "functions": [function(k) for k in kernels],
-        "nb": spec.layout.surfaces, "effects_dict": repr({f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)}),
-        "unknowns": equations.unknowns, "vectors": vector_quantities, "scalars": scalar_quantities,
+        "version": __version__,
+        "spec": spec,
+        "module": module,
+        "layout": spec.layout,
+        "effects": spec.effects,
+        "blocks": blocks,
+        "functions": [function(k) for k in kernels],
+        "nb": spec.layout.surfaces,
+        "effects_dict": repr({f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)}),
+        "unknowns": equations.unknowns,
+        "vectors": vector_quantities,
+        "scalars": scalar_quantities,
         "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
     }
-    names = {"msfp_model.h": "msfp_model.h.jinja", "msfp_kernels.h": "msfp_kernels.h.jinja", f"{module}.pyx": "module.pyx.jinja"}
+    names = {
+        "msfp_model.h": "msfp_model.h.jinja",
+        "msfp_kernels.h": "msfp_kernels.h.jinja",
+        f"{module}.pyx": "module.pyx.jinja",
+    }
     return {name: environment.get_template(template).render(context, file=name) for name, template in names.items()}

@@ -1,4 +1,4 @@
-"""Lowering: each program with the local partial derivatives its tangent needs (forward mode, statement by statement)."""
+"""Lowering: each program with the local partial derivatives that its tangent needs, statement by statement."""
 
 from __future__ import annotations
 
@@ -79,7 +79,9 @@ def lower(program: Program) -> Kernel:
     return Kernel(program, values, *pruned(partials, tangents, targets))
 
 
-def pruned(partials: list[Statement], tangents: list[Tangent], targets: set[sp.Symbol]) -> tuple[tuple[Statement, ...], tuple[Tangent, ...]]:
+def pruned(
+    partials: list[Statement], tangents: list[Tangent], targets: set[sp.Symbol]
+) -> tuple[tuple[Statement, ...], tuple[Tangent, ...]]:
     """What the wanted tangents depend on: a switch has no derivative, so what feeds it may fall away."""
     needed, kept, used = set(targets), [], set()
     for tangent in reversed(tangents):

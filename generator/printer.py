@@ -9,7 +9,7 @@ from sympy.printing.c import C99CodePrinter
 class Printer(C99CodePrinter):  # type: ignore[misc]
     """C99 with small powers as products and the switch of (3.18) as a function of the runtime."""
 
-    def _print_Pow(self, expr: sp.Pow) -> str:  # noqa: N802 (SymPy's name)
+    def _print_Pow(self, expr: sp.Pow) -> str:
         base, exponent = expr.as_base_exp()
         if exponent.is_Integer and 2 <= abs(exponent) <= 4:
             text = self.parenthesize(base, sp.printing.precedence.PRECEDENCE["Mul"] + 1)
@@ -17,13 +17,13 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
             return f"({product})" if exponent > 0 else f"(1.0/({product}))"
         return str(super()._print_Pow(expr))
 
-    def _print_Step(self, expr: sp.Function) -> str:  # noqa: N802
+    def _print_Step(self, expr: sp.Function) -> str:
         return f"msfp_step({self._print(expr.args[0])})"
 
-    def _print_ArcTan2(self, expr: sp.Function) -> str:  # noqa: N802
+    def _print_ArcTan2(self, expr: sp.Function) -> str:
         return f"atan2({self._print(expr.args[0])}, {self._print(expr.args[1])})"
 
-    def _print_Modulus(self, expr: sp.Function) -> str:  # noqa: N802
+    def _print_Modulus(self, expr: sp.Function) -> str:
         return f"fabs({self._print(expr.args[0])})"
 
 

@@ -42,7 +42,7 @@ class Block:
         out: dict[str, sp.Expr | Vector] = {}
         for quantity, parts in self.quantities.items():
             values = tuple(sp.Symbol(f"{alias}_{part}", real=True) if isinstance(part, str) else part for part in parts)
-            out[quantity] = values[0] if len(values) == 1 else values  # type: ignore[assignment]
+            out[quantity] = values[0] if len(values) == 1 else values
         return out
 
 
@@ -63,7 +63,9 @@ class BlockBuilder:
             self.quantities[name] = (name,)
         return self
 
-    def vector(self, name: str, unit: str, meaning: str, planar: tuple[int | None, int | None, int | None]) -> BlockBuilder:
+    def vector(
+        self, name: str, unit: str, meaning: str, planar: tuple[int | None, int | None, int | None]
+    ) -> BlockBuilder:
         """Add a vector; `planar` gives the constant components of a planar model (None: stored)."""
         parts: list[str | sp.Expr] = []
         for axis, constant in zip(AXES, planar, strict=True):
@@ -168,8 +170,14 @@ class Program:
             elif (-component).is_Symbol:
                 self.rates[-component] = -rate
 
-    def write(self, block: Block, values: Mapping[str, sp.Expr | Vector], tangents: bool | Iterable[str] = True,
-              columns: str = "MSFP_DOF", alias: str = "out") -> None:
+    def write(
+        self,
+        block: Block,
+        values: Mapping[str, sp.Expr | Vector],
+        tangents: bool | Iterable[str] = True,
+        columns: str = "MSFP_DOF",
+        alias: str = "out",
+    ) -> None:
         """Declare the output block; a component that the block holds constant must come out so."""
         for quantity, parts in block.quantities.items():
             value = values[quantity]
@@ -184,7 +192,9 @@ class Program:
             raise AssertionError(f"{self.name}: {sorted(unknown)} are not in block {block.name}")
         self.output = Use(block, alias, frozenset())
         names = [f.name for f in block.fields]
-        self.tangents = frozenset(names if tangents is True else [] if tangents is False else fields_of(block, tangents))
+        self.tangents = frozenset(
+            names if tangents is True else [] if tangents is False else fields_of(block, tangents)
+        )
         self.columns = columns if self.tangents else ""
 
 

@@ -35,16 +35,25 @@ def top_wrench(b: Blocks, massless: bool) -> Program:
     force: Symbols = p.read(b.vector, "fe")
     moment: Symbols = p.read(b.moment, "me")
     zero = sp.Integer(0)
-    horizontal: Vector = (par["k"] * (body["C"][0] - par["x0"][0]) + par["c"] * body["V"][0],
-                          par["k"] * (body["C"][1] - par["x0"][1]) + par["c"] * body["V"][1], zero)
+    horizontal: Vector = (
+        par["k"] * (body["C"][0] - par["x0"][0]) + par["c"] * body["V"][0],
+        par["k"] * (body["C"][1] - par["x0"][1]) + par["c"] * body["V"][1],
+        zero,
+    )
     _, _, a = mass_point(p, par, body)
     inertia = p.let_vector(scale(par["m"], add(a, (zero, zero, par["g"]))), "inertia")
     f = add(p.let_vector(horizontal, "rig"), inertia, scale(sp.Integer(-1), force["F"]))
     t3 = body["t3"]
-    restoring = add(cross((zero, zero, par["kr"]), t3), scale(p.let(par["kr"] * x["phi"]), t3), scale(par["cr"], body["wp"]))
+    restoring = add(
+        cross((zero, zero, par["kr"]), t3), scale(p.let(par["kr"] * x["phi"]), t3), scale(par["cr"], body["wp"])
+    )
     h_dot = rate_of_angular_momentum(p, par, body)
-    m = add(p.let_vector(restoring, "rot"), h_dot, cross(p.let_vector(scale(par["h"], t3), "lever"), inertia),
-            scale(sp.Integer(-1), moment["M"]))
+    m = add(
+        p.let_vector(restoring, "rot"),
+        h_dot,
+        cross(p.let_vector(scale(par["h"], t3), "lever"), inertia),
+        scale(sp.Integer(-1), moment["M"]),
+    )
     p.write(b.top_wrench, {"F": f, "M": m})
     return p
 
@@ -58,5 +67,3 @@ def top_energy(b: Blocks) -> Program:
     r, v, _ = mass_point(p, par, body)
     p.write(b.energy, energy_terms(p, par, body, r, v, base), tangents=False)
     return p
-
-

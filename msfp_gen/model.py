@@ -90,9 +90,19 @@ class Model:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
         return self.extension.Stack(bearing.gravity, *bodies_and_surfaces(bearing), top_values(top, anchor))
 
-    def evaluate(self, bearing: Bearing, q: ArrayLike, v: ArrayLike, h: ArrayLike, *, base_acceleration: ArrayLike = ZERO,
-                 top_force: ArrayLike = ZERO, top_moment: ArrayLike = ZERO, base_rotation: Rotation | None = None,
-                 formulation: str = "condensed") -> Evaluation:
+    def evaluate(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        *,
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+        formulation: str = "condensed",
+    ) -> Evaluation:
         """Accelerations, normal forces and friction rates at a state.
 
         q, v: angles psi, theta, phi of bodies 2..n and rates, shape (n-1, 3) [rad], [rad/s]. h: Y, Z, shape (n-1, 2).
@@ -108,14 +118,20 @@ class Model:
         if self.effects.sliders == "massless":
             return self._quasistatic(stack, state)
         status, a, row, rates, residual, iterations, sign, _ = stack.accelerations(
-            state.q, state.v, state.f, state.base, state.load, report=formulation == "report")
+            state.q, state.v, state.f, state.base, state.load, report=formulation == "report"
+        )
         if status != "ok":
-            raise RunError(f"evaluate: {FAILURES.get(status, status)} ({iterations} iterations, residual {residual:.3g})", status=status)
+            raise RunError(
+                f"evaluate: {FAILURES.get(status, status)} ({iterations} iterations, residual {residual:.3g})",
+                status=status,
+            )
         return self._evaluation(state, a, row, rates, residual, iterations, sign)
 
     def _quasistatic(self, stack: Any, state: State) -> Evaluation:
         zero = np.zeros_like(state.q)
-        status, residual, _, _ = stack.condensed(state.q, state.v, zero, state.f, state.base, state.load, 0.0, 0.0, 0.0, 0.0)
+        status, residual, _, _ = stack.condensed(
+            state.q, state.v, zero, state.f, state.base, state.load, 0.0, 0.0, 0.0, 0.0
+        )
         if status != "ok":
             raise RunError(f"evaluate: {FAILURES.get(status, status)}", status=status)
         row, _ = stack.observe(state.q, state.v, zero, state.f, state.base, state.load)
@@ -124,33 +140,52 @@ class Model:
         size = float(np.max(np.abs(residual)) / max(float(np.max(fields["normal"])), 1e-12))
         return self._evaluation(state, None, row, rates, size, 0, 0)
 
-    def _evaluation(self, state: State, a: Array | None, row: Array, rates: Array, residual: float, iterations: int, sign: int) -> Evaluation:
+    def _evaluation(
+        self, state: State, a: Array | None, row: Array, rates: Array, residual: float, iterations: int, sign: int
+    ) -> Evaluation:
         fields = self.unpack(row)
         turn = state.azimuth
         return Evaluation(
-            acceleration=None if a is None else out_of_plane(a, turn, "angles"), normal_force=fields["normal"],
-            contact_angles=out_of_plane(fields["angles"], turn, "pair_angles"), friction_rate=out_of_plane(rates, turn, "pair"),
-            interface_force=out_of_plane(fields["force"], turn, "vector"), slip_velocity=out_of_plane(fields["slip"], turn, "pair"),
-            sliding=fields["sliding"], gap=fields["gap"], residual_norm=float(residual), newton_iterations=int(iterations),
-            determinant=int(sign))
+            acceleration=None if a is None else out_of_plane(a, turn, "angles"),
+            normal_force=fields["normal"],
+            contact_angles=out_of_plane(fields["angles"], turn, "pair_angles"),
+            friction_rate=out_of_plane(rates, turn, "pair"),
+            interface_force=out_of_plane(fields["force"], turn, "vector"),
+            slip_velocity=out_of_plane(fields["slip"], turn, "pair"),
+            sliding=fields["sliding"],
+            gap=fields["gap"],
+            residual_norm=float(residual),
+            newton_iterations=int(iterations),
+            determinant=int(sign),
+        )
 
     def unpack(self, rows: Array) -> dict[str, Array]:
         """Recorded rows, shape (..., row size), as named arrays (names and shapes: `ROW` of the extension)."""
         out, start = {}, 0
         for name, shape in self.extension.ROW:
             size = int(np.prod(shape, dtype=int))
-            out[name] = rows[..., start:start + size].reshape(rows.shape[:-1] + shape)
+            out[name] = rows[..., start : start + size].reshape(rows.shape[:-1] + shape)
             start += size
         return out
 
-    def residual(self, bearing: Bearing, q: ArrayLike, v: ArrayLike, h: ArrayLike, unknowns: ArrayLike, *,
-                 base_acceleration: ArrayLike = ZERO, top_force: ArrayLike = ZERO, top_moment: ArrayLike = ZERO,
-                 base_rotation: Rotation | None = None) -> Array:
+    def residual(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        unknowns: ArrayLike,
+        *,
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+    ) -> Array:
         """The report's balances (3.26)-(3.29) at given unknowns: left side less right side.
 
-        unknowns: shape (6(n-1),) in the order of (2.119): accelerations psi'', theta'', phi'' body by body, psi~, theta~
-        surface by surface, N. Returns shape (6(n-1),): per body the linear balance along E1, E2, E3 [N], then the angular
-        one along t_1, t_2, t_3 of the body [N m]; with locked spin phi'' in place of its axial part. A planar model has
+        unknowns: shape (6(n-1),) in the order of (2.119): accelerations psi'', theta'', phi'' body by body, psi~,
+        theta~ surface by surface, N. Returns shape (6(n-1),): per body the linear balance along E1, E2, E3 [N], then the
+        angular one along t_1, t_2, t_3 of the body [N m]; with locked spin phi'' in place of its axial part. A planar model has
         3(n-1) of each: theta'', theta~, N; and E1, E3, t_2. Other inputs as in `evaluate`.
         """
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
@@ -158,9 +193,20 @@ class Model:
         residual: Array = self.stack(bearing).report(state.q, state.v, state.f, state.base, state.load, values)[0]
         return residual
 
-    def jacobian(self, bearing: Bearing, q: ArrayLike, v: ArrayLike, h: ArrayLike, unknowns: ArrayLike, *, wrt: str = "unknowns",
-                 base_acceleration: ArrayLike = ZERO, top_force: ArrayLike = ZERO, top_moment: ArrayLike = ZERO,
-                 base_rotation: Rotation | None = None) -> Array:
+    def jacobian(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        unknowns: ArrayLike,
+        *,
+        wrt: str = "unknowns",
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+    ) -> Array:
         """Jacobian of `residual`, shape (6(n-1), k).
 
         wrt: "unknowns" (k = 6(n-1), their order); "state" (k = 8(n-1): q, v, h, each flattened); "inputs" (k = 24: base
@@ -169,15 +215,19 @@ class Model:
         columns = self._columns(wrt)
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
-        jacobian: Array = self.stack(bearing).report(state.q, state.v, state.f, state.base, state.load, values, columns)[1]
+        jacobian: Array = self.stack(bearing).report(
+            state.q, state.v, state.f, state.base, state.load, values, columns
+        )[1]
         return jacobian
 
-    def kinematics(self, bearing: Bearing, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, base: ArrayLike | None = None) -> dict[str, Array]:
+    def kinematics(
+        self, bearing: Bearing, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, base: ArrayLike | None = None
+    ) -> dict[str, Array]:
         """Every named vector of (3.1)-(3.12) with velocity and acceleration.
 
         q, v, a: shape (n-1, 3). base: shape (3, 6): u_g1..3, psi_1, theta_1, phi_1 and first and second derivatives.
-        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], "v_..." [m/s], "a_..." [m/s^2], "omega_k" and "omega'_k"
-        [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. E components.
+        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], "v_..." [m/s], "a_..." [m/s^2], "omega_k" and
+        "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. E components.
         """
         if self.planar:
             raise InputError("kinematics: a planar model has no third dimension; build it with dimension = 'spatial'")
@@ -193,34 +243,59 @@ class Model:
 
         return Ode(self, bearing, motion, top)
 
-    def _state(self, q: ArrayLike, v: ArrayLike, h: ArrayLike, acceleration: ArrayLike, rotation: Rotation | None,
-               force: ArrayLike, moment: ArrayLike) -> State:
+    def _state(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        acceleration: ArrayLike,
+        rotation: Rotation | None,
+        force: ArrayLike,
+        moment: ArrayLike,
+    ) -> State:
         count = self.layout.surfaces
         base = np.zeros((3, 6))
         base[2, :3] = vector(acceleration, "base_acceleration", (3,), "m/s^2")
         if rotation is not None:
-            base[:, 3:] = vector(rotation, "base_rotation", (3, 3), "rad, rad/s, rad/s^2")
+            base[:, 3:] = vector(np.asarray(rotation, dtype=float), "base_rotation", (3, 3), "rad, rad/s, rad/s^2")
         load = np.concatenate([vector(force, "top_force", (3,), "N"), vector(moment, "top_moment", (3,), "N m")])
-        state = State(vector(q, "q", (count, 3), "rad"), vector(v, "v", (count, 3), "rad/s"), vector(h, "h", (count, 2), "-"),
-                      base, load)
+        state = State(
+            vector(q, "q", (count, 3), "rad"),
+            vector(v, "v", (count, 3), "rad/s"),
+            vector(h, "h", (count, 2), "-"),
+            base,
+            load,
+        )
         return into_plane(state) if self.planar else state
 
     def _columns(self, wrt: str) -> list[tuple[int, int, int]]:
         makers: dict[str, Callable[[], list[tuple[int, int, int]]]] = {
-            "unknowns": self._unknown_columns, "state": self._state_columns, "inputs": _input_columns}
+            "unknowns": self._unknown_columns,
+            "state": self._state_columns,
+            "inputs": _input_columns,
+        }
         if wrt not in makers:
             raise InputError(f"wrt = {wrt!r}: give one of {', '.join(makers)}")
         return makers[wrt]()
 
     def _unknown_columns(self) -> list[tuple[int, int, int]]:
-        bodies, angles, contact = range(self.layout.surfaces), (1,) if self.planar else (0, 1, 2), (1,) if self.planar else (0, 1)
-        return [*((0, k + 1, 6 + i) for k in bodies for i in angles), *((1, k, i) for k in bodies for i in contact),
-                *((1, k, 2) for k in bodies)]
+        bodies, angles, contact = (
+            range(self.layout.surfaces),
+            (1,) if self.planar else (0, 1, 2),
+            (1,) if self.planar else (0, 1),
+        )
+        return [
+            *((0, k + 1, 6 + i) for k in bodies for i in angles),
+            *((1, k, i) for k in bodies for i in contact),
+            *((1, k, 2) for k in bodies),
+        ]
 
     def _state_columns(self) -> list[tuple[int, int, int]]:
         bodies = range(self.layout.surfaces)
-        return [*((0, k + 1, 3 * order + i) for order in (0, 1) for k in bodies for i in range(3)),
-                *((2, k, i) for k in bodies for i in range(2))]
+        return [
+            *((0, k + 1, 3 * order + i) for order in (0, 1) for k in bodies for i in range(3)),
+            *((2, k, i) for k in bodies for i in range(2)),
+        ]
 
 
 def _input_columns() -> list[tuple[int, int, int]]:

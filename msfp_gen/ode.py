@@ -27,7 +27,9 @@ class Ode:
         if model.effects.sliders == "massless":
             raise InputError("as_ode: a massless model is no ordinary differential equation; use sliders = 'inertial'")
         if model.planar and motion.plane() != 0.0:
-            raise InputError("as_ode: a planar model takes a motion in the E1-E3 plane; turn it with motion.rotated(angle)")
+            raise InputError(
+                "as_ode: a planar model takes a motion in the E1-E3 plane; turn it with motion.rotated(angle)"
+            )
         self.model, self.motion = model, motion
         self.count = model.layout.surfaces
         self.stack = model.stack(bearing, top, anchor=motion.displacement(0.0)[:2])
@@ -39,7 +41,7 @@ class Ode:
 
     def _split(self, y: Array) -> tuple[Array, Array, Array]:
         k = 3 * self.count
-        q, v, h = y[:k].reshape(-1, 3), y[k:2 * k].reshape(-1, 3), y[2 * k:].reshape(-1, 2)
+        q, v, h = y[:k].reshape(-1, 3), y[k : 2 * k].reshape(-1, 3), y[2 * k :].reshape(-1, 2)
         return np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), np.ascontiguousarray(h, float)
 
     def _base(self, t: float) -> Array:
@@ -54,7 +56,7 @@ class Ode:
         return np.concatenate([v.ravel(), a.ravel(), rates.ravel()])
 
     def jac(self, t: float, y: Array) -> Array:
-        """d fun / d y, shape (8(n-1), 8(n-1))."""
+        """D fun / d y, shape (8(n-1), 8(n-1))."""
         q, v, h = self._split(np.asarray(y))
         base = self._base(t)
         status, *_, unknowns = self.stack.accelerations(q, v, h, base, self.load, report=True)
@@ -66,11 +68,11 @@ class Ode:
         sensitivity = -np.linalg.solve(jacobian[:, :split], jacobian[:, split:])  # d unknowns / d y
         k = 3 * self.count
         out = np.zeros((8 * self.count, 8 * self.count))
-        out[:k, k:2 * k] = np.eye(k)
+        out[:k, k : 2 * k] = np.eye(k)
         accelerations = sensitivity[: split // (3 if self.model.planar else 2)]
         if self.model.planar:
-            out[k + 1:2 * k:3] = accelerations
+            out[k + 1 : 2 * k : 3] = accelerations
         else:
-            out[k:2 * k] = accelerations
-        out[2 * k:] = rates[:, split:] + rates[:, :split] @ sensitivity
+            out[k : 2 * k] = accelerations
+        out[2 * k :] = rates[:, split:] + rates[:, :split] @ sensitivity
         return out

@@ -41,7 +41,7 @@ def bodies_and_surfaces(bearing: Bearing) -> tuple[Array, Array]:
 
 
 def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
-    """Array (10,): stiffness, damping, rotational ones, mass, inertias, height, anchor of the rig springs (x, y) [m]."""
+    """Array (10,): stiffness, damping, rotational ones, mass, inertias, height, anchor of the springs (x, y) [m]."""
     values = np.zeros(10)
     values[8:] = np.asarray(anchor, dtype=float)
     if isinstance(top, RigTop):

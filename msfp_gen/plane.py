@@ -35,9 +35,13 @@ def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
     """Angles psi, theta, phi of a tilt in the E1-E3 plane (azimuth 0) or the E2-E3 plane (pi/2) as theta alone."""
     across, along, sign = (0, 1, 1.0) if abs(azimuth) < 1e-9 else (1, 0, -1.0)
     if azimuth and abs(azimuth - np.pi / 2) > 1e-9 and np.any(q):
-        raise InputError(f"{name}: a planar model takes a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'")
+        raise InputError(
+            f"{name}: a planar model takes a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'"
+        )
     if np.any(q[..., [across, 2]]):
-        raise InputError(f"{name} leaves the vertical plane of the model: give angles of that plane, or dimension = 'spatial'")
+        raise InputError(
+            f"{name} leaves the vertical plane of the model: give angles of that plane, or dimension = 'spatial'"
+        )
     out = np.zeros_like(q)
     out[..., 1] = sign * q[..., along]
     return out
@@ -46,18 +50,32 @@ def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
 def into_plane(state: State) -> State:
     """The state seen in its own vertical plane, E1-E3 or E2-E3; InputError if it lies in neither."""
     base = state.base.copy()
-    in_second = any(np.any(x) for x in (state.q[:, 0], state.v[:, 0], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]]))
+    in_second = any(
+        np.any(x) for x in (state.q[:, 0], state.v[:, 0], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]])
+    )
     azimuth = np.pi / 2 if in_second else 0.0
     base[:, :3] = turned(base[:, :3], azimuth) if in_second else base[:, :3]
     base[:, 3:] = tilts_into_plane(base[:, 3:], azimuth, "base_rotation")
     force, moment = (turned(x, azimuth) if in_second else x for x in (state.load[:3], state.load[3:]))
     f = turned_pairs(state.f, azimuth)
-    for name, value in (("h", f[:, 1]), ("base_acceleration", base[:, 1]), ("top_force", force[1:2]), ("top_moment", moment[[0, 2]])):
+    for name, value in (
+        ("h", f[:, 1]),
+        ("base_acceleration", base[:, 1]),
+        ("top_force", force[1:2]),
+        ("top_moment", moment[[0, 2]]),
+    ):
         if np.any(np.abs(value) > 1e-12 * (1 + np.abs(np.concatenate([force, moment])).max())):
             raise InputError(f"{name} leaves the vertical plane of the state: give one plane, or dimension = 'spatial'")
     base[:, 1] = 0.0
-    return replace(state, q=tilts_into_plane(state.q, azimuth, "q"), v=tilts_into_plane(state.v, azimuth, "v"),
-                   f=np.ascontiguousarray(f * [1.0, 0.0]), base=base, load=np.concatenate([force, moment]), azimuth=azimuth)
+    return replace(
+        state,
+        q=tilts_into_plane(state.q, azimuth, "q"),
+        v=tilts_into_plane(state.v, azimuth, "v"),
+        f=np.ascontiguousarray(f * [1.0, 0.0]),
+        base=base,
+        load=np.concatenate([force, moment]),
+        azimuth=azimuth,
+    )
 
 
 def turned_pairs(pairs: Array, angle: float) -> Array:

@@ -28,9 +28,11 @@ CHUNK = 4000  # steps between two looks at Ctrl-C and at the progress
 
 EVENT_KINDS = ("rim_contact", "rim_release", "stop")
 FAILURES = {
-    "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); lower the friction or the motion",
+    "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
+    "lower the friction or the motion",
     "step": "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
-    "irregular": "the equations lost regularity (the determinant changed sign): friction is too high for a unique motion here",
+    "irregular": "the equations lost regularity (the determinant changed sign): "
+    "friction is too high for a unique motion here",
     "uplift": "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion",
     "angle": "a tilt nears 90 degrees, where the Euler angles are singular; check the capacity and the rims",
     "steps": "the allowed number of steps is used up; raise solver.max_steps",
@@ -77,7 +79,9 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
 
 def _check(scene: Scene) -> None:
     if scene.effects.sliders == "massless" and scene.solver.method == "dopri5":
-        raise InputError("solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'")
+        raise InputError(
+            "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
+        )
 
 
 def _advance(run: Any, end: float, progress: Progress | None) -> str | None:
@@ -96,12 +100,17 @@ def _start(scene: Scene, model: Model) -> tuple[Any, float]:
     count, solver = scene.bearing.layout.surfaces, scene.solver
     motion, load, azimuth = scene.motion, load_values(scene.top), 0.0
     state = scene.initial_state
-    q, v, h = (np.zeros((count, k)) if state is None else np.array(value, dtype=float)
-               for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True))
+    q, v, h = (
+        np.zeros((count, k)) if state is None else np.array(value, dtype=float)
+        for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
+    )
     if model.planar:
         azimuth = float(motion.plane() or 0.0)
         if azimuth:
-            motion, load = motion.rotated(-azimuth), np.concatenate([turned(load[:3], azimuth), turned(load[3:], azimuth)])
+            motion, load = (
+                motion.rotated(-azimuth),
+                np.concatenate([turned(load[:3], azimuth), turned(load[3:], azimuth)]),
+            )
         q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
         h = np.ascontiguousarray(turned_pairs(h, azimuth))
         if np.any(np.abs(h[:, 1]) > 1e-12):
@@ -112,11 +121,27 @@ def _start(scene: Scene, model: Model) -> tuple[Any, float]:
     max_step = min((s for s in (solver.max_step, motion.max_step) if s is not None), default=0.0)
     stop = scene.stop
     run = model.extension.Run(
-        stack, np.array(motion.knots, dtype=float), np.array(motion.coefficients, dtype=float), np.array([0.0, 1.0]), pieces,
-        np.array(motion.jumps, dtype=float), q, v, h, method=solver.method, rtol=solver.rtol, atol_angle=solver.angle_tolerance,
-        max_step=max_step, first_step=solver.first_step or 0.0, max_steps=float(solver.max_steps), duration=scene.end,
-        output_step=scene.output_step or 0.0, stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
-        stop_all_rims=bool(stop and stop.all_rims), stop_at_knots=_sampled(motion))
+        stack,
+        np.array(motion.knots, dtype=float),
+        np.array(motion.coefficients, dtype=float),
+        np.array([0.0, 1.0]),
+        pieces,
+        np.array(motion.jumps, dtype=float),
+        q,
+        v,
+        h,
+        method=solver.method,
+        rtol=solver.rtol,
+        atol_angle=solver.angle_tolerance,
+        max_step=max_step,
+        first_step=solver.first_step or 0.0,
+        max_steps=float(solver.max_steps),
+        duration=scene.end,
+        output_step=scene.output_step or 0.0,
+        stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
+        stop_all_rims=bool(stop and stop.all_rims),
+        stop_at_knots=_sampled(motion),
+    )
     return run, azimuth
 
 
@@ -128,33 +153,57 @@ def _sampled(motion: Motion) -> bool:
 def _history(model: Model, rows: Array, azimuth: float) -> History:
     """Named arrays in the user's frame."""
     finite = np.isfinite(rows).all(axis=1)
-    f = model.unpack(rows if finite.all() else rows[:int(finite.argmin())])
+    f = model.unpack(rows if finite.all() else rows[: int(finite.argmin())])
     turn = azimuth
     base, top = out_of_plane(f["base"], turn, "vector"), out_of_plane(f["top"], turn, "vector")
     across = base - top
     work = f["work"]
     energy = {
-        "input": work[:, 0], "kinetic": f["kinetic"], "potential": f["potential"] - f["potential"][0],
-        "restraint": f["restraint"] - f["restraint"][0], "friction_stored": work[:, 1], "friction_dissipated": work[:, 2],
-        "rim_stored": f["rim_stored"] - f["rim_stored"][0], "rim_dissipated": work[:, 3] - (f["rim_stored"] - f["rim_stored"][0]),
+        "input": work[:, 0],
+        "kinetic": f["kinetic"],
+        "potential": f["potential"] - f["potential"][0],
+        "restraint": f["restraint"] - f["restraint"][0],
+        "friction_stored": work[:, 1],
+        "friction_dissipated": work[:, 2],
+        "rim_stored": f["rim_stored"] - f["rim_stored"][0],
+        "rim_dissipated": work[:, 3] - (f["rim_stored"] - f["rim_stored"][0]),
         "top_dissipated": work[:, 4],
     }
     energy["kinetic"] = energy["kinetic"] - energy["kinetic"][0]
     energy["numerical"] = energy["input"] - np.sum([v for k, v in energy.items() if k != "input"], axis=0)
     return History(
-        time=f["time"], tilt_angles=out_of_plane(f["q"], turn, "angles"), tilt_rates=out_of_plane(f["v"], turn, "angles"),
-        tilt_accelerations=out_of_plane(f["a"], turn, "angles"), friction_state=out_of_plane(f["f"], turn, "pair"),
-        normal_force=f["normal"], contact_angles=out_of_plane(f["angles"], turn, "pair_angles"), sliding=f["sliding"], gap=f["gap"],
-        rim_force=f["rim"], interface_force=out_of_plane(f["force"], turn, "vector"), slip_velocity=out_of_plane(f["slip"], turn, "pair"),
-        base_displacement=base, top_displacement=top, displacement=across - across[0], top_force=out_of_plane(f["top_force"], turn, "vector"),
-        top_moment=out_of_plane(f["top_moment"], turn, "axial"), energy=energy)
+        time=f["time"],
+        tilt_angles=out_of_plane(f["q"], turn, "angles"),
+        tilt_rates=out_of_plane(f["v"], turn, "angles"),
+        tilt_accelerations=out_of_plane(f["a"], turn, "angles"),
+        friction_state=out_of_plane(f["f"], turn, "pair"),
+        normal_force=f["normal"],
+        contact_angles=out_of_plane(f["angles"], turn, "pair_angles"),
+        sliding=f["sliding"],
+        gap=f["gap"],
+        rim_force=f["rim"],
+        interface_force=out_of_plane(f["force"], turn, "vector"),
+        slip_velocity=out_of_plane(f["slip"], turn, "pair"),
+        base_displacement=base,
+        top_displacement=top,
+        displacement=across - across[0],
+        top_force=out_of_plane(f["top_force"], turn, "vector"),
+        top_moment=out_of_plane(f["top_moment"], turn, "axial"),
+        energy=energy,
+    )
 
 
 def _events(model: Model, run: Any, azimuth: float) -> tuple[Event, ...]:
     return tuple(
-        Event(time=t, surface=surface, kind=EVENT_KINDS[kind],  # type: ignore[arg-type]
-              displacement=out_of_plane(np.array(u), azimuth, "vector"), top_force=out_of_plane(np.array(force), azimuth, "vector"))
-        for t, surface, kind, u, force in run.events)
+        Event(
+            time=t,
+            surface=surface,
+            kind=EVENT_KINDS[kind],  # type: ignore[arg-type]
+            displacement=out_of_plane(np.array(u), azimuth, "vector"),
+            top_force=out_of_plane(np.array(force), azimuth, "vector"),
+        )
+        for t, surface, kind, u, force in run.events
+    )
 
 
 # What the number beside a failure is.
@@ -165,7 +214,13 @@ def _message(scene: Scene, run: Any, status: str) -> str:
     """One line: when, where, why, and the quantity."""
     _, surface, value = run.status
     known = surface and status in QUANTITIES
-    where = f", surface {surface}, {QUANTITIES[status]} = {value:.4g}" if known else f", surface {surface}" if surface else ""
+    where = (
+        f", surface {surface}, {QUANTITIES[status]} = {value:.4g}"
+        if known
+        else f", surface {surface}"
+        if surface
+        else ""
+    )
     return f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {FAILURES.get(status, status)}"
 
 
@@ -174,7 +229,21 @@ def _result(scene: Scene, model: Model, run: Any, azimuth: float, status: str, w
 
     message = "" if status in ("ok", "stopped") else _message(scene, run, status)
     counts = {k: int(n) for k, n in run.counts.items()}
-    provenance = {"msfp_gen": __version__, "model": model.spec.key, "python": platform.python_version(), "numpy": np.__version__,
-                  "method": scene.solver.method, "rtol": f"{scene.solver.rtol:g}", "build_seconds": f"{setup:.3g}"}
-    return Result(scene=scene, history=_history(model, run.rows, azimuth), events=_events(model, run, azimuth),
-                  counters=replace(Counters(**counts), wall_time=wall), status=status, message=message, provenance=provenance)
+    provenance = {
+        "msfp_gen": __version__,
+        "model": model.spec.key,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "method": scene.solver.method,
+        "rtol": f"{scene.solver.rtol:g}",
+        "build_seconds": f"{setup:.3g}",
+    }
+    return Result(
+        scene=scene,
+        history=_history(model, run.rows, azimuth),
+        events=_events(model, run, azimuth),
+        counters=replace(Counters(**counts), wall_time=wall),
+        status=status,
+        message=message,
+        provenance=provenance,
+    )

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from reference import cases, forces, kinematics, stack
 from support import bearing_of, differences, model_of
 
@@ -19,15 +18,28 @@ SEEDS = [0, 1]
 def sensible(layout: tuple[int, int, int], seed: int) -> tuple[Any, ...]:
     """A random case whose heights fit its centroids, so that the public Bearing takes it."""
     values, state, h, load = cases.random_case(layout, seed)
-    bodies = tuple(replace(b, centroid=min(b.centroid, 0.9 * b.height), inertia=(b.inertia[0], min(b.inertia[1], 1.9 * b.inertia[0])))
-                   for b in values.bodies)
-    return replace(values, bodies=bodies, base_centroid=min(values.base_centroid or 1.0, 0.9 * values.base_height)), state, h, load
+    bodies = tuple(
+        replace(
+            b, centroid=min(b.centroid, 0.9 * b.height), inertia=(b.inertia[0], min(b.inertia[1], 1.9 * b.inertia[0]))
+        )
+        for b in values.bodies
+    )
+    return (
+        replace(values, bodies=bodies, base_centroid=min(values.base_centroid or 1.0, 0.9 * values.base_height)),
+        state,
+        h,
+        load,
+    )
 
 
 def inputs(state: Any, load: Any) -> dict[str, Any]:
     base = state.base
-    return {"base_acceleration": base.acceleration, "top_force": load.force, "top_moment": load.moment,
-            "base_rotation": (base.angles, base.rates, base.rate_rates)}
+    return {
+        "base_acceleration": base.acceleration,
+        "top_force": load.force,
+        "top_moment": load.moment,
+        "base_rotation": (base.angles, base.rates, base.rate_rates),
+    }
 
 
 def unknowns_of(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -45,7 +57,9 @@ def test_balances_equal_the_report_in_plain_vectors(layout, spin, seed):
     if spin == "locked":
         body[:, 2] = a[:, 2]
     unknowns = np.concatenate([a.ravel(), angles.ravel(), normal])
-    found = model_of(layout, spin=spin).residual(bearing_of(values), state.q, state.v, h, unknowns, **inputs(state, load))
+    found = model_of(layout, spin=spin).residual(
+        bearing_of(values), state.q, state.v, h, unknowns, **inputs(state, load)
+    )
     want = np.concatenate([expected.linear, body], axis=1).ravel()
     assert np.abs(found - want).max() < 1e-10 * max(1.0, np.abs(want).max())
 
@@ -85,7 +99,13 @@ def test_friction_rates_and_slip_equal_the_reference(layout, law):
 def test_named_vectors_equal_the_report(layout):
     values, state, _, _ = sensible(layout, 4)
     base = state.base
-    motion = np.array([np.r_[base.displacement, base.angles], np.r_[base.velocity, base.rates], np.r_[base.acceleration, base.rate_rates]])
+    motion = np.array(
+        [
+            np.r_[base.displacement, base.angles],
+            np.r_[base.velocity, base.rates],
+            np.r_[base.acceleration, base.rate_rates],
+        ]
+    )
     found = model_of(layout).kinematics(bearing_of(values), state.q, state.v, state.a, base=motion)
     expected = kinematics.points(values, state)
     assert {f"r_{name}" for name in expected.r} == {name for name in found if name.startswith("r_")}
@@ -105,11 +125,19 @@ def test_velocity_and_acceleration_are_rates_of_position(layout):
     values, state, _, _ = sensible(layout, 5)
     bearing, model = bearing_of(values), model_of(layout)
     base = state.base
-    start = np.array([np.r_[base.displacement, base.angles], np.r_[base.velocity, base.rates], np.r_[base.acceleration, base.rate_rates]])
+    start = np.array(
+        [
+            np.r_[base.displacement, base.angles],
+            np.r_[base.velocity, base.rates],
+            np.r_[base.acceleration, base.rate_rates],
+        ]
+    )
 
     def at(t: float) -> dict[str, np.ndarray]:
         moved = np.array([start[0] + t * start[1] + t**2 / 2 * start[2], start[1] + t * start[2], start[2]])
-        return model.kinematics(bearing, state.q + t * state.v + t**2 / 2 * state.a, state.v + t * state.a, state.a, base=moved)
+        return model.kinematics(
+            bearing, state.q + t * state.v + t**2 / 2 * state.a, state.v + t * state.a, state.a, base=moved
+        )
 
     step, weights = 1e-3, {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     around, here = {i: at(i * step) for k in weights for i in (k, -k)}, at(0.0)
@@ -131,18 +159,35 @@ def test_report_jacobians_against_differences(layout, spin):
     u = np.concatenate([a.ravel(), angles.ravel(), normal])
     s = np.concatenate([state.q.ravel(), state.v.ravel(), h.ravel()])
     base = state.base
-    e = np.concatenate([np.zeros(6), base.acceleration, base.angles, base.rates, base.rate_rates, load.force, load.moment])
+    e = np.concatenate(
+        [np.zeros(6), base.acceleration, base.angles, base.rates, base.rate_rates, load.force, load.moment]
+    )
 
     def residual(u: np.ndarray, s: np.ndarray, e: np.ndarray) -> np.ndarray:
-        q, v, f = s[:3 * count].reshape(-1, 3), s[3 * count:6 * count].reshape(-1, 3), s[6 * count:].reshape(-1, 2)
-        return model.residual(bearing, q, v, f, u, base_acceleration=e[6:9], base_rotation=(e[9:12], e[12:15], e[15:18]),
-                              top_force=e[18:21], top_moment=e[21:24])
+        q, v, f = s[: 3 * count].reshape(-1, 3), s[3 * count : 6 * count].reshape(-1, 3), s[6 * count :].reshape(-1, 2)
+        return model.residual(
+            bearing,
+            q,
+            v,
+            f,
+            u,
+            base_acceleration=e[6:9],
+            base_rotation=(e[9:12], e[12:15], e[15:18]),
+            top_force=e[18:21],
+            top_moment=e[21:24],
+        )
 
     # The patch is smooth over w0 = 0.01 rad/s only: there the differences need short steps, and rounding leaves less.
     step, accuracy = (1e-3, 3e-7) if spin == "patch" else (1e-2, 1e-8)
-    checks = {"unknowns": (lambda x: residual(x, s, e), u, np.where(np.abs(u) > 1e3, 10.0, np.where(np.abs(u) < 0.2, step / 10, step))),
-              "state": (lambda x: residual(u, x, e), s, np.full(len(s), step / 10)),
-              "inputs": (lambda x: residual(u, s, x), e, np.where(np.arange(len(e)) >= 18, 10.0, step))}
+    checks = {
+        "unknowns": (
+            lambda x: residual(x, s, e),
+            u,
+            np.where(np.abs(u) > 1e3, 10.0, np.where(np.abs(u) < 0.2, step / 10, step)),
+        ),
+        "state": (lambda x: residual(u, x, e), s, np.full(len(s), step / 10)),
+        "inputs": (lambda x: residual(u, s, x), e, np.where(np.arange(len(e)) >= 18, 10.0, step)),
+    }
     for wrt, (function, x, steps) in checks.items():
         found = model.jacobian(bearing, state.q, state.v, h, u, wrt=wrt, **inputs(state, load))
         want = differences(function, x, steps)
@@ -151,8 +196,18 @@ def test_report_jacobians_against_differences(layout, spin):
 
 
 @pytest.mark.parametrize("beta", [0.0, 1e-3])
-@pytest.mark.parametrize("effects", [{}, {"spin": "patch"}, {"spin": "free"}, {"bouc_wen": "isotropic"}, {"sliders": "massless"},
-                                     {"dimension": "planar"}], ids=str)
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {"spin": "patch"},
+        {"spin": "free"},
+        {"bouc_wen": "isotropic"},
+        {"sliders": "massless"},
+        {"dimension": "planar"},
+    ],
+    ids=str,
+)
 def test_combined_tangent_of_the_condensed_step(effects, beta):
     """The tangent of the implicit step, seeded with its own factors, against differences of its residual."""
     layout = (5, 2, 2)
@@ -189,8 +244,12 @@ def test_planar_equals_spatial(layout, plane):
     angle = np.array([1.0, 0.0, 0.0] if second else [0.0, 1.0, 0.0])
     q, v, f = state.q * angle, state.v * angle, h * ([0.0, 1.0] if second else [1.0, 0.0])
     axis = np.array([0.0, 1.0, 1.0] if second else [1.0, 0.0, 1.0])
-    given = {"base_acceleration": state.base.acceleration * axis, "top_force": load.force * axis, "top_moment": load.moment * angle,
-             "base_rotation": (state.base.angles * angle, state.base.rates * angle, state.base.rate_rates * angle)}
+    given = {
+        "base_acceleration": state.base.acceleration * axis,
+        "top_force": load.force * axis,
+        "top_moment": load.moment * angle,
+        "base_rotation": (state.base.angles * angle, state.base.rates * angle, state.base.rate_rates * angle),
+    }
     bearing = bearing_of(values)
     flat = model_of(layout, dimension="planar").evaluate(bearing, q, v, f, **given)
     full = model_of(layout).evaluate(bearing, q, v, f, **given)

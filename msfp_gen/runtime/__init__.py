@@ -1,0 +1,1 @@
+"""The hand-written C that is compiled with every model: package data."""
