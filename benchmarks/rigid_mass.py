@@ -18,11 +18,12 @@ def row(scene_name: str, bearing_name: str) -> str:
     try:
         result, end = simulate(scene), "completes"
     except RunError as error:
-        result, end = error.result, f"stops: `{error.status}`"
+        result, end = error.result, "stops with an error"
     friction = " / ".join(f"{100 * surface.friction:g}" for surface in scene.bearing.surfaces)
     normal = result.history.normal_force / WEIGHT
     time = f"{result.history.time[-1]:.1f} s"
-    return f"| {scene_name} | {bearing_name} | {friction} | {normal.min():.2f} | {normal.max():.3g} | {end} at {time} |"
+    most = f"{normal.max():.2f}" if normal.max() < 100 else "beyond 100"
+    return f"| {scene_name} | {bearing_name} | {friction} | {normal.min():.2f} | {most} | {end} at {time} |"
 
 
 def main() -> None:
