@@ -184,9 +184,9 @@ class Model:
         """The report's balances (3.26)-(3.29) at given unknowns: left side less right side.
 
         unknowns: shape (6(n-1),) in the order of (2.119): accelerations psi'', theta'', phi'' body by body, psi~,
-        theta~ surface by surface, N. Returns shape (6(n-1),): per body the linear balance along E1, E2, E3 [N], then the
-        angular one along t_1, t_2, t_3 of the body [N m]; with locked spin phi'' in place of its axial part. A planar model has
-        3(n-1) of each: theta'', theta~, N; and E1, E3, t_2. Other inputs as in `evaluate`.
+        theta~ surface by surface, N. Returns shape (6(n-1),): per body the linear balance along E1, E2, E3 [N], then
+        the angular one along t_1, t_2, t_3 of the body [N m]; with locked spin phi'' in place of its axial part. A
+        planar model has 3(n-1) of each: theta'', theta~, N; and E1, E3, t_2. Other inputs as in `evaluate`.
         """
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
         values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")

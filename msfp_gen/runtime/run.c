@@ -2,9 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "msfp_kernels.h"
+#include "run.h"
 
-#define NB MSFP_NB
 #define SMALLEST_STEP 1e-9 /* [s], far below any period of a bearing */
 
 static const int angles[MSFP_ND] = MSFP_ANGLES;
@@ -65,167 +64,6 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
     return MSFP_OK;
 }
 
-/* ---- dense output ------------------------------------------------------------------------------------- */
-
-static double hermite(double y0, double d0, double y1, double d1, double h, double s)
-{
-    const double r = 1.0 - s;
-    return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
-}
-
-/* A value inside the step: through the stage in its middle where the method has one (the rates at the ends of a stiff
- * step carry ringing that the values do not), else cubic through values and rates. */
-static double inside(double y0, double d0, double middle, double y1, double d1, double h, double c, double s)
-{
-    if (c > 0.0)
-        return (s - c) * (s - 1.0) / c * y0 + s * (s - 1.0) / (c * (c - 1.0)) * middle + s * (s - c) / (1.0 - c) * y1;
-    return hermite(y0, d0, y1, d1, h, s);
-}
-
-static void interpolate(const msfp_run *run, double s, msfp_state *out)
-{
-    const msfp_state *a = &run->now, *b = &run->next;
-    const msfp_middle *m = &run->middle;
-    const double h = b->t - a->t;
-    out->t = a->t + s * h;
-    for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < 3; ++d) {
-            out->q[k][d] = inside(a->q[k][d], a->v[k][d], m->q[k][d], b->q[k][d], b->v[k][d], h, m->share, s);
-            out->v[k][d] = inside(a->v[k][d], a->a[k][d], m->v[k][d], b->v[k][d], b->a[k][d], h, m->share, s);
-            out->a[k][d] = (1.0 - s) * a->a[k][d] + s * b->a[k][d];
-        }
-        for (int d = 0; d < 2; ++d)
-            out->f[k][d] = inside(a->f[k][d], a->df[k][d], m->f[k][d], b->f[k][d], b->df[k][d], h, m->share, s);
-    }
-    for (int i = 0; i < MSFP_WORKS; ++i)
-        out->work[i] = hermite(a->work[i], a->power[i], b->work[i], b->power[i], h, s);
-}
-
-static void to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
-{
-    memset(at, 0, sizeof *at);
-    msfp_point_at(run, s->t, at);
-    memcpy(at->q, s->q, sizeof at->q);
-    memcpy(at->v, s->v, sizeof at->v);
-    memcpy(at->a, s->a, sizeof at->a);
-    memcpy(at->f, s->f, sizeof at->f);
-}
-
-static void observe(msfp_run *run, const msfp_state *s, msfp_row *row)
-{
-    msfp_point at;
-    msfp_work w;
-    to_point(run, s, &at);
-    msfp_observe(&run->parameters, &at, &w, row);
-    row->time = s->t;
-    memcpy(row->work, s->work, sizeof row->work);
-}
-
-/* ---- output -------------------------------------------------------------------------------------------- */
-
-static void *grown(void *items, size_t count, size_t *capacity, size_t size)
-{
-    if (count < *capacity)
-        return items;
-    *capacity = *capacity ? 2 * *capacity : 256;
-    return realloc(items, *capacity * size);
-}
-
-static msfp_row *new_row(msfp_run *run)
-{
-    msfp_row *rows = grown(run->rows, run->row_count, &run->row_capacity, sizeof *rows);
-    if (!rows)
-        return NULL;
-    run->rows = rows;
-    return &rows[run->row_count++];
-}
-
-static int write_row(msfp_run *run, const msfp_state *s)
-{
-    msfp_row *row = new_row(run);
-    if (!row)
-        return MSFP_E_MEMORY;
-    observe(run, s, row);
-    return MSFP_OK;
-}
-
-/* A recorded row inside a step of an implicit method: quadratic through what is recorded of its ends and its middle.
- * Forces are interpolated as they are: made from interpolated angles they would carry a stiff spring's error. */
-static void blend(const msfp_row *start, const msfp_row *middle, const msfp_row *end, double c, double s, msfp_row *out)
-{
-    const double *a = (const double *)start, *m = (const double *)middle, *b = (const double *)end;
-    double *values = (double *)out;
-    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i)
-        values[i] = inside(a[i], 0.0, m[i], b[i], 0.0, 0.0, c, s);
-}
-
-static int write_between(msfp_run *run, double last)
-{
-    msfp_row start, middle, end, *row;
-    msfp_state s;
-    const double c = run->middle.share, h = run->next.t - run->now.t;
-    if (c > 0.0) {
-        observe(run, &run->now, &start);
-        interpolate(run, c, &s);
-        observe(run, &s, &middle);
-        observe(run, &run->next, &end);
-    }
-    for (; run->output_time <= last; run->output_time = run->options.output_step * (double)run->row_count) {
-        const double share = fmin(1.0, (run->output_time - run->now.t) / h);
-        if (!(row = new_row(run)))
-            return MSFP_E_MEMORY;
-        interpolate(run, share, &s);
-        if (c > 0.0)
-            blend(&start, &middle, &end, c, share, row);
-        else
-            observe(run, &s, row);
-        row->time = run->output_time;
-        memcpy(row->work, s.work, sizeof row->work);
-    }
-    return MSFP_OK;
-}
-
-static int write_step(msfp_run *run)
-{
-    const double last = run->next.t * (1.0 + 1e-14);
-    if (run->options.output_step <= 0.0) { /* the evaluation that ended the step is still there */
-        msfp_row *row = new_row(run);
-        msfp_point at;
-        if (!row)
-            return MSFP_E_MEMORY;
-        to_point(run, &run->next, &at);
-        msfp_record(&run->parameters, &at, &run->work, row);
-        row->time = run->next.t;
-        memcpy(row->work, run->next.work, sizeof row->work);
-        return MSFP_OK;
-    }
-    return run->output_time <= last ? write_between(run, last) : MSFP_OK;
-}
-
-static void across(const msfp_run *run, const msfp_row *row, double *displacement)
-{
-    for (int i = 0; i < 3; ++i)
-        displacement[i] = row->base[i] - row->top[i] - run->start[i];
-}
-
-static int write_event(msfp_run *run, const msfp_state *s, int surface, int kind)
-{
-    msfp_row row;
-    msfp_event *events = grown(run->events, run->event_count, &run->event_capacity, sizeof *events);
-    if (!events)
-        return MSFP_E_MEMORY;
-    run->events = events;
-    msfp_event *event = &events[run->event_count++];
-    observe(run, s, &row);
-    event->time = s->t;
-    event->surface = surface;
-    event->kind = kind;
-    across(run, &row, event->displacement);
-    memcpy(event->top_force, row.top_force, sizeof event->top_force);
-    ++run->counts[MSFP_COUNT_EVENTS];
-    return MSFP_OK;
-}
-
 /* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
 
 #define EVENTS (NB + 1)
@@ -240,8 +78,8 @@ static void event_values(msfp_run *run, const msfp_state *s, double *g)
         g[j] = sliding[j][MSFP_GAP_G];
     g[NB] = 1.0;
     if (run->options.stop_displacement > 0.0) {
-        observe(run, s, &row);
-        across(run, &row, u);
+        msfp_observe_state(run, s, &row);
+        msfp_across(run, &row, u);
         g[NB] = run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]);
     }
 }
@@ -265,7 +103,7 @@ static double first_event(msfp_run *run, const double *before, const double *aft
         for (int n = 0; n < 40; ++n) {
             msfp_state s;
             const double middle = 0.5 * (low + high);
-            interpolate(run, middle, &s);
+            msfp_interpolate(run, middle, &s);
             event_values(run, &s, g);
             *((g[i] > 0.0) == met ? &low : &high) = middle;
         }
@@ -288,12 +126,12 @@ static int record_events(msfp_run *run, const double *before, const double *afte
     int stop = 0;
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
         if (before[j] > 0.0 && after[j] <= 0.0)
-            write_event(run, &run->next, j + 1, 0);
+            msfp_write_event(run, &run->next, j + 1, 0);
         else if (before[j] <= 0.0 && after[j] > 0.0)
-            write_event(run, &run->next, j + 1, 1);
+            msfp_write_event(run, &run->next, j + 1, 1);
     }
     if (after[NB] <= event_tolerance(run, NB) || (run->options.stop_all_rims && all_rims_met(after))) {
-        write_event(run, &run->next, 0, 2);
+        msfp_write_event(run, &run->next, 0, 2);
         stop = 1;
     }
     return stop;
@@ -308,7 +146,7 @@ static int settle(msfp_run *run)
     msfp_solution solution = { 0, 0, 0.0 };
     double f[NB][2], residual[MSFP_DOF];
     msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } } };
-    to_point(run, &run->now, &at);
+    msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
         const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
@@ -350,13 +188,13 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     if (run->status)
         return run->status;
     msfp_row row;
-    observe(run, &run->now, &row);
+    msfp_observe_state(run, &run->now, &row);
     for (int i = 0; i < 3; ++i)
         run->start[i] = row.base[i] - row.top[i];
     run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * options->duration);
     run->previous_error = 1.0;
     event_values(run, &run->now, run->events_now);
-    run->status = write_row(run, &run->now);
+    run->status = msfp_write_row(run, &run->now);
     run->output_time = options->output_step;
     return run->status;
 }
@@ -413,14 +251,14 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->previous_error = error;
     run->restart = 0;
     const int stop = record_events(run, before, after);
-    run->status = write_step(run);
+    run->status = msfp_write_step(run);
     if (run->status)
         return 0;
     run->now = run->next;
     memcpy(run->events_now, after, sizeof run->events_now);
     if (stop) {
         if (run->options.output_step > 0.0)
-            write_row(run, &run->now);
+            msfp_write_row(run, &run->now);
         run->status = MSFP_STOPPED;
         return 0;
     }

@@ -1,0 +1,110 @@
+/* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. */
+#include <math.h>
+#include <string.h>
+#include "stack.h"
+
+static int angle_of(int i)
+{
+    static const int angles[ND] = MSFP_ANGLES;
+    return angles[i];
+}
+
+static void seed_columns(msfp_work *w, const msfp_seed *seed)
+{
+    memset(w->dx, 0, sizeof w->dx);
+    memset(w->dbody[0], 0, sizeof w->dbody[0]);
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int column = k * ND + i;
+            w->dx[k + 1][coordinate(0, i) * DOF + column] = seed->cq;
+            w->dx[k + 1][coordinate(1, i) * DOF + column] = seed->cv;
+            w->dx[k + 1][coordinate(2, i) * DOF + column] = seed->ca;
+        }
+}
+
+int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                   double f[MSFP_NB][2], double *residual, double *tangent)
+{
+    double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    msfp_kinematics(p, at, w);
+    if (tangent) {
+        seed_columns(w, seed);
+        msfp_kinematics_tangent(p, w);
+        msfp_top_columns(p, at, w, NULL);
+    } else
+        msfp_top(p, at, w);
+    for (int j = NB - 1; j >= 0; --j) {
+        if (tangent)
+            msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j],
+                                         w->dbody[j + 1], w->dforce[j + 1], w->dforce[j]);
+        else
+            msfp_interface_force(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j]);
+    }
+    for (int j = 0; j < NB; ++j) {
+        const int status = msfp_surface(p, w, seed, f[j], j, tangent != NULL);
+        if (status)
+            return status;
+    }
+    for (int k = 1; k <= NB; ++k) {
+        if (tangent) {
+            msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out,
+                                         w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], w->dmoment[k], dout);
+            memcpy(tangent + (k - 1) * ND * DOF, dout, ND * DOF * sizeof *tangent);
+        } else
+            msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out);
+        memcpy(residual + (k - 1) * ND, out, ND * sizeof *residual);
+    }
+    return MSFP_OK;
+}
+
+void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
+{
+    for (int k = 0; k < NB; ++k) {
+        const double *par = p->surface[k];
+        const double natural = w->contact[k][MSFP_CONTACT_N] * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+        for (int i = 0; i < ND; ++i)
+            scale[k * ND + i] = natural > 1e-12 ? natural : 1e-12;
+    }
+}
+
+void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
+{
+    for (int j = 0; j < NB; ++j) {
+        rates[j][0] = w->contact[j][MSFP_CONTACT_DY];
+        rates[j][1] = msfp_contact_dZ(w->contact[j]);
+    }
+}
+
+int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
+{
+    double residual[DOF], tangent[DOF * DOF], scale[DOF], f[NB][2];
+    int pivots[DOF];
+    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } } };
+    memcpy(seed.fp, at->f, sizeof seed.fp);
+    double last = INFINITY;
+    out->determinant = 1;
+    for (out->iterations = 0; out->iterations < 50; ++out->iterations) {
+        memcpy(f, at->f, sizeof f);
+        const int status = msfp_condensed(p, at, &seed, w, f, residual, tangent);
+        if (status)
+            return status;
+        msfp_residual_scale(p, w, scale);
+        out->residual = 0.0;
+        for (int i = 0; i < DOF; ++i)
+            out->residual = fmax(out->residual, fabs(residual[i]) / scale[i]);
+        if (!(out->residual < INFINITY))
+            return MSFP_E_FINITE;
+        /* Converged, or at the floor that rounding leaves. */
+        if (out->residual <= 1e-13 || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
+            return MSFP_OK;
+        last = out->residual;
+        out->determinant = msfp_lu(tangent, DOF, pivots);
+        if (out->determinant == 0)
+            return MSFP_E_IRREGULAR;
+        msfp_lu_solve(tangent, DOF, pivots, residual);
+        for (int k = 0; k < NB; ++k)
+            for (int i = 0; i < ND; ++i)
+                at->a[k][angle_of(i)] -= residual[k * ND + i];
+    }
+    return MSFP_E_NEWTON;
+}

@@ -1,0 +1,166 @@
+/* output.c: what a run records: dense output, rows, events. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "run.h"
+
+/* ---- dense output ------------------------------------------------------------------------------------- */
+
+static double hermite(double y0, double d0, double y1, double d1, double h, double s)
+{
+    const double r = 1.0 - s;
+    return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
+}
+
+/* A value inside the step: through the stage in its middle where the method has one (the rates at the ends of a stiff
+ * step carry ringing that the values do not), else cubic through values and rates. */
+static double inside(double y0, double d0, double middle, double y1, double d1, double h, double c, double s)
+{
+    if (c > 0.0)
+        return (s - c) * (s - 1.0) / c * y0 + s * (s - 1.0) / (c * (c - 1.0)) * middle + s * (s - c) / (1.0 - c) * y1;
+    return hermite(y0, d0, y1, d1, h, s);
+}
+
+void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
+{
+    const msfp_state *a = &run->now, *b = &run->next;
+    const msfp_middle *m = &run->middle;
+    const double h = b->t - a->t;
+    out->t = a->t + s * h;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < 3; ++d) {
+            out->q[k][d] = inside(a->q[k][d], a->v[k][d], m->q[k][d], b->q[k][d], b->v[k][d], h, m->share, s);
+            out->v[k][d] = inside(a->v[k][d], a->a[k][d], m->v[k][d], b->v[k][d], b->a[k][d], h, m->share, s);
+            out->a[k][d] = (1.0 - s) * a->a[k][d] + s * b->a[k][d];
+        }
+        for (int d = 0; d < 2; ++d)
+            out->f[k][d] = inside(a->f[k][d], a->df[k][d], m->f[k][d], b->f[k][d], b->df[k][d], h, m->share, s);
+    }
+    for (int i = 0; i < MSFP_WORKS; ++i)
+        out->work[i] = hermite(a->work[i], a->power[i], b->work[i], b->power[i], h, s);
+}
+
+void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
+{
+    memset(at, 0, sizeof *at);
+    msfp_point_at(run, s->t, at);
+    memcpy(at->q, s->q, sizeof at->q);
+    memcpy(at->v, s->v, sizeof at->v);
+    memcpy(at->a, s->a, sizeof at->a);
+    memcpy(at->f, s->f, sizeof at->f);
+}
+
+void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)
+{
+    msfp_point at;
+    msfp_work w;
+    msfp_to_point(run, s, &at);
+    msfp_observe(&run->parameters, &at, &w, row);
+    row->time = s->t;
+    memcpy(row->work, s->work, sizeof row->work);
+}
+
+/* ---- output -------------------------------------------------------------------------------------------- */
+
+static void *grown(void *items, size_t count, size_t *capacity, size_t size)
+{
+    if (count < *capacity)
+        return items;
+    *capacity = *capacity ? 2 * *capacity : 256;
+    return realloc(items, *capacity * size);
+}
+
+static msfp_row *new_row(msfp_run *run)
+{
+    msfp_row *rows = grown(run->rows, run->row_count, &run->row_capacity, sizeof *rows);
+    if (!rows)
+        return NULL;
+    run->rows = rows;
+    return &rows[run->row_count++];
+}
+
+int msfp_write_row(msfp_run *run, const msfp_state *s)
+{
+    msfp_row *row = new_row(run);
+    if (!row)
+        return MSFP_E_MEMORY;
+    msfp_observe_state(run, s, row);
+    return MSFP_OK;
+}
+
+/* A recorded row inside a step of an implicit method: quadratic through what is recorded of its ends and its middle.
+ * Forces are interpolated as they are: made from interpolated angles they would carry a stiff spring's error. */
+static void blend(const msfp_row *start, const msfp_row *middle, const msfp_row *end, double c, double s, msfp_row *out)
+{
+    const double *a = (const double *)start, *m = (const double *)middle, *b = (const double *)end;
+    double *values = (double *)out;
+    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i)
+        values[i] = inside(a[i], 0.0, m[i], b[i], 0.0, 0.0, c, s);
+}
+
+static int write_between(msfp_run *run, double last)
+{
+    msfp_row start, middle, end, *row;
+    msfp_state s;
+    const double c = run->middle.share, h = run->next.t - run->now.t;
+    if (c > 0.0) {
+        msfp_observe_state(run, &run->now, &start);
+        msfp_interpolate(run, c, &s);
+        msfp_observe_state(run, &s, &middle);
+        msfp_observe_state(run, &run->next, &end);
+    }
+    for (; run->output_time <= last; run->output_time = run->options.output_step * (double)run->row_count) {
+        const double share = fmin(1.0, (run->output_time - run->now.t) / h);
+        if (!(row = new_row(run)))
+            return MSFP_E_MEMORY;
+        msfp_interpolate(run, share, &s);
+        if (c > 0.0)
+            blend(&start, &middle, &end, c, share, row);
+        else
+            msfp_observe_state(run, &s, row);
+        row->time = run->output_time;
+        memcpy(row->work, s.work, sizeof row->work);
+    }
+    return MSFP_OK;
+}
+
+int msfp_write_step(msfp_run *run)
+{
+    const double last = run->next.t * (1.0 + 1e-14);
+    if (run->options.output_step <= 0.0) { /* the evaluation that ended the step is still there */
+        msfp_row *row = new_row(run);
+        msfp_point at;
+        if (!row)
+            return MSFP_E_MEMORY;
+        msfp_to_point(run, &run->next, &at);
+        msfp_record(&run->parameters, &at, &run->work, row);
+        row->time = run->next.t;
+        memcpy(row->work, run->next.work, sizeof row->work);
+        return MSFP_OK;
+    }
+    return run->output_time <= last ? write_between(run, last) : MSFP_OK;
+}
+
+void msfp_across(const msfp_run *run, const msfp_row *row, double *displacement)
+{
+    for (int i = 0; i < 3; ++i)
+        displacement[i] = row->base[i] - row->top[i] - run->start[i];
+}
+
+int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind)
+{
+    msfp_row row;
+    msfp_event *events = grown(run->events, run->event_count, &run->event_capacity, sizeof *events);
+    if (!events)
+        return MSFP_E_MEMORY;
+    run->events = events;
+    msfp_event *event = &events[run->event_count++];
+    msfp_observe_state(run, s, &row);
+    event->time = s->t;
+    event->surface = surface;
+    event->kind = kind;
+    msfp_across(run, &row, event->displacement);
+    memcpy(event->top_force, row.top_force, sizeof event->top_force);
+    ++run->counts[MSFP_COUNT_EVENTS];
+    return MSFP_OK;
+}

@@ -1,0 +1,19 @@
+/* run.h: between the loop of a run and its output. Private to the runtime. */
+#ifndef MSFP_RUN_H
+#define MSFP_RUN_H
+#include "msfp_kernels.h"
+
+#define NB MSFP_NB
+
+/* A state inside the last step, at a share of it. */
+void msfp_interpolate(const msfp_run *run, double s, msfp_state *out);
+void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
+void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
+/* Displacement across the bearing, less its start. */
+void msfp_across(const msfp_run *run, const msfp_row *row, double *displacement);
+/* 0 or MSFP_E_MEMORY. */
+int msfp_write_row(msfp_run *run, const msfp_state *s);
+int msfp_write_step(msfp_run *run);
+int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
+
+#endif

@@ -1,0 +1,29 @@
+/* stack.h: what the files that loop over bodies and surfaces share. Private to the runtime. */
+#ifndef MSFP_STACK_H
+#define MSFP_STACK_H
+#include "msfp_kernels.h"
+
+#define DOF MSFP_DOF
+#define NB MSFP_NB
+#define ND MSFP_ND
+#define VECTOR MSFP_FORCE_SIZE  /* components of a force */
+#define MOMENT MSFP_MOMENT_SIZE /* components of a moment */
+#define FRICTION MSFP_FRICTION_SIZE
+#define PAIR (MSFP_PLANAR ? 1 : 2) /* tilts of a body */
+
+/* Field of block coordinates: angle i of order 0, 1, 2. */
+static inline int coordinate(int order, int i) { return MSFP_PLANAR ? order : 3 * order + i; }
+
+/* kinematics.c */
+void msfp_ground(const msfp_point *at, double *body);
+void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w);
+void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */);
+
+/* surface.c */
+void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
+void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
+int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent);
+
+#endif
