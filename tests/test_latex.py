@@ -125,3 +125,15 @@ def test_every_program_that_carries_the_motion_is_shown():
     for name in PLACES:
         rows = statements(names[name])
         assert len({left for left, _ in rows}) == len(rows), f"{name} writes one symbol twice"
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/model.md", "docs/architecture.md", "docs/extending.md"])
+def test_mathematics_of_the_pages_parses(page):
+    from matplotlib.mathtext import MathTextParser
+
+    text = re.sub(r"^```.*?^```$", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    shown = re.findall(r"^\$\$\n(.*?)\n\$\$$", text, flags=re.MULTILINE | re.DOTALL)
+    inline = re.sub(r"^\$\$\n(.*?)\n\$\$$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert inline.count("$") % 2 == 0, "a dollar sign stands alone"
+    for formula in (*shown, *re.findall(r"\$([^$]+)\$", inline)):
+        MathTextParser("path").parse(f"${' '.join(formula.split())}$")
