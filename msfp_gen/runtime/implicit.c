@@ -235,7 +235,7 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
     double worst = 0.0;
     for (int j = 0; j < NB; ++j)
         worst = fmax(worst, sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - 1.0);
-    return worst / (10.0 * run->options.rtol);
+    return worst / run->options.rtol;
 }
 
 /* The embedded estimate of an undamped fast mode is of the size of its ringing, however well the method damps it.
