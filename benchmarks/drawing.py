@@ -1,0 +1,95 @@
+"""What the figures of the results page share: the style of `msfp_gen.figures`, and parts of a run ready to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, STYLE
+from msfp_gen.output import replacing
+from msfp_gen.summary import axial_load
+from msfp_gen.top import RigTop
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from reference.friction_circle import Push
+
+    from msfp_gen.result import Result
+
+__all__ = ["COLOURS", "FAINT", "INK", "MILLI", "Array", "Runs", "closed_form", "closed_push", "cycle", "drawn",
+           "panels", "ratio", "tilts"]  # fmt: skip
+
+Array = NDArray[np.float64]
+Runs = Callable[[str], "Result"]  # a scene preset's name -> its run
+
+
+@contextmanager
+def drawn(path: Path, width: float, height: float) -> Iterator[Figure]:
+    """A figure in the project's style, written to `path` (whole or not at all) when the block ends without error."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure
+        with replacing(path) as temporary:
+            figure.savefig(temporary)
+
+
+def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
+    """One row of axes with titles."""
+    row: list[Axes] = list(figure.subplots(1, len(titles), squeeze=False, **options)[0])
+    for axes, title in zip(row, titles, strict=True):
+        axes.set_title(title)
+    return row
+
+
+def ratio(result: Result) -> Array:
+    """Force on the top support over the axial load, ndarray, shape (T, 3)."""
+    load = axial_load(result)
+    assert load is not None, f"{result.scene.name} has no axial load"
+    force: Array = result.history.top_force / load
+    return force
+
+
+def tilts(result: Result) -> Array:
+    """delta_g = arccos(cos psi cos theta) of body g+1 against body g, ndarray, shape (T, n-1), [rad] (section 4.1)."""
+    psi, theta = result.history.tilt_angles[..., 0], result.history.tilt_angles[..., 1]
+    delta: Array = np.arccos(np.clip(np.cos(psi) * np.cos(theta), -1.0, 1.0))
+    return delta
+
+
+def cycle(result: Result, back: int = 1) -> slice:
+    """Rows of one full cycle of a periodic scene, `back` cycles before its end: 1 is the last."""
+    period = float(str(result.scene.motion.metadata["period"]))
+    ends = result.scene.end - period * np.array([back, back - 1])
+    start, stop = np.searchsorted(result.history.time, ends + 1e-9)
+    return slice(int(start) - 1, int(stop))  # from the row at or before its start: no gap where the loop closes
+
+
+def closed_form(result: Result, displacements: Array) -> Array:
+    """F/N of the massless, rigid-plastic stack pushed from rest to each displacement [m], by friction circles.
+
+    The closed form pushes the top plate to +E1; here the base is pushed to +E1 under it. Mirrored, they are one run:
+    displacement across the bearing and force on the top support are both positive, as they are there.
+    """
+    from reference.friction_circle import force_at
+
+    push = closed_push(result)
+    force: Array = force_at(push, list(displacements)) / push.load
+    return force
+
+
+def closed_push(result: Result) -> Push:
+    """The scene of a run on a rig, as the closed form takes it."""
+    from reference.friction_circle import Push
+
+    top = result.scene.top
+    assert isinstance(top, RigTop), f"{result.scene.name} does not stand on a rig"
+    return Push(result.scene.bearing, top.axial_load, top.rotational_stiffness)
