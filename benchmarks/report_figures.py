@@ -41,12 +41,12 @@ def stages(runs: Runs, path: Path) -> None:
         left.plot(u, ratio(result)[:, 0], color=COLOURS[0], label="fenz-monotonic")
         left.plot(grid * MILLI, closed_form(result, grid), color=INK, linestyle="--", linewidth=0.9,
                   label="closed form: friction circles,\nmassless, rigid-plastic")  # fmt: skip
-        left.set(xlabel=U, ylabel=F, xlim=(-3, 145), ylim=(0, 0.39))
+        left.set(xlabel=U, ylabel=F, xlim=(-3, 145), ylim=(0, 0.42))
         left.legend(loc="lower right", frameon=True, facecolor="white", edgecolor="none", framealpha=1)
         for index, delta in enumerate(tilts(result).T):
             right.plot(u, delta, color=COLOURS[index], label=f"δ{'₁₂₃₄'[index]}")
         right.set(xlabel=U, ylabel="relative angle δ [rad]", xlim=(-3, 145), ylim=(0, 0.21))
-        right.legend(loc="upper left", bbox_to_anchor=(0.06, 0.93), ncols=4)
+        right.legend(loc="upper left", bbox_to_anchor=(0.05, 0.95))
         found = result.summary["transitions"]
         edges = [0.0, *(found[key] * MILLI for key in MARKS), u[-1]]
         for axes in (left, right):

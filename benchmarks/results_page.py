@@ -83,6 +83,12 @@ def peak_row(result: Result, closed: bool) -> str:
     return row(*cells, ", ".join(map(str, summary["rims_met"])) or "none")
 
 
+def resting_offset(result: Result) -> float:
+    """How far off its centre surface 4 rests in the last cycle [m]: the middle of where it is."""
+    tilt = result.history.tilt_angles[cycle(result), 3, :2].mean(axis=0)
+    return float(np.hypot(*tilt)) * result.scene.bearing.surfaces[3].radius
+
+
 def open_loop(result: Result) -> float:
     """How far the last cycle lies from the one before it: largest difference of force at one phase, over the peak."""
     time, force = result.history.time, ratio(result)[:, 0]
@@ -136,6 +142,7 @@ def page(runs: Runs, points: list[Point]) -> str:
         loops=table((*peaks, "closed form F / N", "cycle 2 against 1", "rims met"),
                     [peak_row(runs(name), closed=True) for name in PERIODIC]),
         orbits=table((*peaks, "rims met"), [peak_row(runs(name), closed=False) for name in ORBITS]),
+        offset=f"{resting_offset(runs(ORBITS[2])) * MILLI:.1f}",
         quake_u=f"{quake['peak_displacement']['radial'] * MILLI:.1f}", quake_f=f"{quake['peak_force_ratio']:.3f}",
         quake_rims=", ".join(map(str, quake["rims_met"])) or "none",
         quake_energy=f"{quake['energy']['closure_error']:.2%}",
