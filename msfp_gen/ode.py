@@ -59,9 +59,13 @@ class Ode:
         """D fun / d y, shape (8(n-1), 8(n-1))."""
         q, v, h = self._split(np.asarray(y))
         base = self._base(t)
-        status, *_, unknowns = self.stack.accelerations(q, v, h, base, self.load, report=True)
+        status, a, row, *_ = self.stack.accelerations(q, v, h, base, self.load)
         if status != "ok":
             raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
+        # The very solution of `fun`: Newton on the report's balances may end on another root, with N < 0.
+        found, keep = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
+        angles = found["angles"][:, 1:] if self.model.planar else found["angles"]
+        unknowns = np.concatenate([a[:, keep].ravel(), angles.ravel(), found["normal"]])
         inner, outer = self.model._unknown_columns(), self.model._state_columns()
         _, jacobian, rates = self.stack.report(q, v, h, base, self.load, unknowns, [*inner, *outer])
         split = len(inner)

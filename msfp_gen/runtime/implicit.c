@@ -229,12 +229,16 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     return MSFP_OK;
 }
 
-/* Y, Z beyond the unit disc are integration error; how far counts like any other error. */
+/* Y, Z beyond the unit disc are integration error. How far a step takes them out counts like any other error; being out
+ * from before does not, since no shorter step would mend it: sliding brings them back. */
 static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 {
     double worst = 0.0;
-    for (int j = 0; j < NB; ++j)
-        worst = fmax(worst, sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - 1.0);
+    for (int j = 0; j < NB; ++j) {
+        const double *now = run->now.f[j];
+        const double before = fmax(1.0, sqrt(now[0] * now[0] + now[1] * now[1]));
+        worst = fmax(worst, sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - before);
+    }
     return worst / run->options.rtol;
 }
 

@@ -199,6 +199,9 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     return run->status;
 }
 
+/* Times closer than this are one time: what rounding leaves of a step that was to land there [s]. */
+static double same_time(double t) { return 1e-12 * fmax(1.0, t); }
+
 static double target(const msfp_run *run)
 {
     double end = run->options.duration;
@@ -207,7 +210,7 @@ static double target(const msfp_run *run)
         int i = m->last;
         while (i > 0 && m->knots[i] > run->now.t)
             --i;
-        while (i < m->pieces && m->knots[i] <= run->now.t * (1.0 + 1e-14))
+        while (i < m->pieces && m->knots[i] <= run->now.t + same_time(run->now.t))
             ++i;
         end = fmin(end, m->knots[i]);
     }
@@ -247,7 +250,9 @@ static int shrink(msfp_run *run, double h, double factor, int status)
 static int accept(msfp_run *run, const double *before, const double *after, double error, double h)
 {
     ++run->counts[MSFP_COUNT_STEPS];
-    run->h = h * controlled(run, error);
+    /* A step cut short to land on a time says little: the one proposed before still stands. */
+    const int cut = h < 0.9 * run->h && error < 0.5;
+    run->h = fmax(h * controlled(run, error), cut ? run->h : 0.0);
     run->previous_error = error;
     run->restart = 0;
     const int stop = record_events(run, before, after);
@@ -262,7 +267,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
         run->status = MSFP_STOPPED;
         return 0;
     }
-    if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] * (1.0 - 1e-15)) {
+    if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump]) {
         ++run->next_jump;
         run->status = settle(run);
         run->h = fmin(run->h, 1e-4);
@@ -296,7 +301,7 @@ static int one_step(msfp_run *run)
             break;
         h *= share;
     }
-    if (h == left) /* land on the target exactly */
+    if (fabs(run->next.t - target(run)) <= same_time(run->next.t)) /* land on the target exactly */
         run->next.t = target(run);
     return accept(run, before, after, error, h);
 }
