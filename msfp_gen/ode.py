@@ -62,7 +62,7 @@ class Ode:
         status, a, row, *_ = self.stack.accelerations(q, v, h, base, self.load)
         if status != "ok":
             raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
-        # The very solution of `fun`: Newton on the report's balances may end on another root, with N < 0.
+        # The solution of `fun` itself: Newton on the report's balances might end on another root.
         found, keep = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
         angles = found["angles"][:, 1:] if self.model.planar else found["angles"]
         unknowns = np.concatenate([a[:, keep].ravel(), angles.ravel(), found["normal"]])
