@@ -161,7 +161,8 @@ static double take_step(msfp_run *run, stages *s, double *residual, double size,
 }
 
 /* Newton on the residual. Factors serve as long as they at least quarter it: other stages, other steps of like size. The
- * switches of friction and rims make it semi-smooth. */
+ * switches of friction and rims make it semi-smooth. The sign of the determinant is looked at with every factorisation;
+ * while old factors contract the residual the tangent has theirs. */
 static int solve_stage(msfp_run *run, stages *s)
 {
     const double goal = fmin(1e-4, fmax(1e-10, 1e-2 * run->options.rtol));

@@ -98,6 +98,17 @@ static void blend(const msfp_row *start, const msfp_row *middle, const msfp_row 
         values[i] = inside(a[i], 0.0, m[i], b[i], 0.0, 0.0, c, s);
 }
 
+/* Sliding is a distance, with a kink at the centre: made from the angles of its own row. */
+static void measure(const msfp_run *run, msfp_row *row)
+{
+    double sliding[NB][MSFP_GAP_SIZE];
+    msfp_gaps(&run->parameters, row->q, sliding);
+    for (int j = 0; j < NB; ++j) {
+        row->sliding[j] = sliding[j][MSFP_GAP_S];
+        row->gap[j] = sliding[j][MSFP_GAP_G];
+    }
+}
+
 static int write_between(msfp_run *run, double last)
 {
     msfp_row start, middle, end, *row;
@@ -114,9 +125,10 @@ static int write_between(msfp_run *run, double last)
         if (!(row = new_row(run)))
             return MSFP_E_MEMORY;
         msfp_interpolate(run, share, &s);
-        if (c > 0.0)
+        if (c > 0.0) {
             blend(&start, &middle, &end, c, share, row);
-        else
+            measure(run, row);
+        } else
             msfp_observe_state(run, &s, row);
         row->time = run->output_time;
         memcpy(row->work, s.work, sizeof row->work);
