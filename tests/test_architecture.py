@@ -160,7 +160,7 @@ def test_paths_in_the_docs_exist(page):
     for target in links - {""}:
         assert (page.parent / target).exists(), f"{page.name} links to {target}"
     named = re.findall(r"`((?:docs|tests|generator|templates|msfp_gen|benchmarks|build)/[\w./-]*)`", text)
-    for name in named:
+    for name in set(named) - {"build/models/"}:  # made by the first build
         assert (ROOT / name).exists(), f"{page.name} names {name}"
     scripts = re.findall(r"python ((?:docs|benchmarks)/\w+\.py)", text)
     for name in scripts:
