@@ -124,6 +124,7 @@ def test_methods_agree_on_the_second_test_of_fenz() -> None:
     explicit = simulate(replace(scene, solver=replace(scene.solver, method="dopri5", rtol=1e-6)))
     implicit = simulate(scene)
     assert peak(implicit) == pytest.approx(peak(explicit), rel=2e-3)
+    assert apart(explicit, implicit) < 2e-3
 
 
 # ---- what holds of every run ------------------------------------------------------------------------------------
