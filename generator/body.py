@@ -188,13 +188,16 @@ def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
     )
 
 
-def body_energy(b: Blocks) -> Program:
+def body_energy(b: Blocks, massless: bool) -> Program:
     """Kinetic and potential energy of one body in the frame that moves with the base, and the power of the frame."""
     p = Program("body_energy", "energy of a body in the frame moving with the base")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     base: Symbols = p.read(b.base_motion, "o", active=False)
-    p.write(b.energy, energy_terms(p, par, body, body["rc"], body["vc"], base), tangents=False)
+    terms = energy_terms(p, par, body, body["rc"], body["vc"], base)
+    if massless:
+        terms.update(kinetic=sp.Integer(0), power=sp.Integer(0))
+    p.write(b.energy, terms, tangents=False)
     return p
 
 

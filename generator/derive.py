@@ -45,7 +45,7 @@ def derive(spec: ModelSpec) -> Equations:
         body.interface_force(blocks, massless),
         body.linear_balance(blocks, massless),
         body.angular_balance(blocks, massless),
-        body.body_energy(blocks),
+        body.body_energy(blocks, massless),
         top.top_wrench(blocks, massless),
         top.top_energy(blocks),
         contact.gap(blocks),

@@ -28,6 +28,7 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 FAILURES = {
     "newton": "Newton's method found no accelerations; the state may be beyond what the bearing can carry",
     "irregular": "the equations have lost regularity: friction and inertia admit no unique acceleration",
+    "uplift": "an interface would have to pull; uplift is not modelled: increase the load on the top",
     "finite": "a value is not finite; check the state and the load",
 }
 

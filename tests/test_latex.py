@@ -36,7 +36,8 @@ def random_numbers(rng, level):
     sizes = lengths | {"m_2": 4.0, "lambda_2": 0.03, "g": 9.8, "mu_1": 0.1}
     numbers = {name: value * rng.uniform(0.5, 1.5) for name, value in sizes.items()}
     motions = ("ddu_g1", "ddu_g3", "dtheta_1", "ddtheta_1", "dtheta_2", "ddtheta_2")
-    numbers |= {name: rng.uniform(-1.0, 1.0) for name in (*motions, "theta_1", "theta_2", "thetat_1", "Y_1")}
+    numbers |= {name: rng.uniform(-1.0, 1.0) for name in (*motions, "thetat_1", "Y_1")}
+    numbers |= {name: rng.uniform(-0.3, 0.3) for name in ("theta_1", "theta_2")}  # steeper, the load would pull
     numbers |= {"N_1": rng.uniform(8e3, 1.2e4), "F_1": rng.uniform(-1e3, 1e3), "F_3": -1e4, "M_2": rng.uniform(-50, 50)}
     return numbers | dict.fromkeys(("theta_1", "dtheta_1", "ddtheta_1"), 0.0) if level else numbers
 

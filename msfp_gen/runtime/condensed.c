@@ -67,6 +67,17 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
     }
 }
 
+int msfp_pulling(const msfp_work *w)
+{
+    for (int j = 0; j < NB; ++j) {
+        double p[3];
+        msfp_local_p_get(w->local[j], p);
+        if (p[2] <= 0.0)
+            return j + 1;
+    }
+    return 0;
+}
+
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
 {
     for (int j = 0; j < NB; ++j) {

@@ -108,6 +108,9 @@ int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, do
 /* Sliding displacements and gaps (3.20), (3.21). */
 void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
+/* Surface (1-based) whose interface would have to pull: P . t_3 <= 0 (docs/model.md, choice 11). 0: none. */
+int msfp_pulling(const msfp_work *w);
+
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
 
 /* Named points (3.1)-(3.11) of bodies 0..NB: [body][bottom, centre of mass, top, sphere centre][r, v, a][3];

@@ -25,11 +25,9 @@ static void energies(const msfp_parameters *p, const msfp_point *at, const msfp_
     total[0] = total[1] = total[2] = 0.0;
     for (int k = 1; k <= NB; ++k) {
         msfp_body_energy(p->body[k], w->body[k], base, one);
+        total[0] += one[MSFP_ENERGY_KINETIC];
         total[1] += one[MSFP_ENERGY_POTENTIAL];
-        if (!MSFP_MASSLESS) {
-            total[0] += one[MSFP_ENERGY_KINETIC];
-            total[2] += one[MSFP_ENERGY_POWER];
-        }
+        total[2] += one[MSFP_ENERGY_POWER];
     }
     msfp_top_energy(p->top, w->body[NB], base, one);
     total[0] += one[MSFP_ENERGY_KINETIC];
