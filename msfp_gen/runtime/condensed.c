@@ -53,6 +53,7 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
         } else
             msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out);
         memcpy(residual + (k - 1) * ND, out, ND * sizeof *residual);
+        w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
     }
     return MSFP_OK;
 }

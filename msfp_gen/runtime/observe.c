@@ -80,12 +80,25 @@ static double drive_power(const msfp_parameters *p, const msfp_point *at, const 
     return power + dot3(force, relative) + dot3(moment, turning);
 }
 
+/* A body that does not spin on its basis turns about its axis all the same, by psi' sin(theta): the moments that lock
+ * the spin do work, of the order of the tilt squared. */
+static double lock_power(const msfp_work *w)
+{
+    double power = 0.0, axis[3], turning[3];
+    for (int k = 1; k <= NB; ++k) {
+        msfp_body_t3_get(w->body[k], axis);
+        msfp_body_wp_get(w->body[k], turning);
+        power += w->lock[k - 1] * dot3(axis, turning);
+    }
+    return power;
+}
+
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
 {
     double total[3];
     energies(p, at, w, total);
     memset(power, 0, MSFP_WORKS * sizeof *power);
-    power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]);
+    power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
     for (int j = 0; j < NB; ++j) {
         friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
         if (w->rim_active[j])
