@@ -252,7 +252,7 @@ def test_declared_jump_of_acceleration_restarts_the_integrator() -> None:
 
 
 def test_moments_that_lock_the_spin_do_work() -> None:
-    """A tilting plate led round a circle turns about its axis: without that work the balance is off by several per cent."""
+    """A tilting plate led round a circle turns about its axis: without that work the balance is off by per cents."""
     bearing = Bearing(
         layout=Layout(2, 1, 0),
         base_height=0.03,
