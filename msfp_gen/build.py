@@ -19,15 +19,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from msfp_gen import cache
 from msfp_gen.compiler import LOG_NAME, compile_extension
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.layout import Effects, Layout, ModelSpec
-
-if TYPE_CHECKING:
-    from msfp_gen.model import Model
+from msfp_gen.model import Model
 
 Progress = Callable[[str], None]
 
@@ -167,8 +164,6 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
 
 
 def _load_model(spec: ModelSpec, progress: Progress | None) -> Model:
-    from msfp_gen.model import Model
-
     begin = perf_counter()
     info = prepare(spec, progress)
     extension = load_extension(info.path, info.module)

@@ -1,0 +1,73 @@
+"""What a build and a run cost here: `python benchmarks/speed.py`.
+
+Builds go to a cache of their own that is thrown away; every run is repeated and its fastest wall time counts.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+LAYOUTS = ("5 2 2", "7 3 3", "11 5 5")
+SCENES = ("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc", "ridgecrest-ccc")
+REPEATS = 5
+
+WARM = """
+import msfp_gen, time
+from msfp_gen import Layout, build_model
+begin = time.perf_counter()
+build_model(Layout.tfp())
+print(time.perf_counter() - begin)
+"""
+
+
+def cold_build(layout: str, cache: str) -> float:
+    """Seconds of `msfp-gen generate` for a layout that the cache does not hold, interpreter start included."""
+    begin = time.perf_counter()
+    subprocess.run(
+        [sys.executable, "-m", "msfp_gen", "generate", *layout.split()],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        env={**os.environ, "MSFP_GEN_CACHE": cache},
+    )
+    return time.perf_counter() - begin
+
+
+def warm_build(cache: str) -> float:
+    """Seconds of `build_model` in a new process that finds the model in the cache."""
+    done = subprocess.run(
+        [sys.executable, "-c", WARM],
+        check=True,
+        text=True,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "MSFP_GEN_CACHE": cache},
+    )
+    return float(done.stdout)
+
+
+def main() -> None:
+    """Print both tables."""
+    from msfp_gen import load_scene, simulate
+
+    with tempfile.TemporaryDirectory() as cache:
+        print("| layout | cold build [s] | over (5 2 2) |\n|---|---|---|")
+        first = 0.0
+        for layout in LAYOUTS:
+            seconds = cold_build(layout, cache)
+            first = first or seconds
+            print(f"| {layout} | {seconds:.2f} | {seconds / first:.2f} |")
+        print(f"\nwarm build_model: {min(warm_build(cache) for _ in range(REPEATS)):.4f} s\n")
+    print("| scene | run [s] | times real time | steps | Newton iterations |\n|---|---|---|---|---|")
+    for name in SCENES:
+        runs = [simulate(load_scene(name)) for _ in range(REPEATS)]
+        best = min(runs, key=lambda run: run.counters.wall_time)
+        count = best.counters
+        speed = best.history.time[-1] / count.wall_time
+        print(f"| {name} | {count.wall_time:.4f} | {speed:.0f} | {count.steps} | {count.newton_iterations} |")
+
+
+if __name__ == "__main__":
+    main()
