@@ -6,12 +6,14 @@ In a planar model polar vectors keep (E1, E3), axial ones keep E2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from .program import Block, BlockBuilder
 
 POLAR = (None, 0, None)
 AXIAL = (0, None, 0)
+Maker = Callable[[str], BlockBuilder]
 
 
 @dataclass(frozen=True)
@@ -43,14 +45,10 @@ class Blocks:
     energy: Block
 
 
-def make_blocks(planar: bool) -> Blocks:
-    """The blocks of a planar or spatial model."""
-
-    def new(name: str) -> BlockBuilder:
-        return BlockBuilder(name, planar)
-
-    return Blocks(
-        dimensions=new("dimensions")
+def _parameters(new: Maker, planar: bool) -> dict[str, Block]:
+    """What a user gives: dimensions, masses, surfaces, the top."""
+    return {
+        "dimensions": new("dimensions")
         .scalar("height", "m", "l, height of the body")
         .scalar("centroid", "m", "z, from the bottom (lower surface concave up, 3.6) or from the top (3.10)")
         .scalar("sign_lower", "-", "+1: the surface below is concave up, -1: down")
@@ -58,11 +56,11 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("radius_lower", "m", "R of the surface below; 0 under the base")
         .scalar("radius_upper", "m", "R of the surface above; 0 on the top plate")
         .build(),
-        arms=new("arms")
+        "arms": new("arms")
         .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
         .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
         .build(),
-        body_parameters=new("body_parameters")
+        "body_parameters": new("body_parameters")
         .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
         .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
         .scalar("m", "kg", "mass")
@@ -70,7 +68,7 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("ja", "kg m^2", "lambda_3, axial moment of inertia (2.118)")
         .scalar("g", "m/s^2", "gravitational acceleration")
         .build(),
-        surface_parameters=new("surface_parameters")
+        "surface_parameters": new("surface_parameters")
         .scalar("sign", "-", "+1 concave up, -1 concave down")
         .scalar("R", "m", "radius of the sliding surface")
         .scalar("sc", "m", "s_c, sliding capacity (3.21)")
@@ -81,7 +79,7 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("rs", "m", "radius of the slider that carries the contact patch")
         .scalar("pr", "m", "p, height of the rim contact above the slider's face (3.25)")
         .build(),
-        top_parameters=new("top_parameters")
+        "top_parameters": new("top_parameters")
         .scalar("k", "N/m", "horizontal stiffness of the rig")
         .scalar("c", "N s/m", "horizontal damping of the rig")
         .scalar("kr", "N m/rad", "rotational stiffness")
@@ -93,7 +91,13 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("g", "m/s^2", "gravitational acceleration")
         .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR)
         .build(),
-        coordinates=new("coordinates")
+    }
+
+
+def _motion(new: Maker, planar: bool) -> dict[str, Block]:
+    """Coordinates and kinematics of a body, and the motion of the base."""
+    return {
+        "coordinates": new("coordinates")
         .scalar("psi", "rad", "psi, first Euler angle", 0)
         .scalar("theta", "rad", "theta, second Euler angle")
         .scalar("phi", "rad", "phi, spin", 0)
@@ -104,7 +108,7 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("theta2", "rad/s^2", "second derivative of theta")
         .scalar("phi2", "rad/s^2", "second derivative of phi", 0)
         .build(),
-        body=new("body")
+        "body": new("body")
         .vector("t1", "-", "t_1 (2.1)", POLAR)
         .vector("t2", "-", "t_2 (2.1)", (0, 1, 0))
         .vector("t3", "-", "t_3, axis of symmetry (2.1)", POLAR)
@@ -123,19 +127,36 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("st", "-", "sin theta")
         .scalar("ct", "-", "cos theta")
         .build(),
-        vector=new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
-        moment=new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
-        local=new("local")
+        "points": _points(planar),
+        "base_motion": new("base_motion")
+        .vector("U", "m/s", "velocity of the base", POLAR)
+        .vector("B", "m/s^2", "acceleration of the base", POLAR)
+        .vector("O", "m", "displacement of the base", POLAR)
+        .build(),
+        "energy": new("energy")
+        .scalar("kinetic", "J", "kinetic energy relative to the moving base")
+        .scalar("potential", "J", "m g times height above the base")
+        .scalar("power", "W", "power of the base acceleration")
+        .build(),
+    }
+
+
+def _interfaces(new: Maker, planar: bool) -> dict[str, Block]:
+    """What passes through a surface, and what decides it."""
+    return {
+        "vector": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
+        "moment": new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
+        "local": new("local")
         .vector("p", "N", "contact force (normal and friction) in the basis of the body below", POLAR)
         .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL)
         .build(),
-        friction=new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
-        unknowns=new("unknowns")
+        "friction": new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
+        "unknowns": new("unknowns")
         .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
         .scalar("theta", "rad", "theta~, second angle of the normal's position")
         .scalar("N", "N", "normal force")
         .build(),
-        contact=new("contact")
+        "contact": new("contact")
         .vector("M", "N m", "moment about the sphere centre, basis of the body below", AXIAL)
         .scalar("dY", "1/s", "dY/dt (3.18)")
         .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
@@ -152,48 +173,59 @@ def make_blocks(planar: bool) -> Blocks:
         .scalar("ZY", "1/s", "d(dZ/dt)/dY", 0)
         .scalar("ZZ", "1/s", "d(dZ/dt)/dZ", 0)
         .build(),
-        report_contact=new("report_contact")
+        "report_contact": new("report_contact")
         .vector("p", "N", "N + F_f, basis of the body below (3.15)-(3.17)", POLAR)
         .vector("M", "N m", "moment about the sphere centre, same basis", AXIAL)
         .scalar("dY", "1/s", "dY/dt (3.18)")
         .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
         .build(),
-        rim=new("rim")
+    }
+
+
+def _rims(new: Maker, planar: bool) -> dict[str, Block]:
+    """Gap and rim of a surface."""
+    return {
+        "rim": new("rim")
         .vector("f", "N", "F_c (3.22), basis of the body below", POLAR)
         .vector("M", "N m", "its moment about the sphere centre, same basis", AXIAL)
         .scalar("g", "m", "gap (3.21)")
         .scalar("dg", "m/s", "d gap/dt (2.102)")
         .scalar("fc", "N", "signed magnitude k g + c dg/dt (3.23)")
         .build(),
-        rim_coordinates=new("rim_coordinates")
+        "rim_coordinates": new("rim_coordinates")
         .scalar("psi", "rad", "psi of the body above", 0)
         .scalar("theta", "rad", "theta of the body above")
         .scalar("psi1", "rad/s", "its rate", 0)
         .scalar("theta1", "rad/s", "its rate")
         .build(),
-        gap=new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
-        top_wrench=new("top_wrench")
+        "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
+    }
+
+
+def _balances(new: Maker, planar: bool) -> dict[str, Block]:
+    """What a body's balances and the top give."""
+    return {
+        "top_wrench": new("top_wrench")
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
         .build(),
-        linear=new("linear")
+        "linear": new("linear")
         .vector("r", "N", "(3.26), (3.28): left side less right side, along E1, E2, E3", POLAR)
         .build(),
-        angular=new("angular")
+        "angular": new("angular")
         .vector("r", "N m", "(3.27), (3.29): left side less right side, along t_1, t_2, t_3", AXIAL)
         .build(),
-        points=_points(planar),
-        base_motion=new("base_motion")
-        .vector("U", "m/s", "velocity of the base", POLAR)
-        .vector("B", "m/s^2", "acceleration of the base", POLAR)
-        .vector("O", "m", "displacement of the base", POLAR)
-        .build(),
-        energy=new("energy")
-        .scalar("kinetic", "J", "kinetic energy relative to the moving base")
-        .scalar("potential", "J", "m g times height above the base")
-        .scalar("power", "W", "power of the base acceleration")
-        .build(),
-    )
+    }
+
+
+def make_blocks(planar: bool) -> Blocks:
+    """The blocks of a planar or spatial model."""
+
+    def new(name: str) -> BlockBuilder:
+        return BlockBuilder(name, planar)
+
+    rooms = (_parameters, _motion, _interfaces, _rims, _balances)
+    return Blocks(**{name: block for room in rooms for name, block in room(new, planar).items()})
 
 
 def _points(planar: bool) -> Block:
