@@ -160,7 +160,7 @@ static double take_step(msfp_run *run, stages *s, double *residual, double size,
     return next;
 }
 
-/* Newton on the residual. Factors serve as long as they at least quarter it: other stages, other steps of like size. The
+/* Newton on the residual. Factors serve as long as they reduce it tenfold: other stages, other steps of like size. The
  * switches of friction and rims make it semi-smooth. The sign of the determinant is looked at with every factorisation;
  * while old factors contract the residual the tangent has theirs. */
 static int solve_stage(msfp_run *run, stages *s)
@@ -184,7 +184,7 @@ static int solve_stage(msfp_run *run, stages *s)
         }
         const double before = size;
         size = take_step(run, s, residual, size, fresh);
-        good = size < 0.25 * before;
+        good = size < 0.1 * before;
     }
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
@@ -201,8 +201,11 @@ static void guess(const msfp_run *run, stages *s, int i, double h, int extrapola
     memcpy(s->f, i > 1 ? s->f : run->now.f, sizeof s->f);
     if (extrapolate)
         for (int k = 0; k < NB; ++k)
-            for (int d = 0; d < ND; ++d)
-                s->at.v[k][angles[d]] += method.c[i] * h * run->now.a[k][angles[d]];
+            for (int d = 0; d < ND; ++d) {
+                const int j = angles[d];
+                const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / method.c[1] : h * run->now.a[k][j];
+                s->at.v[k][j] += method.c[i] * slope;
+            }
 }
 
 static int stage(msfp_run *run, stages *s, int i, double h)
