@@ -140,5 +140,7 @@ def test_program_runs_as_python_does(printed: dict[str, Array]) -> None:
     assert printed["time"][:, 0] == pytest.approx(run.history.time, abs=1e-12) and len(printed["time"]) == 101
     assert printed["steps"][0, 0] == run.counters.steps
     peak = np.abs(run.history.top_force[:, 0]).max()
-    assert np.abs(printed["top_force"] - run.history.top_force).max() < 1e-6 * peak
+    # The program makes its motion itself, with its own rounding; that may move where Newton's method stops, and with it
+    # the answer, but within the tolerance of the run.
+    assert np.abs(printed["top_force"] - run.history.top_force).max() < scene.solver.rtol * peak
     assert peak > 0.05 * LOAD
