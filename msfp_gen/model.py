@@ -40,7 +40,8 @@ class Evaluation:
     acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2]; None in a massless model,
     whose sliders have no acceleration of their own. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
     [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) on the body above [N]; slip_velocity
-    (n-1, 2) u~, v~ [m/s]; sliding, gap (n-1,) [m]. residual_norm: largest balance relative to its natural size;
+    (n-1, 2) u~, v~ [m/s]; sliding, gap (n-1,) [m]. residual_norm: largest balance relative to its natural size
+    (massless: moment over the largest normal force [m], how far the state is from equilibrium);
     determinant: sign of the determinant of the equations solved.
     """
 
@@ -135,9 +136,10 @@ class Model:
         )
         if status != "ok":
             raise RunError(f"evaluate: {FAILURES.get(status, status)}", status=status)
-        row, _ = stack.observe(state.q, state.v, zero, state.f, state.base, state.load)
+        row, _, rates, pulling = stack.observe(state.q, state.v, zero, state.f, state.base, state.load)
+        if pulling:
+            raise RunError(f"evaluate, surface {pulling}: {FAILURES['uplift']}", status="uplift")
         fields = self.unpack(row)
-        rates = stack.accelerations(state.q, state.v, state.f, state.base, state.load)[3]
         size = float(np.max(np.abs(residual)) / max(float(np.max(fields["normal"])), 1e-12))
         return self._evaluation(state, None, row, rates, size, 0, 0)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from support import failure_of, scene_of
 
-from msfp_gen import Motion, RunError, Scene, Top, presets
+from msfp_gen import Effects, Motion, RunError, Scene, Top, build_model, presets
 from msfp_gen.result import Result
 from msfp_gen.scene import InitialState
 
@@ -127,3 +127,16 @@ def test_initial_state_under_tension_is_refused_at_once() -> None:
     start = InitialState(q, q, q[:, :2])
     scene = Scene(presets.bearing("fenz-tfp"), STILL, Top.prescribed((0.0, 0.0, 1e5)), initial_state=start)
     assert failure_of(scene).status == "uplift"
+
+
+def test_massless_evaluation_gives_rates_and_names_uplift() -> None:
+    """A massless stack has no acceleration; its contact is defined all the same, and it cannot pull either."""
+    bearing, shape = presets.bearing("fenz-tfp"), (4, 3)
+    state = (np.full(shape, [0.01, 0.02, 0.0]), np.full(shape, [0.1, 0.2, 0.0]), np.full((4, 2), 0.3))
+    massless = build_model(bearing.layout, Effects(sliders="massless"))
+    found = massless.evaluate(bearing, *state, top_force=(0.0, 0.0, -112e3))
+    heavy = build_model(bearing.layout, Effects()).evaluate(bearing, *state, top_force=(0.0, 0.0, -112e3))
+    assert found.acceleration is None
+    assert np.abs(found.friction_rate - heavy.friction_rate).max() < 1e-2 * np.abs(heavy.friction_rate).max()
+    with pytest.raises(RunError, match="would have to pull"):
+        massless.evaluate(bearing, *state, top_force=(0.0, 0.0, 112e3))

@@ -164,7 +164,7 @@ int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind)
     msfp_row row;
     msfp_event *events = grown(run->events, run->event_count, &run->event_capacity, sizeof *events);
     if (!events)
-        return MSFP_E_MEMORY;
+        return run->status = MSFP_E_MEMORY;
     run->events = events;
     msfp_event *event = &events[run->event_count++];
     msfp_observe_state(run, s, &row);

@@ -256,7 +256,8 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->previous_error = error;
     run->restart = 0;
     const int stop = record_events(run, before, after);
-    run->status = msfp_write_step(run);
+    if (run->status == MSFP_OK)
+        run->status = msfp_write_step(run);
     if (run->status)
         return 0;
     run->now = run->next;
