@@ -10,9 +10,10 @@ import sys
 import pytest
 from synthetic import loops, ramp
 
-from msfp_gen import cli
 from msfp_gen.build import BuildInfo
 from msfp_gen.cli import main
+from msfp_gen.cli.console import Progress
+from msfp_gen.cli.running import DEMO, _report
 from msfp_gen.errors import CompileError, RunError
 from msfp_gen.result import Result
 
@@ -255,7 +256,7 @@ def test_explain_has_a_meaning_for_every_choice():
 def test_presets_are_listed(capsys):
     assert main(["presets"]) == 0
     out = capsys.readouterr().out
-    for name in (*cli.DEMO, "fenz-monotonic", "fenz-tfp", "becker-tfp"):
+    for name in (*DEMO, "fenz-monotonic", "fenz-tfp", "becker-tfp"):
         assert f"\n  {name}" in out
 
 
@@ -275,10 +276,10 @@ def test_demo_writes_figures_and_data(capsys, simulated, tmp_path):
     folder = tmp_path / "new" / "out"
     assert main(["demo", "-o", str(folder)]) == 0
     names = sorted(path.name for path in folder.iterdir())
-    assert names == sorted(f"{name}{suffix}" for name in cli.DEMO for suffix in (".nc", ".png"))
+    assert names == sorted(f"{name}{suffix}" for name in DEMO for suffix in (".nc", ".png"))
     out = capsys.readouterr().out
     assert all(f"wrote {folder / name}" in out for name in names)
-    assert [scene.name for scene in simulated] == list(cli.DEMO)
+    assert [scene.name for scene in simulated] == list(DEMO)
 
 
 def test_demo_refuses_a_folder_that_is_a_file(capsys, simulated, tmp_path):
@@ -300,8 +301,8 @@ def test_interrupted_run_says_so(capsys, simulated, monkeypatch):
 def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    cli._report(loops(), as_json=False)
-    with cli._Progress("fenz-test5") as update:
+    _report(loops(), as_json=False)
+    with Progress("fenz-test5") as update:
         for time in (0.0, 20.0, 20.1, 40.0):
             update(time, 40.0)
     out, err = capsys.readouterr()

@@ -1,0 +1,61 @@
+"""The command line, `msfp-gen`. The only room that prints; everything heavy is imported when a command needs it."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from msfp_gen.cli import building, running
+from msfp_gen.cli.console import fail, say
+from msfp_gen.errors import MsfpError
+from msfp_gen.version import __version__
+
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+# The base of usage errors (ClickException), in click or in the copy of it that newer typers carry.
+USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
+
+app = typer.Typer(
+    help="Full nonlinear equations of motion of multi-stage friction pendulum bearings: derived, compiled, integrated.",
+    epilog="Examples:\n\n\b\n"
+    "  msfp-gen demo -o out\n  msfp-gen run fenz-test2 --plot loops.png\n  msfp-gen generate 7 3 3",
+    rich_markup_mode=None,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+# In the order in which help lists the commands.
+for group in (running, building):
+    app.add_typer(group.app)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input."""
+    arguments = sys.argv[1:] if argv is None else argv
+    try:
+        code = app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0
+    except MsfpError as error:
+        return fail(str(error), error.exit_code)
+    except OSError as error:  # such as a full disk, or a reader of our output that left
+        return fail(str(error), FAILED)
+    except typer.Abort:
+        code = INTERRUPTED
+    except USAGE_ERROR as error:
+        return fail(f"{error.format_message().rstrip('.')} (see msfp-gen --help)", BAD_INPUT)
+    # Typer turns Ctrl-C into this code without a word.
+    return fail("interrupted", code) if code == INTERRUPTED else int(code)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        say(f"msfp-gen {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass

@@ -1,0 +1,68 @@
+"""Commands about models and the installation: generate, explain, presets, doctor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from msfp_gen.cli.console import SceneName, note, show, whole, words
+from msfp_gen.layout import Effects, Layout, ModelSpec
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example:\n\n\b\n  msfp-gen generate 5 2 2 -o models   # then: import msfp_5_2_2")
+def generate(
+    n: Annotated[int, typer.Argument(parser=whole, metavar="N", help="Bodies, base and top plate included.")],
+    m: Annotated[int, typer.Argument(parser=whole, metavar="M", help="Surfaces that are concave up; they lie below.")],
+    p: Annotated[int, typer.Argument(parser=whole, metavar="P", help="Surfaces that are concave down; n = m + p + 1.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put sources and module here.")
+    ] = None,
+    dimension: Annotated[str | None, typer.Option(metavar=words(Effects, "dimension"))] = None,
+    spin: Annotated[str | None, typer.Option(metavar=words(Effects, "spin"))] = None,
+    sliders: Annotated[str | None, typer.Option(metavar=words(Effects, "sliders"))] = None,
+    rims: Annotated[bool | None, typer.Option("--rims/--no-rims", help="Whether sliders meet rims.")] = None,
+    bouc_wen: Annotated[str | None, typer.Option(metavar=words(Effects, "bouc_wen"))] = None,
+) -> None:
+    """Derive, emit and compile the equations of a layout."""
+    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen}
+    effects: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    spec = ModelSpec(Layout(n, m, p), Effects(**effects))
+    from msfp_gen.build import generate_to, prepare
+    from msfp_gen.tables import build_table
+
+    info = prepare(spec, note) if output is None else generate_to(spec, output, note)
+    show([build_table(info)])
+
+
+@app.command()
+def explain(scene: SceneName) -> None:
+    """Say in plain words what a scene computes."""
+    from msfp_gen.explain import explain as describe
+    from msfp_gen.scenefile import load_scene
+
+    show(describe(load_scene(scene)))
+
+
+@app.command()
+def presets() -> None:
+    """List the scenes and bearings that come with msfp-gen."""
+    from msfp_gen import presets as catalogue
+    from msfp_gen.tables import Table
+
+    show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "bearing"))
+
+
+@app.command()
+def doctor() -> None:
+    """Check Python, libraries, compiler and cache."""
+    from msfp_gen.doctor import diagnose
+    from msfp_gen.tables import check_table
+
+    checks = diagnose()
+    show([check_table(checks)])
+    if not all(check.ok for check in checks):
+        raise typer.Exit(1)

@@ -1,0 +1,127 @@
+"""Commands that simulate: run, demo."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from msfp_gen.cli.console import Output, Progress, SceneName, note, number, say, show, words
+from msfp_gen.errors import RunError
+from msfp_gen.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.solver import Solver
+
+if TYPE_CHECKING:
+    from msfp_gen.result import Result
+    from msfp_gen.scene import Scene
+
+DEMO = ("ridgecrest-clc", "fenz-test5")
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json"
+)
+def run(
+    scene: SceneName,
+    output: Output = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw loops and sliding: .png, .svg or .pdf.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")] = False,
+    method: Annotated[str | None, typer.Option(metavar=words(Solver, "method"), help="Instead of the scene's.")] = None,
+    rtol: Annotated[
+        float | None, typer.Option(parser=number, metavar="NUMBER", help="Relative tolerance, instead of the scene's.")
+    ] = None,
+    max_step: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="Longest step, instead of the scene's.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this time.")
+    ] = None,
+) -> None:
+    """Simulate a scene."""
+    if output is not None:
+        check_output(output, DATASET_SUFFIXES, "--output")
+    if plot is not None:
+        check_output(plot, FIGURE_SUFFIXES, "--plot")
+    from msfp_gen.scenefile import load_scene
+
+    chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
+    for path in _run(chosen, output, plot, as_json):
+        note(f"wrote {path}")
+
+
+@app.command()
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where figures and data go.")] = Path(
+        "out"
+    ),
+) -> None:
+    """Run an earthquake and a laboratory test; write figures and data."""
+    from msfp_gen.output import make_folder
+    from msfp_gen.scenefile import load_scene
+
+    scenes = [load_scene(name) for name in DEMO]
+    make_folder(output, "--output")
+    for name, scene in zip(DEMO, scenes, strict=True):
+        written = _run(scene, output / f"{name}.nc", output / f"{name}.png")
+        say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
+
+
+def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
+    """`scene` with what the options gave."""
+    given = {name: value for name, value in solver.items() if value is not None}
+    scene = replace(scene, solver=replace(scene.solver, **given)) if given else scene
+    return scene if duration is None else replace(scene, duration=duration)
+
+
+def _run(scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False) -> list[Path]:
+    """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
+    result, failure = _simulate(scene)
+    saved = []
+    if result is not None:
+        _report(result, as_json)
+        saved = _save(result, output, plot)
+    if failure is not None:
+        kept = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
+        raise RunError(f"{failure}{kept}", status=failure.status, result=result) from failure
+    return saved
+
+
+def _simulate(scene: Scene) -> tuple[Result | None, RunError | None]:
+    """The result, and why the run failed if it did: what was computed until then is worth keeping."""
+    from msfp_gen.build import build_model
+    from msfp_gen.result import Result
+    from msfp_gen.simulation import simulate
+
+    build_model(scene.bearing.layout, scene.effects, progress=note)
+    with Progress(scene.name or "run") as progress:
+        try:
+            return simulate(scene, progress=progress), None
+        except RunError as error:
+            return error.result if isinstance(error.result, Result) else None, error
+
+
+def _report(result: Result, as_json: bool) -> None:
+    if as_json:
+        say(json.dumps(result.summary, indent=2, allow_nan=False))
+        return
+    from msfp_gen.tables import summary_tables
+
+    show(summary_tables(result))
+
+
+def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:
+    """Write what was asked for; the paths written."""
+    if output is not None:
+        result.to_netcdf(output)
+    if plot is not None:
+        from msfp_gen.figures import plot_result
+
+        plot_result(result, plot)
+    return [path for path in (output, plot) if path is not None]
