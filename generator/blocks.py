@@ -43,6 +43,8 @@ class Blocks:
     points: Block
     base_motion: Block
     energy: Block
+    coefficient: Block | None = None
+    """The friction coefficient as an unknown, where it follows a law."""
 
 
 def _parameters(new: Maker, planar: bool) -> dict[str, Block]:

@@ -247,7 +247,7 @@ def to_local(b: Blocks) -> Program:
     t2: Vector = (zero, cos_psi, sin_psi)
     t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
     relative = add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
-    p.write(
-        b.local, {"p": subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"]), "dw": relative}
-    )
+    force = subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"])
+    tilt = {"tilt": cos_psi * cos_theta} if "tilt" in b.local.quantities else {}
+    p.write(b.local, {"p": force, "dw": relative, **tilt})
     return p

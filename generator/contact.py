@@ -10,44 +10,17 @@ from typing import Any
 
 import sympy as sp
 
+from msfp_gen import friction_laws
+
+from . import laws
 from .blocks import Blocks
+from .functions import ArcTan2, Modulus, Step
 from .program import Program, Vector
 from .vectors import add, dot, scale
 
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
 """w_0 [rad/s] of the drilling moment (docs/model.md)."""
-
-
-class Step(sp.Function):  # type: ignore[misc]
-    """1 for a positive argument, else 0: the switches a, b of (3.18). Its derivative is zero on both sides."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Zero on both sides of the switch."""
-        return sp.Integer(0)
-
-
-class ArcTan2(sp.Function):  # type: ignore[misc]
-    """atan2(y, x) with the derivative it has off its branch cut (SymPy's own adds a distribution on the cut)."""
-
-    nargs = 2
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """x/(x^2 + y^2) and -y/(x^2 + y^2)."""
-        y, x = self.args
-        return (x if argindex == 1 else -y) / (x**2 + y**2)
-
-
-class Modulus(sp.Function):  # type: ignore[misc]
-    """|x|, with the derivative +-1 that it has on either side."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """+1 or -1."""
-        return 2 * Step(self.args[0]) - 1
 
 
 def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
@@ -61,6 +34,8 @@ class Law:
 
     bouc_wen: str
     patch: bool
+    coefficient: friction_laws.Law | None = None
+    """The law of mu; None: constant."""
 
 
 Basis = tuple[Vector, Vector, Vector]
@@ -96,12 +71,17 @@ def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: 
     }
 
 
-def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector) -> Symbols:
-    """Slip velocity (3.19), (2.98), Bouc-Wen rates (3.18) and the moment of the contact about the sphere centre."""
-    t1, t2, t3 = base
+def slip(p: Program, par: Symbols, base: Basis, dw: Vector) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """sign R, and the slip velocity (3.19), v~ = -sign R dw x t~_3: its components (2.98) by the triple product."""
     sliding = p.let(par["sign"] * par["R"])
-    # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
-    u, v = p.let(-sliding * dot(dw, t2), "u"), p.let(sliding * dot(dw, t1), "v")
+    return sliding, p.let(-sliding * dot(dw, base[1]), "u"), p.let(sliding * dot(dw, base[0]), "v")
+
+
+def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector,
+             at: tuple[sp.Expr, sp.Expr, sp.Expr]) -> Symbols:  # fmt: skip
+    """Bouc-Wen rates (3.18) and the moment of the contact about the sphere centre, at a `slip`."""
+    t1, t2, t3 = base
+    sliding, u, v = at
     rates = bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"])
     # (3.14)-(3.17): the normal force passes through the centre; -sign R t~_3 x F_f is what is left.
     arm = p.let(sliding * par["mu"] * N)
@@ -123,11 +103,14 @@ def report_contact(b: Blocks, law: Law) -> Program:
     f: Symbols = p.read(b.friction, "f")
     loc: Symbols = p.read(b.local, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(g(x[a])) for a in ("psi", "theta") for g in (sp.sin, sp.cos)))
-    out = friction(p, law, par, base, x["N"], f, loc["dw"])
+    at = slip(p, par, base, loc["dw"])
+    par, heat = laws.stated(p, b, law.coefficient, par, loc, x["N"], *at[1:])
+    out = friction(p, law, par, base, x["N"], f, loc["dw"], at)
     t1, t2, t3 = base
     mu_n = p.let(-par["mu"] * x["N"])
     force = add(scale(x["N"], t3), scale(p.let(mu_n * f["Y"]), t1), scale(p.let(mu_n * f["Z"]), t2))  # (3.15)-(3.17)
-    p.write(b.report_contact, {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"]})
+    p.write(b.report_contact, {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat},
+            tangents=("p", "M", "dY", "dZ"))  # fmt: skip
     return p
 
 
@@ -159,13 +142,15 @@ def contact(b: Blocks, law: Law) -> Program:
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     loc: Symbols = p.read(b.local, "loc")
     f: Symbols = p.read(b.friction, "f")
-    N, (sp_, cp_, st_, ct_) = closed_form(p, par, loc["p"], f)
+    given = laws.unknown(p, b, law.coefficient, par)
+    N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], f)
     base = contact_basis(p, sp_, cp_, st_, ct_)
-    out = friction(p, law, par, base, N, f, loc["dw"])
+    out = friction(p, law, given, base, N, f, loc["dw"], slip(p, par, base, loc["dw"]))
+    out |= laws.lawful(p, law.coefficient, par, given, loc, N, out)
     p.write(
         b.contact,
         {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
-        tangents=("M", "dY", "dZ", "N"),
+        tangents=("M", "dY", "dZ", "N") if law.coefficient is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_LOCAL",
     )
     return p

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.layout import ModelSpec
 
-from . import body, contact, top
+from . import body, contact, laws, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -30,8 +30,9 @@ class Equations:
 def derive(spec: ModelSpec) -> Equations:
     """Derive the programs; what an effect leaves out never enters them."""
     effects = spec.effects
-    blocks = make_blocks(planar=effects.dimension == "planar")
-    law = contact.Law(effects.bouc_wen, patch=effects.spin == "patch" and effects.dimension == "spatial")
+    blocks = laws.with_law(make_blocks(planar=effects.dimension == "planar"), effects.law)
+    patch = effects.spin == "patch" and effects.dimension == "spatial"
+    law = contact.Law(effects.bouc_wen, patch, effects.law)
     massless = effects.sliders == "massless"
     programs = [
         body.arms(blocks),

@@ -11,6 +11,7 @@ import sympy as sp
 from msfp_gen.version import __version__
 
 from .derive import Equations
+from .heat import HEAT_KERNEL
 from .lower import Kernel
 from .printer import to_c
 from .program import Block, Use
@@ -156,7 +157,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         autoescape=False,
     )
     spec = equations.spec
-    blocks = [getattr(equations.blocks, f.name) for f in fields(equations.blocks)]
+    blocks = [b for f in fields(equations.blocks) if (b := getattr(equations.blocks, f.name)) is not None]
+    law = spec.effects.law
     context = {
         "version": __version__,
         "spec": spec,
@@ -170,7 +172,9 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "unknowns": equations.unknowns,
         "vectors": vector_quantities,
         "scalars": scalar_quantities,
-        "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields),
+        "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields) + (law is not None),
+        "law": law,
+        "heat": HEAT_KERNEL if law is not None and law.heats else (),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
     }
     names = {

@@ -31,7 +31,8 @@ class Surface:
 
     radius: R, of the sphere [m]. capacity: s_c, the arc at which the rim is met (2.101) [m]. friction: mu.
     yield_displacement: d_y of the Bouc-Wen law [m]; the report's R_gamma/R_0 (2.94) with its numbers in SI is 1/d_y.
-    rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103). Raises InputError.
+    rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103). The rest are numbers of laws of the friction coefficient
+    (docs/friction.md): given where `Effects.friction` takes them and nowhere else. Raises InputError.
     """
 
     radius: Annotated[float, _LENGTH]
@@ -40,6 +41,20 @@ class Surface:
     yield_displacement: Annotated[float, _LENGTH]
     rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
     rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+    friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
+    velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None
+    velocity_drop: Annotated[float | None, Quantity("", least=0.0)] = None
+    reference_pressure: Annotated[float | None, Quantity("Pa", least=0.0)] = None
+    pressure_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
+    temperature_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
+    patch_radius: Annotated[float | None, _LENGTH] = None
+    conductivity: Annotated[float | None, Quantity("W/(m K)", above=0.0)] = None
+    diffusivity: Annotated[float | None, Quantity("m^2/s", above=0.0)] = None
+    start_temperature: Annotated[float | None, Quantity("degC")] = None
+    c1: Annotated[float | None, Quantity("")] = None
+    c2: Annotated[float | None, Quantity("")] = None
+    c3: Annotated[float | None, Quantity("")] = None
+    c4: Annotated[float | None, Quantity("")] = None
 
     def __post_init__(self) -> None:
         check_fields(self, "surface")
@@ -85,6 +100,7 @@ class Body:
 
 
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
+_CONSTANT = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping")
 
 
 @dataclass(frozen=True)
@@ -196,7 +212,7 @@ class Bearing:
         rows = [(b.height, b.centroid, b.mass, *b.moments, b.rim_radius, b.rim_offset) for b in self.bodies]
         names = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
         arrays = dict(zip(names, np.array([base, *rows]).T.copy(), strict=True))
-        for name in _names(Surface):
+        for name in _CONSTANT:
             arrays[name] = np.array([getattr(surface, name) for surface in self.surfaces])
         return {**arrays, "gravity": np.array(self.gravity)}
 

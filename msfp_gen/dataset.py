@@ -82,7 +82,7 @@ def read_result(path: str | Path) -> Result:
 
 def _rows(history: History) -> Variables:
     for field, rows in quantities().items():
-        if field == "time":
+        if field == "time" or getattr(history, field) is None:
             continue
         values, dims, names = getattr(history, field), ("time", *rows.dims), rows.names or (field,)
         split = len(names) > 1  # one variable a component
@@ -143,6 +143,8 @@ def _without(prefix: str, attributes: Mapping[Any, Any]) -> dict[str, Any]:
 def _history(dataset: xr.Dataset) -> History:
     arrays = {}
     for field, rows in quantities().items():
+        if not set(rows.names or (field,)) <= set(dataset.variables):
+            continue  # an effect that the run did not have
         columns = [dataset[name].to_numpy() for name in rows.names or (field,)]
         arrays[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
     return History(**arrays, energy={name: dataset[f"energy_{name}"].to_numpy() for name in ENERGY})

@@ -83,13 +83,17 @@ class History:
     top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
     top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
     energy: dict[str, Array]
+    # Of models whose friction follows a law, and of those in which it heats; else None.
+    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu", ("friction",))] = None
+    temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
 
     def __post_init__(self) -> None:
         if not len(self.time):
             raise InputError("history.time has no rows: give at least the start of the run")
         surfaces = self.normal_force.shape[-1]
         for name, rows in quantities().items():
-            self._check(name, getattr(self, name), self._shape(rows.dims, surfaces))
+            if (values := getattr(self, name)) is not None:
+                self._check(name, values, self._shape(rows.dims, surfaces))
         if set(self.energy) != set(ENERGY):
             raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(ENERGY)}")
         for name, values in self.energy.items():

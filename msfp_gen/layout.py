@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields
+from msfp_gen.friction_laws import Law, law_of
 
 _COUNT = Quantity("", least=0, whole=True)
 
@@ -71,7 +72,8 @@ class Effects:
     sliders: with their inertia, or massless (quasi-static).
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
-    friction: the law of the friction coefficient.
+    friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature, or custom:
+    the formula in friction_law (docs/friction.md).
     """
 
     dimension: Literal["spatial", "planar"] = "spatial"
@@ -79,15 +81,25 @@ class Effects:
     sliders: Literal["inertial", "massless"] = "inertial"
     rims: bool = True
     bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Literal["constant"] = "constant"
+    friction: Literal["constant", "velocity", "pvt", "custom"] = "constant"
+    friction_law: str | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, "effects")
+        if self.friction == "custom" and self.law is not None:
+            object.__setattr__(self, "friction_law", self.law.text)  # one spelling, so that equal laws are one model
+        else:
+            law_of(self.friction, self.friction_law)
         if self.sliders == "massless" and self.spin == "free":
             raise InputError(
                 "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
                 "without inertia; give spin = 'locked' or 'patch'"
             )
+
+    @property
+    def law(self) -> Law | None:
+        """The law of the friction coefficient; None where it is constant."""
+        return law_of(self.friction, self.friction_law)
 
 
 @dataclass(frozen=True)
@@ -102,5 +114,6 @@ class ModelSpec:
         """A stable name, such as `5_2_2-spatial-locked-inertial-rims-report-constant`."""
         effects = self.effects
         rims = "rims" if effects.rims else "norims"
-        words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, effects.friction)
+        friction = effects.friction + (f"[{effects.friction_law.replace(' ', '')}]" if effects.friction_law else "")
+        words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, friction)
         return "-".join((self.layout.name, *words))

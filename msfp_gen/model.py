@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.friction_laws import check_bearing
 from msfp_gen.layout import ModelSpec
 from msfp_gen.packing import Array, bodies_and_surfaces, top_values, vector
 from msfp_gen.plane import State, into_plane, out_of_plane
@@ -90,7 +91,8 @@ class Model:
         """The compiled stack (`Stack` of the extension) for one bearing and top."""
         if bearing.layout != self.layout:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
-        return self.extension.Stack(bearing.gravity, *bodies_and_surfaces(bearing), top_values(top, anchor))
+        check_bearing(self.effects.law, self.effects.friction, bearing)
+        return self.extension.Stack(bearing.gravity, *bodies_and_surfaces(bearing, self.effects.law), top_values(top, anchor))
 
     def evaluate(
         self,

@@ -26,6 +26,11 @@ class Ode:
     def __init__(self, model: Model, bearing: Bearing, motion: Motion, top: Top) -> None:
         if model.effects.sliders == "massless":
             raise InputError("as_ode: a massless model is no ordinary differential equation; use sliders = 'inertial'")
+        if model.effects.law is not None and model.effects.law.heats:
+            raise InputError(
+                f"as_ode: effects.friction = {model.effects.friction!r} has temperatures, which are no part of y; use "
+                "simulate, or a law without T"
+            )
         if model.planar and motion.plane() != 0.0:
             raise InputError(
                 "as_ode: a planar model takes a motion in the E1-E3 plane; turn it with motion.rotated(angle)"

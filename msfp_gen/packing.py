@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from msfp_gen.errors import InputError
+from msfp_gen.friction_laws import numbers
 from msfp_gen.top import MassTop, PrescribedTop, RigTop, Top
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
+    from msfp_gen.friction_laws import Law
 
 Array = NDArray[np.float64]
 
@@ -32,12 +34,15 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     return array
 
 
-def bodies_and_surfaces(bearing: Bearing) -> tuple[Array, Array]:
-    """Arrays (n, 7) and (n-1, 6) in the order of the columns above."""
+def bodies_and_surfaces(bearing: Bearing, law: Law | None = None) -> tuple[Array, Array]:
+    """Arrays (n, 7) and (n-1, 6) in the order of the columns above; a law of friction adds its own to a surface."""
     arrays = bearing.arrays()
     bodies = np.ascontiguousarray(np.column_stack([arrays[name] for name in BODY_COLUMNS]))
-    surfaces = np.ascontiguousarray(np.column_stack([arrays[name] for name in SURFACE_COLUMNS]))
-    return bodies, surfaces
+    surfaces = np.column_stack([arrays[name] for name in SURFACE_COLUMNS])
+    if law is not None:
+        rows = [numbers(law, bearing, index) for index in range(len(surfaces))]
+        surfaces = np.column_stack([surfaces, [[row[name] for name in law.columns] for row in rows]])
+    return bodies, np.ascontiguousarray(surfaces)
 
 
 def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
+from msfp_gen.friction_laws import check_bearing
 from msfp_gen.layout import Effects, ModelSpec
 from msfp_gen.motion import Motion
 from msfp_gen.solver import Solver
@@ -84,6 +85,7 @@ class Scene:
         check_fields(self, "scene")
         self._check_times()
         self._check_sizes()
+        check_bearing(self.effects.law, self.effects.friction, self.bearing)
         if self.effects.rims:
             self._check_rims()
         elif self.stop is not None and self.stop.all_rims:

@@ -190,6 +190,8 @@ def _history(model: Model, rows: Array, azimuth: float) -> History:
         top_force=out_of_plane(f["top_force"], turn, "vector"),
         top_moment=out_of_plane(f["top_moment"], turn, "axial"),
         energy=energy,
+        friction_coefficient=f.get("mu"),
+        temperature=f.get("temperature"),
     )
 
 

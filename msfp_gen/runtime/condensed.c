@@ -40,6 +40,9 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
         else
             msfp_interface_force(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j]);
     }
+#if MSFP_LAW
+    msfp_surroundings(at, w);
+#endif
     for (int j = 0; j < NB; ++j) {
         const int status = msfp_surface(p, w, seed, f[j], j, tangent != NULL);
         if (status)

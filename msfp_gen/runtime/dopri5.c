@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "msfp_model.h"
+#include "heat.h"
 
 #define NB MSFP_NB
 #define STAGES 7
@@ -76,6 +77,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
     if (status)
         return status;
     next->t = run->now.t + h;
+    msfp_heat_finish(run);
     memcpy(next->q, at->q, sizeof next->q);
     memcpy(next->v, at->v, sizeof next->v);
     memcpy(next->a, last->a, sizeof next->a);
@@ -94,15 +96,18 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
     run->middle.share = 0.0;
     memset(&at, 0, sizeof at);
+    msfp_heat_begin(run);
     memcpy(k[0].v, run->now.v, sizeof k[0].v);
     memcpy(k[0].a, run->now.a, sizeof k[0].a);
     memcpy(k[0].f, run->now.df, sizeof k[0].f);
     for (int i = 1; i < STAGES; ++i) {
         msfp_point_at(run, run->now.t + c[i] * h, &at);
         combine(&run->now, k, a[i], i, h, &at);
+        msfp_heat_prepare(run, a[i], i, h, 0.0, &at);
         const int status = slope_at(run, &at, &k[i]);
         if (status)
             return status;
+        msfp_heat_stage(run, i, 0.0);
     }
     for (int i = 0; i < STAGES; ++i)
         for (int b = 0; b < NB; ++b) {
@@ -113,6 +118,6 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
             for (int d = 0; d < 2; ++d)
                 df[b][d] += h * e[i] * k[i].f[b][d];
         }
-    *error = msfp_error_norm(run, dq, dv, df);
+    *error = fmax(msfp_error_norm(run, dq, dv, df), msfp_heat_error(run, e, STAGES, h, 0.0));
     return finish(run, &at, &k[STAGES - 1], h);
 }

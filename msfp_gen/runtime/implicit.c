@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 #include "msfp_model.h"
+#include "heat.h"
 
 #define DOF MSFP_DOF
 #define NB MSFP_NB
@@ -212,6 +213,7 @@ static int stage(msfp_run *run, stages *s, int i, double h)
 {
     prepare(run, s, i, h);
     msfp_point_at(run, run->now.t + method.c[i] * h, &s->at);
+    msfp_heat_prepare(run, method.a[i], i, h, s->beta, &s->at);
     int status = MSFP_E_NEWTON;
     for (int attempt = 0; attempt < 2 && status == MSFP_E_NEWTON; ++attempt) {
         guess(run, s, i, h, (run->restart ? 1 : 0) == attempt);
@@ -224,11 +226,13 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     memcpy(s->a[i], s->at.a, sizeof s->a[i]);
     if (i == 1) {
         run->middle.share = method.c[i];
+        msfp_heat_middle(run);
         memcpy(run->middle.q, s->at.q, sizeof run->middle.q);
         memcpy(run->middle.v, s->at.v, sizeof run->middle.v);
         memcpy(run->middle.f, s->f, sizeof run->middle.f);
     }
     msfp_friction_rates(&run->work, s->df[i]);
+    msfp_heat_stage(run, i, s->beta);
     msfp_powers(&run->parameters, &s->at, s->f, &run->work, s->power[i]);
     return MSFP_OK;
 }
@@ -294,6 +298,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
     memcpy(s.power[0], now->power, sizeof s.power[0]);
+    msfp_heat_begin(run);
     double disc = 0.0;
     for (int i = 1; i < STAGES; ++i) {
         const int status = stage(run, &s, i, h);
@@ -302,6 +307,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
         disc = fmax(disc, beyond_disc(run, s.f));
     }
     next->t = now->t + h;
+    msfp_heat_finish(run);
     memcpy(next->q, s.at.q, sizeof next->q);
     memcpy(next->v, s.at.v, sizeof next->v);
     memcpy(next->a, s.at.a, sizeof next->a);
@@ -322,6 +328,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
             for (int d = 0; d < 2; ++d)
                 df[k][d] += h * method.e[i] * s.df[i][k][d];
         }
+    disc = fmax(disc, msfp_heat_error(run, method.e, STAGES, h, s.beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
     if (*error > 1.0) {
         const msfp_work converged = run->work;

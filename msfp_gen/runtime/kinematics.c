@@ -39,6 +39,8 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         out[MSFP_SURFACE_PARAMETERS_CC] = s[5];
         out[MSFP_SURFACE_PARAMETERS_RS] = slider[5];
         out[MSFP_SURFACE_PARAMETERS_PR] = slider[6];
+        for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* a law's numbers come last in both */
+            out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
         p->rim_cosine[j] = cos(s[1] / s[0]);
     }
     double *t = p->top;

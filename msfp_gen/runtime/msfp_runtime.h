@@ -11,7 +11,13 @@ extern "C" {
 
 /* ---- values: a bearing and its top ------------------------------------------------------- */
 
-#define MSFP_SURFACE_VALUES 6 /* R, s_c, mu, d_y, k_c, c_c */
+#ifndef MSFP_LAW /* the friction coefficient is constant */
+#define MSFP_LAW 0
+#define MSFP_LAW_VALUES 0
+#define MSFP_HEAT 0
+#endif
+
+#define MSFP_SURFACE_VALUES (6 + MSFP_LAW_VALUES) /* R, s_c, mu, d_y, k_c, c_c; numbers of a law of friction */
 #define MSFP_BODY_VALUES 7    /* l, z, m, J transverse, J axial, r, p; the base first (m, J, z unused) */
 #define MSFP_TOP_VALUES 10    /* k, c, k_rot, c_rot, m, J transverse, J axial, h, anchor x, anchor y */
 
@@ -25,7 +31,7 @@ typedef struct {
 } msfp_parameters;
 
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies /* [N][7] */,
-                         const double *surfaces /* [NB][6] */, const double *top /* [10] */);
+                         const double *surfaces /* [NB][SURFACE_VALUES] */, const double *top /* [10] */);
 
 /* ---- one evaluation ---------------------------------------------------------------------- */
 
@@ -35,6 +41,9 @@ typedef struct {
     double load[6];    /* force and moment that the outside applies to the top plate at r_nn */
     double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3];
     double f[MSFP_NB][2];
+#if MSFP_HEAT
+    double rise[MSFP_NB], warming; /* temperature above the start is rise + warming * flux */
+#endif
 } msfp_point;
 
 /* How q, v, a follow the unknown of a step (columns of the tangent) and Y, Z their stage formula
@@ -54,6 +63,9 @@ typedef struct {
     double contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB];
+#if MSFP_LAW
+    double coefficient[MSFP_NB][MSFP_COEFFICIENT_SIZE]; /* mu: what Newton starts from; 0 does */
+#endif
     double lock[MSFP_NB]; /* axial moments that hold phi'' = 0 where spin is locked */
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
@@ -136,6 +148,7 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 /* ---- runs ----------------------------------------------------------------------------------- */
 
 enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1 };
+#define MSFP_STAGES 7 /* at most */
 
 typedef struct {
     int method;
@@ -162,6 +175,12 @@ typedef struct {
     double base[3], top[3], top_force[3], top_moment[3];
     double kinetic, potential, restraint, rim_stored;
     double work[MSFP_WORKS];
+#if MSFP_LAW
+    double mu[MSFP_NB];
+#endif
+#if MSFP_HEAT
+    double temperature[MSFP_NB];
+#endif
 } msfp_row;
 #define MSFP_ROW_SIZE (sizeof(msfp_row) / sizeof(double))
 
@@ -177,12 +196,18 @@ typedef struct {
     double t;
     double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2], df[MSFP_NB][2];
     double work[MSFP_WORKS], power[MSFP_WORKS];
+#if MSFP_HEAT
+    double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
+#endif
 } msfp_state;
 
 /* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
 typedef struct {
     double share; /* of the step */
     double q[MSFP_NB][3], v[MSFP_NB][3], f[MSFP_NB][2];
+#if MSFP_HEAT
+    double heat[MSFP_NB][MSFP_HEAT];
+#endif
 } msfp_middle;
 
 typedef struct {
@@ -194,6 +219,11 @@ typedef struct {
     msfp_state now, next;
     msfp_middle middle;
     msfp_work work;
+#if MSFP_HEAT
+    struct { /* of the step in progress: what the stages before leave, the stage itself, and all their rates */
+        double before[MSFP_NB][MSFP_HEAT], heat[MSFP_NB][MSFP_HEAT], rates[MSFP_STAGES][MSFP_NB][MSFP_HEAT];
+    } step;
+#endif
     double h, previous_error, output_time;
     double start[3]; /* r_01 - r_nn at the start */
     double events_now[MSFP_NB + 1]; /* event functions at the present state */

@@ -35,13 +35,24 @@ static void energies(const msfp_parameters *p, const msfp_point *at, const msfp_
     total[2] += one[MSFP_ENERGY_POWER];
 }
 
+static double friction_coefficient(const double *par, const double *contact)
+{
+#if MSFP_LAW
+    (void)par;
+    return contact[MSFP_CONTACT_MU];
+#else
+    (void)contact;
+    return par[MSFP_SURFACE_PARAMETERS_MU];
+#endif
+}
+
 /* Friction of one surface: mu N f . slip, split into what Y, Z store and what is lost (3.16)-(3.18). */
 static void friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost)
 {
     const double u = contact[MSFP_CONTACT_U], v = msfp_contact_v(contact);
     const double yu = f[0] * u, zv = f[1] * v, square = f[0] * f[0] + f[1] * f[1];
     const double drive = MSFP_ISOTROPIC ? fmax(yu + zv, 0.0) : fmax(yu, 0.0) + fmax(zv, 0.0);
-    const double force = par[MSFP_SURFACE_PARAMETERS_MU] * contact[MSFP_CONTACT_N];
+    const double force = friction_coefficient(par, contact) * contact[MSFP_CONTACT_N];
     *lost += force * square * drive - msfp_contact_drill(contact);
     *stored += force * (yu + zv - square * drive);
 }
@@ -137,6 +148,9 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
     msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } } };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
+#if MSFP_LAW
+    memset(w->coefficient, 0, sizeof w->coefficient);
+#endif
     msfp_condensed(p, at, &seed, w, f, residual, NULL);
     msfp_record(p, at, w, row);
 }
@@ -160,6 +174,12 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
         row->slip[j][0] = contact[MSFP_CONTACT_U];
         row->slip[j][1] = msfp_contact_v(contact);
         msfp_force_F_get(w->force[j], row->force[j]);
+#if MSFP_LAW
+        row->mu[j] = contact[MSFP_CONTACT_MU];
+#endif
+#if MSFP_HEAT
+        row->temperature[j] = contact[MSFP_CONTACT_T];
+#endif
     }
     memcpy(row->base, at->base[0], sizeof row->base);
     msfp_body_C_get(w->body[NB], row->top);

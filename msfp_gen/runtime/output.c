@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "run.h"
+#include "heat.h"
 
 /* ---- dense output ------------------------------------------------------------------------------------- */
 
@@ -36,6 +37,16 @@ void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
         for (int d = 0; d < 2; ++d)
             out->f[k][d] = inside(a->f[k][d], a->df[k][d], m->f[k][d], b->f[k][d], b->df[k][d], h, m->share, s);
     }
+#if MSFP_HEAT
+    double da[NB][MSFP_HEAT], db[NB][MSFP_HEAT];
+    msfp_heat_rates(a->heat, a->flux, da);
+    msfp_heat_rates(b->heat, b->flux, db);
+    for (int k = 0; k < NB; ++k) {
+        out->flux[k] = (1.0 - s) * a->flux[k] + s * b->flux[k];
+        for (int i = 0; i < MSFP_HEAT; ++i)
+            out->heat[k][i] = inside(a->heat[k][i], da[k][i], m->heat[k][i], b->heat[k][i], db[k][i], h, m->share, s);
+    }
+#endif
     for (int i = 0; i < MSFP_WORKS; ++i)
         out->work[i] = hermite(a->work[i], a->power[i], b->work[i], b->power[i], h, s);
 }
@@ -48,6 +59,7 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
     memcpy(at->v, s->v, sizeof at->v);
     memcpy(at->a, s->a, sizeof at->a);
     memcpy(at->f, s->f, sizeof at->f);
+    msfp_heat_point(s, at);
 }
 
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)

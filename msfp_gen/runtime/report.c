@@ -71,8 +71,11 @@ static void report_surface(const msfp_parameters *p, const msfp_point *at, msfp_
     msfp_rim_force(p, w, j, tangent ? drim : NULL);
     if (!tangent) {
         msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j]);
-        msfp_report_contact(p->surface[j], s->contact[j], f, w->local[j], out);
+        msfp_report_contact(p->surface[j], s->contact[j], f, w->local[j] LAW(w->coefficient[j]), out);
         memcpy(w->contact[j] + MSFP_CONTACT_DY, out + MSFP_REPORT_CONTACT_DY, FRICTION * sizeof *out);
+#if MSFP_HEAT
+        w->contact[j][MSFP_CONTACT_FLUX] = out[MSFP_REPORT_CONTACT_FLUX];
+#endif
     }
     double dlocal[MSFP_LOCAL_SIZE * DOF], dout[MSFP_REPORT_CONTACT_SIZE * DOF];
     if (tangent) {
@@ -80,7 +83,7 @@ static void report_surface(const msfp_parameters *p, const msfp_point *at, msfp_
         /* Only the slip rotation of the local block is used here: the force is made from the unknowns. */
         msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[NB], w->rim[j], w->local[j],
                                    w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[NB], drf, dlocal);
-        msfp_report_contact_tangent(p->surface[j], s->contact[j], f, w->local[j], out, s->dcontact[j], s->dfriction[j], dlocal, dout);
+        msfp_report_contact_tangent(p->surface[j], s->contact[j], f, w->local[j] LAW(w->coefficient[j]), out, s->dcontact[j], s->dfriction[j], dlocal, dout);
     }
     for (int r = 0; r < VECTOR; ++r)
         force[r] = out[r] + w->rim[j][r];
@@ -134,6 +137,9 @@ void msfp_report(const msfp_parameters *p, const msfp_point *given, const double
     spread(unknowns, &at, s.contact);
     msfp_kinematics(p, &at, w);
     msfp_top(p, &at, w);
+#if MSFP_LAW
+    msfp_surroundings(&at, w);
+#endif
     for (int j = 0; j < NB; ++j)
         report_surface(p, &at, w, &s, j, 0);
     for (int k = 1; k <= NB; ++k) {

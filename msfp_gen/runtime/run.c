@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "run.h"
+#include "heat.h"
 
 #define SMALLEST_STEP 1e-9 /* [s], far below any period of a bearing */
 
@@ -162,6 +163,7 @@ static int settle(msfp_run *run)
         return status;
     memcpy(run->now.a, at.a, sizeof at.a);
     msfp_friction_rates(&run->work, run->now.df);
+    msfp_heat_settle(run);
     msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
     run->have_unknowns = 0;
     run->restart = 1;

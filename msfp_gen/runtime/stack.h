@@ -10,6 +10,11 @@
 #define MOMENT MSFP_MOMENT_SIZE /* components of a moment */
 #define FRICTION MSFP_FRICTION_SIZE
 #define PAIR (MSFP_PLANAR ? 1 : 2) /* tilts of a body */
+#if MSFP_LAW
+#define LAW(...) , __VA_ARGS__ /* one more argument where the friction coefficient is an unknown */
+#else
+#define LAW(...)
+#endif
 
 /* Field of block coordinates: angle i of order 0, 1, 2. */
 static inline int coordinate(int order, int i) { return MSFP_PLANAR ? order : 3 * order + i; }
@@ -25,5 +30,9 @@ void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work 
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
 int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent);
+#if MSFP_LAW
+/* Temperature of the surfaces, and a sound value for Newton to start from. */
+void msfp_surroundings(const msfp_point *at, msfp_work *w);
+#endif
 
 #endif

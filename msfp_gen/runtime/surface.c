@@ -71,15 +71,39 @@ void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dfo
 }
 
 
-#define ROWS (MOMENT + FRICTION + 1) /* rows of the contact's tangent: M, dY, dZ, N */
-#define ACTIONS (MOMENT + 1)         /* what is condensed: M and N */
+#define OWN (FRICTION + MSFP_LAW) /* local unknowns: Y, Z, and mu where it follows a law */
+#define ROWS (MOMENT + OWN + 1)  /* rows of the contact's tangent: M, dY, dZ, mu, N */
+#define ACTIONS (MOMENT + 1)     /* what is condensed: M and N */
+#if MSFP_HEAT
+#define SLOPE(out) (out)[MSFP_CONTACT_MM] /* d mu/d mu by its law: friction heats */
+#else
+#define SLOPE(out) 0.0
+#endif
 
-static void contact_tangent(const double *par, const double *local, const double *f, double *out, double *jacobian)
+#if MSFP_LAW
+void msfp_surroundings(const msfp_point *at, msfp_work *w)
 {
-    double seed[(MSFP_LOCAL_SIZE + FRICTION) * MSFP_LOCAL] = { 0 }, full[MSFP_CONTACT_SIZE * MSFP_LOCAL];
+    for (int j = 0; j < NB; ++j) {
+        double *x = w->coefficient[j];
+#if MSFP_HEAT
+        x[MSFP_COEFFICIENT_RISE] = at->rise[j];
+        x[MSFP_COEFFICIENT_WARMING] = at->warming;
+#else
+        (void)at;
+#endif
+        if (!(fabs(x[MSFP_COEFFICIENT_MU]) < 1e3)) /* left by a failed step */
+            x[MSFP_COEFFICIENT_MU] = 0.0;
+    }
+}
+#endif
+
+static void contact_tangent(const double *par, const double *local, const double *f LAW(const double *x), double *out, double *jacobian)
+{
+    double seed[(MSFP_LOCAL_SIZE + OWN) * MSFP_LOCAL] = { 0 }, full[MSFP_CONTACT_SIZE * MSFP_LOCAL];
     for (int i = 0; i < MSFP_LOCAL; ++i)
         seed[i * MSFP_LOCAL + i] = 1.0;
-    msfp_contact_tangent(par, local, f, out, seed, seed + MSFP_LOCAL_SIZE * MSFP_LOCAL, full);
+    msfp_contact_tangent(par, local, f LAW(x), out, seed, seed + MSFP_LOCAL_SIZE * MSFP_LOCAL
+                         LAW(seed + (MSFP_LOCAL_SIZE + FRICTION) * MSFP_LOCAL), full);
     memcpy(jacobian, full, ROWS * MSFP_LOCAL * sizeof *jacobian);
 }
 
@@ -97,18 +121,23 @@ static int solve_small(const double *a, double *b)
     return determinant != 0.0;
 }
 
-/* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation. Newton with the
- * derivative at constant slip velocity (the contact point hardly moves with Y, Z), halved while it does not help. */
-static int friction_stage(const double *par, const double *local, const double *fp, double beta, double accuracy, double *f, double *out)
+/* Y, Z of one surface from their stage formula f = fp + beta df/dt, at a given force and slip rotation, and mu from its
+ * law. Newton with the derivative at constant slip velocity and N (the contact point hardly moves with Y, Z, mu), halved
+ * while it does not help. */
+static int friction_stage(const double *par, const double *local, const double *fp, double beta, double accuracy, double *f LAW(double *x), double *out)
 {
-    double g[FRICTION], a[FRICTION * FRICTION], step[FRICTION] = { 0 }, best = INFINITY;
+    double g[FRICTION], a[FRICTION * FRICTION], step[OWN] = { 0 }, best = INFINITY;
     for (int i = 0; i < 60; ++i) {
-        msfp_contact(par, local, f, out);
+        msfp_contact(par, local, f LAW(x), out);
         double size = 0.0;
         for (int r = 0; r < FRICTION; ++r) {
             g[r] = f[r] - fp[r] - beta * out[MSFP_CONTACT_DY + r];
             size = fmax(size, fabs(g[r]));
         }
+#if MSFP_LAW
+        const double excess = x[MSFP_COEFFICIENT_MU] - out[MSFP_CONTACT_MU];
+        size = fmax(size, fabs(excess));
+#endif
         if (!(size < INFINITY))
             return MSFP_E_FINITE;
         if (size <= accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY])))
@@ -122,6 +151,10 @@ static int friction_stage(const double *par, const double *local, const double *
             for (int c = 0; c < FRICTION; ++c)
                 a[r * FRICTION + c] = (r == c) - beta * out[MSFP_CONTACT_YY + r * FRICTION + c];
         }
+#if MSFP_LAW
+        step[FRICTION] = overshot ? 0.5 * step[FRICTION] : excess / (1.0 - SLOPE(out));
+        x[MSFP_COEFFICIENT_MU] += overshot ? step[FRICTION] : -step[FRICTION];
+#endif
         if (!overshot) {
             best = size;
             if (!solve_small(a, step))
@@ -133,23 +166,32 @@ static int friction_stage(const double *par, const double *local, const double *
     return MSFP_E_NEWTON;
 }
 
-/* Jacobian of the moment and of N with Y, Z following their stage formula: [ACTIONS][MSFP_LOCAL_SIZE]. */
-static int condense(const double *par, const double *local, const double *f, double beta, double *out, double *condensed)
+/* Jacobian of the moment and of N with Y, Z following their stage formula and mu its law: [ACTIONS][MSFP_LOCAL_SIZE]. */
+static int condense(const double *par, const double *local, const double *f LAW(const double *x), double beta, double *out, double *condensed)
 {
-    double jacobian[ROWS * MSFP_LOCAL], a[FRICTION * FRICTION], b[FRICTION];
-    contact_tangent(par, local, f, out, jacobian);
-    for (int r = 0; r < FRICTION; ++r)
-        for (int c = 0; c < FRICTION; ++c)
-            a[r * FRICTION + c] = (r == c) - beta * jacobian[(MOMENT + r) * MSFP_LOCAL + MSFP_LOCAL_SIZE + c];
+    double jacobian[ROWS * MSFP_LOCAL], a[OWN * OWN], b[OWN];
+    contact_tangent(par, local, f LAW(x), out, jacobian);
+    for (int r = 0; r < OWN; ++r)
+        for (int c = 0; c < OWN; ++c)
+            a[r * OWN + c] = (r == c) - (r < FRICTION ? beta : 1.0) * jacobian[(MOMENT + r) * MSFP_LOCAL + MSFP_LOCAL_SIZE + c];
+#if MSFP_LAW
+    int pivots[OWN];
+    if (!msfp_lu(a, OWN, pivots))
+        return MSFP_E_NEWTON;
+#endif
     for (int k = 0; k < MSFP_LOCAL_SIZE; ++k) {
-        for (int r = 0; r < FRICTION; ++r)
-            b[r] = beta * jacobian[(MOMENT + r) * MSFP_LOCAL + k];
+        for (int r = 0; r < OWN; ++r)
+            b[r] = (r < FRICTION ? beta : 1.0) * jacobian[(MOMENT + r) * MSFP_LOCAL + k];
+#if MSFP_LAW
+        msfp_lu_solve(a, OWN, pivots, b);
+#else
         if (!solve_small(a, b))
             return MSFP_E_NEWTON;
+#endif
         for (int r = 0; r < ACTIONS; ++r) {
-            const double *row = jacobian + (r < MOMENT ? r : MOMENT + FRICTION) * MSFP_LOCAL;
+            const double *row = jacobian + (r < MOMENT ? r : MOMENT + OWN) * MSFP_LOCAL;
             double sum = row[k];
-            for (int c = 0; c < FRICTION; ++c)
+            for (int c = 0; c < OWN; ++c)
                 sum += row[MSFP_LOCAL_SIZE + c] * b[c];
             condensed[r * MSFP_LOCAL_SIZE + k] = sum;
         }
@@ -171,9 +213,9 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
                                    w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
         msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
-    int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f, w->contact[j]);
+    int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f LAW(w->coefficient[j]), w->contact[j]);
     if (status == MSFP_OK && tangent)
-        status = condense(par, w->local[j], f, seed->beta, w->contact[j], condensed);
+        status = condense(par, w->local[j], f LAW(w->coefficient[j]), seed->beta, w->contact[j], condensed);
     if (status)
         return status;
     for (int r = 0; r < MOMENT; ++r)

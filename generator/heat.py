@@ -1,0 +1,33 @@
+"""The heat of friction: the kernel 1/sqrt(t) of a half-space as a sum of exponentials, each one state of a surface.
+
+T = T_0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau) over tau (Carslaw and Jaeger; Kumar et al. 2015). With
+1/sqrt(tau) = sum of w_i exp(-lambda_i tau) it becomes T = T_0 + sum of h_i with dh_i/dt = -lambda_i h_i + w_i flux.
+
+Rates go in geometric progression; weights are those with the least relative error over [SHORTEST, LONGEST], none
+negative, and with the exact integral over [0, SHORTEST]. `benchmarks/heat_kernel.py` fits them.
+"""
+
+from __future__ import annotations
+
+SHORTEST, LONGEST = 1e-3, 1e3
+"""Times between which the sum is a fit [s]; after the last of them heat is forgotten."""
+HEAT_ERROR = 1.8e-3
+"""Bound of the relative error between them."""
+
+HEAT_KERNEL: tuple[tuple[float, float], ...] = (
+    (6.0000000000e+03, 1.2078817073e+02),
+    (1.6832329748e+03, 2.8458871434e+01),
+    (4.7221220791e+02, 1.5622216602e+01),
+    (1.3247385991e+02, 8.3021979222e+00),
+    (3.7164061550e+01, 4.3187491334e+00),
+    (1.0425962313e+01, 2.3486816271e+00),
+    (2.9248872599e+00, 1.2081621465e+00),
+    (8.2054444726e-01, 6.5997556553e-01),
+    (2.3019457849e-01, 3.3852067045e-01),
+    (6.4578517522e-02, 1.8581755062e-01),
+    (1.8116781693e-02, 9.3342760085e-02),
+    (5.0824607238e-03, 5.7161762604e-02),
+    (1.4258275806e-03, 1.0537004578e-02),
+    (4.0000000000e-04, 4.2786061899e-02),
+)
+"""(lambda_i [1/s], w_i [s^-1/2])."""
