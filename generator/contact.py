@@ -71,18 +71,19 @@ def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: 
     }
 
 
-def slip(p: Program, par: Symbols, base: Basis, dw: Vector) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """sign R, and the slip velocity (3.19), v~ = -sign R dw x t~_3: its components (2.98) by the triple product."""
+def slip(p: Program, law: Law, par: Symbols, base: Basis, f: Symbols, dw: Vector) -> tuple[sp.Expr, Symbols]:
+    """Sign R; and the slip velocity (3.19), (2.98) with the Bouc-Wen rates (3.18)."""
+    t1, t2, _ = base
     sliding = p.let(par["sign"] * par["R"])
-    return sliding, p.let(-sliding * dot(dw, base[1]), "u"), p.let(sliding * dot(dw, base[0]), "v")
+    # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
+    u, v = p.let(-sliding * dot(dw, t2), "u"), p.let(sliding * dot(dw, t1), "v")
+    return sliding, {**bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"]), "u": u, "v": v}
 
 
-def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector,
-             at: tuple[sp.Expr, sp.Expr, sp.Expr]) -> Symbols:  # fmt: skip
-    """Bouc-Wen rates (3.18) and the moment of the contact about the sphere centre, at a `slip`."""
+def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector, sliding: sp.Expr
+             ) -> Symbols:  # fmt: skip
+    """The moment of the contact about the sphere centre, and the power of its drilling part."""
     t1, t2, t3 = base
-    sliding, u, v = at
-    rates = bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"])
     # (3.14)-(3.17): the normal force passes through the centre; -sign R t~_3 x F_f is what is left.
     arm = p.let(sliding * par["mu"] * N)
     moment = add(scale(p.let(arm * f["Y"]), t2), scale(p.let(-arm * f["Z"]), t1))
@@ -92,7 +93,7 @@ def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Sym
         size = p.let(-sp.Rational(2, 3) * par["mu"] * par["rs"] * N * spin / sp.sqrt(spin**2 + SPIN_SMOOTHING**2))
         moment = add(moment, scale(size, t3))
         drill = p.let(size * spin)
-    return {"M": p.let_vector(moment, "M"), **rates, "u": u, "v": v, "drill": drill}
+    return {"M": p.let_vector(moment, "M"), "drill": drill}
 
 
 def report_contact(b: Blocks, law: Law) -> Program:
@@ -103,9 +104,9 @@ def report_contact(b: Blocks, law: Law) -> Program:
     f: Symbols = p.read(b.friction, "f")
     loc: Symbols = p.read(b.local, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(g(x[a])) for a in ("psi", "theta") for g in (sp.sin, sp.cos)))
-    at = slip(p, par, base, loc["dw"])
-    par, heat = laws.stated(p, b, law.coefficient, par, loc, x["N"], *at[1:])
-    out = friction(p, law, par, base, x["N"], f, loc["dw"], at)
+    sliding, rates = slip(p, law, par, base, f, loc["dw"])
+    par, heat = laws.stated(p, b, law.coefficient, par, loc, x["N"], f, rates)
+    out = {**rates, **friction(p, law, par, base, x["N"], f, loc["dw"], sliding)}
     t1, t2, t3 = base
     mu_n = p.let(-par["mu"] * x["N"])
     force = add(scale(x["N"], t3), scale(p.let(mu_n * f["Y"]), t1), scale(p.let(mu_n * f["Z"]), t2))  # (3.15)-(3.17)
@@ -145,8 +146,9 @@ def contact(b: Blocks, law: Law) -> Program:
     given = laws.unknown(p, b, law.coefficient, par)
     N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], f)
     base = contact_basis(p, sp_, cp_, st_, ct_)
-    out = friction(p, law, given, base, N, f, loc["dw"], slip(p, par, base, loc["dw"]))
-    out |= laws.lawful(p, law.coefficient, par, given, loc, N, out)
+    sliding, rates = slip(p, law, par, base, f, loc["dw"])
+    out = {**rates, **friction(p, law, given, base, N, f, loc["dw"], sliding)}
+    out |= laws.lawful(p, law.coefficient, par, given, loc, N, f, rates)
     p.write(
         b.contact,
         {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},

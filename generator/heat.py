@@ -9,7 +9,9 @@ negative, and with the exact integral over [0, SHORTEST]. `benchmarks/heat_kerne
 
 from __future__ import annotations
 
-SHORTEST, LONGEST = 1e-3, 1e3
+from msfp_gen.friction_laws import HEAT_TIMES
+
+SHORTEST, LONGEST = HEAT_TIMES
 """Times between which the sum is a fit [s]; after the last of them heat is forgotten."""
 HEAT_ERROR = 1.8e-3
 """Bound of the relative error between them."""

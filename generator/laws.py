@@ -21,8 +21,7 @@ from .functions import Modulus, Step
 from .program import Block, Field, Program
 
 Symbols = dict[str, Any]
-SLIP_SMOOTHING = sp.Float("1e-6")
-"""[m/s]: rounds |slip| where it vanishes, by at most itself."""
+Sliding = tuple[sp.Expr, sp.Expr, sp.Expr]
 EDGE = sp.Rational(1, 10)
 """The patch leaves the centre while (x/reach)^2 goes from 1 - EDGE to 1 + EDGE: 5 % of the way on either side."""
 
@@ -37,7 +36,7 @@ NUMBERS: dict[str, tuple[str, str]] = {
     "reach": ("m", "how far from the centre of the surface the patch still covers it"),
     "heating": ("K s^1/2 m^2/J", "sqrt(D/pi)/k of the half-space that is heated"),
     "start_temperature": ("degC", "temperature at the start"),
-    **{name: ("SI", "parameter of the law") for name in COEFFICIENTS},
+    **dict.fromkeys(COEFFICIENTS, ("SI", "parameter of the law")),
 }
 UNKNOWN = [
     Field("mu", "-", "friction coefficient, solved for with Y and Z"),
@@ -59,6 +58,8 @@ def with_law(b: Blocks, law: Law | None) -> Blocks:
     if law is None:
         return b
     contact = extended(b.contact, [Field("mu", "-", "friction coefficient by its law")], before="N")
+    slopes = [Field(f"law_{f.name}", "-", f"d mu/d{f.name} at constant N and slip") for f in b.friction.fields]
+    contact = extended(contact, slopes)
     b = replace(
         b,
         surface_parameters=extended(b.surface_parameters, [Field(name, *NUMBERS[name]) for name in law.columns]),
@@ -67,7 +68,7 @@ def with_law(b: Blocks, law: Law | None) -> Blocks:
     )
     if not law.heats:
         return b
-    heat = [FLUX, Field("T", "degC", "temperature at the centre"), Field("MM", "-", "d mu/d mu at constant N and slip")]
+    heat = [FLUX, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
     return replace(
         b,
         local=extended(b.local, [Field("tilt", "-", "cosine of the angle between the axes of the two bodies")]),
@@ -85,51 +86,69 @@ def unknown(p: Program, b: Blocks, law: Law | None, par: Symbols) -> Symbols:
     return {**par, "mu": c["mu"], "law": c}
 
 
-def lawful(p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, out: Symbols) -> Symbols:
+def lawful(p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, f: Symbols,
+           slip: Symbols) -> Symbols:  # fmt: skip
     """What the law adds to the results of `contact`: its mu, and with heat the flux, the temperature and d mu/d mu."""
     if law is None:
         return {}
-    c = given["law"]
-    feels = surroundings(p, law, par, N, out["u"], out["v"])
-    if not law.heats:
-        return {"mu": coefficient(p, law, par, feels)}
-    share = heat_share(p, par, feels, loc)
-    flux = p.let(c["mu"] * share, "flux")
-    T = p.let(par["start_temperature"] + c["rise"] + c["warming"] * flux, "T")
-    mu = coefficient(p, law, par, {**feels, "T": T})
-    return {"mu": mu, "flux": flux, "T": T, "MM": p.let(by(p, mu, T) * c["warming"] * share)}
+    c, motion = given["law"], sliding(p, f, slip)
+    feels = surroundings(p, law, par, N, motion)
+    more: Symbols = {}
+    if law.heats:
+        share = heat_share(p, par, feels, loc)
+        more["flux"] = p.let(c["mu"] * share, "flux")
+        feels["T"] = more["T"] = p.let(par["start_temperature"] + c["rise"] + c["warming"] * more["flux"], "T")
+    mu = more["mu"] = coefficient(p, law, par, feels)
+    if law.heats:
+        more["law_mu"] = p.let(by(p, mu, feels["T"]) * c["warming"] * share)
+    slope, (square, along, slides) = by(p, mu, feels["v"]), motion
+    for name, velocity in (("Y", slip["u"]), ("Z", slip["v"])):
+        if f[name] != 0:
+            more[f"law_{name}"] = p.let(slope * slides * (2 * f[name] * along + square * velocity))
+    return more
 
 
-def stated(p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, u: sp.Expr, v: sp.Expr
-           ) -> tuple[Symbols, Symbols]:  # fmt: skip
+def stated(p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, f: Symbols,
+           slip: Symbols) -> tuple[Symbols, Symbols]:  # fmt: skip
     """The same at given N and slip: the parameters with mu by its law, and what that adds to `report_contact`."""
     if law is None:
         return par, {}
     assert b.coefficient is not None
     c: Symbols = p.read(b.coefficient, "c", active=False)
-    feels = surroundings(p, law, par, N, u, v)
+    feels = surroundings(p, law, par, N, sliding(p, f, slip))
     if not law.heats:
         return {**par, "mu": coefficient(p, law, par, feels)}, {}
     mu = coefficient(p, law, par, {**feels, "T": p.let(par["start_temperature"] + c["rise"], "T")})
     return {**par, "mu": mu}, {"flux": mu * heat_share(p, par, feels, loc)}
 
 
-def surroundings(p: Program, law: Law, par: Symbols, N: sp.Expr, u: sp.Expr, v: sp.Expr) -> Symbols:
-    """Slip velocity, normal force and pressure that a law may depend on."""
-    square = p.let(u**2 + v**2)
-    speed = p.let(square / (sp.sqrt(square + SLIP_SMOOTHING**2) + SLIP_SMOOTHING), "speed")
+def surroundings(p: Program, law: Law, par: Symbols, N: sp.Expr, motion: Sliding) -> Symbols:
+    """Sliding velocity, normal force and pressure that a law may depend on."""
+    speed = p.let(sp.Mul(*motion), "speed")
     pressure = {"p": p.let(N / par["area"], "pressure")} if "patch_radius" in law.takes else {}
     return {"N": N, "v": speed, **pressure}
 
 
+def sliding(p: Program, f: Symbols, slip: Symbols) -> Sliding:
+    """Y^2 + Z^2, Y u + Z v and whether that is positive. Their product is the sliding velocity: the slip less what Y, Z
+    give back, by the isotropic law; in steady sliding |slip| itself.
+
+    With |slip| friction would grow against its own direction where a surface unloads, and push: light sliders would run
+    away. So it would with the switches per axis, across the slip.
+    """
+    along = p.let(f["Y"] * slip["u"] + f["Z"] * slip["v"])
+    return p.let(f["Y"] ** 2 + f["Z"] ** 2), along, p.let(Step(along))
+
+
 def coefficient(p: Program, law: Law, par: Symbols, feels: Symbols) -> sp.Expr:
-    """mu by the formula of the law, every step of it named."""
+    """Mu by the formula of the law, every step of it named."""
     return p.let(fold(law.tree, {**par, **feels}, operations(p)), "mu")
 
 
 def heat_share(p: Program, par: Symbols, feels: Symbols, loc: Symbols) -> sp.Expr:
     """The flux over mu: p v sqrt(D/pi)/k while the patch covers the centre of the surface, which is where the
-    temperature is. The distance of its own centre is R sin of the tilt."""
+    temperature is. The distance of its own centre is R sin of the tilt.
+    """
     away = p.let((par["R"] / par["reach"]) ** 2 * (1 - loc["tilt"] ** 2))
     z = p.let((1 - away) / EDGE)
     inside, within = p.let(Step(z + 1)), p.let(Step(z - 1))

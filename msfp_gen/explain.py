@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.bearing import Surface
 from msfp_gen.fields import Quantity, ruled_fields
+from msfp_gen.friction_laws import numbers
 from msfp_gen.tables import Table, vector, yes
 
 if TYPE_CHECKING:
@@ -32,6 +34,9 @@ MEANINGS: dict[tuple[str, object], str] = {
     ("bouc_wen", "report"): "switches for each axis (2.94)-(2.98)",
     ("bouc_wen", "isotropic"): "one switch along the slip, the same in every direction",
     ("friction", "constant"): "the friction coefficient does not change",
+    ("friction", "velocity"): "it rises with the sliding velocity, exponentially from friction_slow to friction",
+    ("friction", "pvt"): "it follows pressure, velocity and temperature (Kumar et al. 2015)",
+    ("friction", "custom"): "it follows the formula below",
 }
 SURFACE_COLUMNS = {
     "R [mm]": ("radius", 1e3),
@@ -64,7 +69,7 @@ def explain(scene: Scene) -> list[Table]:
     """Tables that describe `scene`: bearing, motion, top, effects with their meaning, and solver."""
     return [
         _surfaces(scene.bearing), _bodies(scene.bearing), _motion(scene.motion), _top(scene.top),
-        _effects(scene.effects), _solver(scene),
+        _effects(scene.effects), *_laws(scene), _solver(scene),
     ]  # fmt: skip
 
 
@@ -114,9 +119,23 @@ def _top(top: Top) -> Table:
 
 
 def _effects(effects: Effects) -> Table:
-    chosen = {field.name: getattr(effects, field.name) for field in fields(effects)}
+    chosen = {field.name: getattr(effects, field.name) for field in fields(effects) if field.name != "friction_law"}
     rows = [(name, _value(value), MEANINGS[name, value]) for name, value in chosen.items()]
+    if effects.law is not None:
+        rows.append(("", "mu =", effects.law.text))
     return Table("effects", (), rows)
+
+
+def _laws(scene: Scene) -> list[Table]:
+    """The numbers of each surface in the law of friction, defaults put in."""
+    law, bearing = scene.effects.law, scene.bearing
+    if law is None:
+        return []
+    rows = [numbers(law, bearing, index) for index in range(len(bearing.surfaces))]
+    units = {name: rule.unit for name, rule, _ in ruled_fields(Surface) if isinstance(rule, Quantity)}
+    names = {name: f"{name} [{units[name]}]" if units[name] else name for name in law.takes}
+    lines = [(shown, *(f"{row[name]:.4g}" for row in rows)) for name, shown in names.items()]
+    return [Table("law of friction, surfaces bottom first", ("", *map(str, range(1, len(rows) + 1))), lines)]
 
 
 def _solver(scene: Scene) -> Table:

@@ -8,7 +8,7 @@ a pressure or a temperature. The generator derives from the same formula.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import pi, sqrt
@@ -32,6 +32,7 @@ VARIABLES: dict[str, tuple[str, np.ndarray[Any, np.dtype[np.float64]]]] = {
 }
 # Numbers of a surface that a variable brings with it, with their defaults; the slider's rim gives the patch its radius.
 PATCH: dict[str, float | None] = {"patch_radius": None}
+HEAT_TIMES = (1e-3, 1e3)  # times over which the heat of friction is followed [s]
 HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
 
 
@@ -89,7 +90,8 @@ def law_of(word: str, text: str | None = None) -> Law | None:
         return BUILT_IN.get(word)
     if text is None:
         raise InputError(
-            "effects.friction_law is missing: friction = 'custom' needs a formula, such as 'mu * (1 - c1 * exp(-c2 * v))'"
+            "effects.friction_law is missing: friction = 'custom' needs a formula, "
+            "such as 'mu * (1 - c1 * exp(-c2 * v))'"
         )
     try:
         tree = parse(text, {"mu", *VARIABLES, *COEFFICIENTS})
@@ -111,10 +113,10 @@ def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
     for index, surface in enumerate(bearing.surfaces):
         for name in own_numbers():
             if name not in takes and getattr(surface, name) is not None:
-                users = [w for w, other in BUILT_IN.items() if name in other.takes] or ["custom"]
+                users = " or ".join(repr(w) for w, other in BUILT_IN.items() if name in other.takes) or "'custom'"
                 raise InputError(
                     f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
-                    f"effects.friction = {word!r} takes no such value; leave it out or give {' or '.join(map(repr, users))}"
+                    f"effects.friction = {word!r} takes no such value; leave it out or give {users}"
                 )
         if law is not None:
             _check_values(law, f"bearing.surfaces[{index}]", index, surface, numbers(law, bearing, index))
@@ -122,7 +124,7 @@ def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
 
 def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
     """The numbers of one surface (index from 0) by the names in `columns`, defaults put in. Raises InputError."""
-    surface, found = bearing.surfaces[index], {}
+    surface, found = bearing.surfaces[index], dict[str, float | None]()
     defaults = {**law.takes, "patch_radius": bearing.slider_rim_radius(index) or None}
     for name in law.takes:
         value = getattr(surface, name)
@@ -136,10 +138,11 @@ def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
     return {name: float(value) for name, value in {**found, **_derived(found)}.items() if value is not None}
 
 
-def _derived(found: Mapping[str, float | None]) -> Iterator[tuple[str, float]] | dict[str, float]:
+def _derived(found: Mapping[str, float | None]) -> dict[str, float]:
     """Area of the patch pi r^2; half the side of the square of that area, within which the patch covers the centre
-    (Kumar et al. 2015); and sqrt(D/pi)/k."""
-    out = {}
+    (Kumar et al. 2015); and sqrt(D/pi)/k.
+    """
+    out: dict[str, float] = {}
     if (radius := found.get("patch_radius")) is not None:
         out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
     if (k := found.get("conductivity")) is not None and (d := found.get("diffusivity")) is not None:

@@ -84,7 +84,9 @@ class History:
     top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
     energy: dict[str, Array]
     # Of models whose friction follows a law, and of those in which it heats; else None.
-    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu", ("friction",))] = None
+    friction_coefficient: Annotated[
+        Array | None, Rows(("surface",), "1", "friction coefficient mu", ("friction",))
+    ] = None
     temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
 
     def __post_init__(self) -> None:

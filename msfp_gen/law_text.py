@@ -192,7 +192,7 @@ def _unit(tree: ast.expr, names: Mapping[str, Unit], solver: _Solver) -> Unit:
     assert isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name)
     arguments = [_unit(argument, names, solver) for argument in tree.args]
     if tree.func.id in ("Min", "Max"):
-        return solver.same(*arguments, repr(text))
+        return solver.same(arguments[0], arguments[1], repr(text))
     if tree.func.id in ("sqrt", "Abs"):
         return Unit().plus(arguments[0], Fraction(1, 2) if tree.func.id == "sqrt" else Fraction(1))
     return solver.pure(arguments[0], f"the argument of {text!r}")

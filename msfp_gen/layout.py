@@ -72,8 +72,8 @@ class Effects:
     sliders: with their inertia, or massless (quasi-static).
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
-    friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature, or custom:
-    the formula in friction_law (docs/friction.md).
+    friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature ("pvt"),
+    or custom: the formula in friction_law (docs/friction.md).
     """
 
     dimension: Literal["spatial", "planar"] = "spatial"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.friction_laws import check_bearing
+from msfp_gen.friction_laws import check_bearing, numbers
 from msfp_gen.layout import ModelSpec
 from msfp_gen.packing import Array, bodies_and_surfaces, top_values, vector
 from msfp_gen.plane import State, into_plane, out_of_plane
@@ -41,7 +41,8 @@ class Evaluation:
     acceleration: ndarray, shape (n-1, 3), second derivatives of psi, theta, phi [rad/s^2]; None in a massless model,
     whose sliders have no acceleration of their own. normal_force (n-1,) [N]; contact_angles (n-1, 2) psi~, theta~
     [rad]; friction_rate (n-1, 2) dY/dt, dZ/dt [1/s]; interface_force (n-1, 3) on the body above [N]; slip_velocity
-    (n-1, 2) u~, v~ [m/s]; sliding, gap (n-1,) [m]. residual_norm: largest balance relative to its natural size
+    (n-1, 2) u~, v~ [m/s]; friction_coefficient (n-1,), None where it is constant; sliding, gap (n-1,) [m].
+    residual_norm: largest balance relative to its natural size
     (massless: moment over the largest normal force [m], how far the state is from equilibrium);
     determinant: sign of the determinant of the equations solved.
     """
@@ -52,6 +53,7 @@ class Evaluation:
     friction_rate: Array
     interface_force: Array
     slip_velocity: Array
+    friction_coefficient: Array | None
     sliding: Array
     gap: Array
     residual_norm: float
@@ -92,7 +94,8 @@ class Model:
         if bearing.layout != self.layout:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
         check_bearing(self.effects.law, self.effects.friction, bearing)
-        return self.extension.Stack(bearing.gravity, *bodies_and_surfaces(bearing, self.effects.law), top_values(top, anchor))
+        bodies, surfaces = bodies_and_surfaces(bearing, self.effects.law)
+        return self.extension.Stack(bearing.gravity, bodies, surfaces, top_values(top, anchor))
 
     def evaluate(
         self,
@@ -105,6 +108,7 @@ class Model:
         top_force: ArrayLike = ZERO,
         top_moment: ArrayLike = ZERO,
         base_rotation: Rotation | None = None,
+        temperature: ArrayLike | None = None,
         formulation: str = "condensed",
     ) -> Evaluation:
         """Accelerations, normal forces and friction rates at a state.
@@ -112,17 +116,18 @@ class Model:
         q, v: angles psi, theta, phi of bodies 2..n and rates, shape (n-1, 3) [rad], [rad/s]. h: Y, Z, shape (n-1, 2).
         base_acceleration (3,) [m/s^2]; top_force, top_moment (3,): what the outside applies to the top plate at r_nn
         [N], [N m]; base_rotation: (angles, rates, accelerations) of psi_1, theta_1, phi_1, each (3,).
+        temperature (n-1,) [degC], where friction depends on it; None: as at the start.
         formulation: "condensed" (contact in closed form), or "report" (Newton on all 6(n-1) unknowns).
         Raises InputError for bad shapes; RunError where no acceleration exists or none is found.
         """
         if formulation not in ("condensed", "report"):
             raise InputError(f"formulation = {formulation!r}: give 'condensed' or 'report'")
         state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
-        stack = self.stack(bearing)
+        stack, heat = self.stack(bearing), self._heat(bearing, temperature)
         if self.effects.sliders == "massless":
-            return self._quasistatic(stack, state)
+            return self._quasistatic(stack, state, heat)
         status, a, row, rates, residual, iterations, sign, _ = stack.accelerations(
-            state.q, state.v, state.f, state.base, state.load, report=formulation == "report"
+            state.q, state.v, state.f, state.base, state.load, report=formulation == "report", **heat
         )
         if status != "ok":
             raise RunError(
@@ -131,14 +136,25 @@ class Model:
             )
         return self._evaluation(state, a, row, rates, residual, iterations, sign)
 
-    def _quasistatic(self, stack: Any, state: State) -> Evaluation:
+    def _heat(self, bearing: Bearing, temperature: ArrayLike | None) -> dict[str, Array]:
+        """Temperature above the start, as the stack takes it."""
+        law = self.effects.law
+        if temperature is None:
+            return {}
+        if law is None or not law.heats:
+            raise InputError(f"temperature: effects.friction = {self.effects.friction!r} depends on none; leave it out")
+        count = self.layout.surfaces
+        start = [numbers(law, bearing, index)["start_temperature"] for index in range(count)]
+        return {"rise": vector(temperature, "temperature", (count,), "degC") - start}
+
+    def _quasistatic(self, stack: Any, state: State, heat: dict[str, Array]) -> Evaluation:
         zero = np.zeros_like(state.q)
         status, residual, _, _ = stack.condensed(
-            state.q, state.v, zero, state.f, state.base, state.load, 0.0, 0.0, 0.0, 0.0
+            state.q, state.v, zero, state.f, state.base, state.load, 0.0, 0.0, 0.0, 0.0, **heat
         )
         if status != "ok":
             raise RunError(f"evaluate: {FAILURES.get(status, status)}", status=status)
-        row, _, rates, pulling = stack.observe(state.q, state.v, zero, state.f, state.base, state.load)
+        row, _, rates, pulling = stack.observe(state.q, state.v, zero, state.f, state.base, state.load, **heat)
         if pulling:
             raise RunError(f"evaluate, surface {pulling}: {FAILURES['uplift']}", status="uplift")
         fields = self.unpack(row)
@@ -157,6 +173,7 @@ class Model:
             friction_rate=out_of_plane(rates, turn, "pair"),
             interface_force=out_of_plane(fields["force"], turn, "vector"),
             slip_velocity=out_of_plane(fields["slip"], turn, "pair"),
+            friction_coefficient=fields.get("mu"),
             sliding=fields["sliding"],
             gap=fields["gap"],
             residual_norm=float(residual),

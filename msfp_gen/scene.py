@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
-from msfp_gen.friction_laws import check_bearing
+from msfp_gen.friction_laws import HEAT_TIMES, check_bearing
 from msfp_gen.layout import Effects, ModelSpec
 from msfp_gen.motion import Motion
 from msfp_gen.solver import Solver
@@ -108,6 +108,12 @@ class Scene:
             raise InputError(
                 f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
                 "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
+            )
+        law = self.effects.law
+        if law is not None and law.heats and self.end > HEAT_TIMES[1]:
+            raise InputError(
+                f"duration = {self.end:.12g}: effects.friction = {self.effects.friction!r} follows the heat of "
+                f"friction for {HEAT_TIMES[1]:g} s; give at most that, or a law without temperature"
             )
         if self.output_step is not None and self.output_step > self.end:
             raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")

@@ -10,8 +10,8 @@ import sympy as sp
 
 from msfp_gen import Bearing, Body, Effects, Layout, Surface, build_model
 from msfp_gen.generator.assembled import assembled, assembled_latex, over_level_base, readable
-from msfp_gen.generator.contact import Step
 from msfp_gen.generator.derive import derive
+from msfp_gen.generator.functions import Step
 from msfp_gen.generator.latex import PLACES, statements
 from msfp_gen.layout import ModelSpec
 

@@ -41,7 +41,7 @@ def test_impossible_layouts_are_refused(counts, words):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"spin": "fixed"}, {"rims": 1}, {"dimension": 2}, {"bouc_wen": None}, {"friction": "velocity"}, {"sliders": []}],
+    [{"spin": "fixed"}, {"rims": 1}, {"dimension": 2}, {"bouc_wen": None}, {"friction": "coulomb"}, {"sliders": []}],
 )
 def test_unknown_effects_are_refused_by_name(wrong):
     (name,) = wrong

@@ -75,7 +75,7 @@ void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dfo
 #define ROWS (MOMENT + OWN + 1)  /* rows of the contact's tangent: M, dY, dZ, mu, N */
 #define ACTIONS (MOMENT + 1)     /* what is condensed: M and N */
 #if MSFP_HEAT
-#define SLOPE(out) (out)[MSFP_CONTACT_MM] /* d mu/d mu by its law: friction heats */
+#define SLOPE(out) (out)[MSFP_CONTACT_LAW_MU] /* d mu/d mu by its law: friction heats */
 #else
 #define SLOPE(out) 0.0
 #endif
@@ -151,15 +151,18 @@ static int friction_stage(const double *par, const double *local, const double *
             for (int c = 0; c < FRICTION; ++c)
                 a[r * FRICTION + c] = (r == c) - beta * out[MSFP_CONTACT_YY + r * FRICTION + c];
         }
-#if MSFP_LAW
-        step[FRICTION] = overshot ? 0.5 * step[FRICTION] : excess / (1.0 - SLOPE(out));
-        x[MSFP_COEFFICIENT_MU] += overshot ? step[FRICTION] : -step[FRICTION];
-#endif
         if (!overshot) {
             best = size;
             if (!solve_small(a, step))
                 return MSFP_E_NEWTON;
         }
+#if MSFP_LAW
+        step[FRICTION] = overshot ? 0.5 * step[FRICTION] : excess;
+        for (int c = 0; c < FRICTION && !overshot; ++c)
+            step[FRICTION] += out[MSFP_CONTACT_LAW_Y + c] * step[c];
+        step[FRICTION] /= overshot ? 1.0 : 1.0 - SLOPE(out);
+        x[MSFP_COEFFICIENT_MU] += overshot ? step[FRICTION] : -step[FRICTION];
+#endif
         for (int r = 0; r < FRICTION; ++r) /* past a switch: half the step back */
             f[r] += overshot ? step[r] : -step[r];
     }

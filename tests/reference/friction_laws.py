@@ -1,0 +1,57 @@
+"""Friction coefficients and temperatures as the publications state them, in plain numpy and SI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .parameters import Array
+
+EDGE = 0.1  # the patch leaves the centre while (x/reach)^2 goes from 1 - EDGE to 1 + EDGE (docs/friction.md)
+
+
+def velocity(mu_fast: Any, mu_slow: Any, rate: float, v: Any) -> Any:
+    """mu_max - (mu_max - mu_min) exp(-a v)."""
+    return mu_fast - (mu_fast - mu_slow) * np.exp(-rate * v)
+
+
+def kp(p: Any, p_ref: float) -> Any:
+    """Pressure [Pa]: 0.7^(0.02 (p - p_ref)) with MPa."""
+    return 0.7 ** (0.02 * (p - p_ref) * 1e-6)
+
+
+def kv(v: Any, rate: float = 100.0) -> Any:
+    """Velocity [m/s]."""
+    return 1 - 0.5 * np.exp(-rate * v)
+
+
+def kt(T: Any) -> Any:
+    """Temperature [degC], with the published factor 0.789."""
+    return 0.789 * (0.7 ** (T / 50) + 0.4)
+
+
+def sliding_velocity(f: Array, slip: Array) -> Array:
+    """(Y^2 + Z^2) max(Y u + Z v, 0), over the last axis [m/s]."""
+    return (f**2).sum(-1) * np.maximum((f * slip).sum(-1), 0)
+
+
+def cover(away: Array, radius: float) -> Array:
+    """1 where a round patch whose centre is `away` [m] from that of the surface covers it, else 0; a smooth edge."""
+    z = np.clip((1 - away**2 / (radius**2 * np.pi / 4)) / EDGE, -1, 1)
+    return 0.5 + z * (3 - z**2) / 4
+
+
+def temperature(t: Array, q: Array, k: float, D: float, T0: float) -> Array:
+    """T0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau), the O(n^2) sum over all pairs of times [degC].
+
+    The flux q [W/m^2] is linear between its samples; each interval is integrated exactly.
+    """
+    out = np.full(len(t), T0)
+    for i in range(1, len(t)):
+        a, b = t[i] - t[:i], t[i] - t[1 : i + 1]  # tau at the two ends of each interval
+        slope = (q[1 : i + 1] - q[:i]) / (t[1 : i + 1] - t[:i])
+        first = 2 * (np.sqrt(a) - np.sqrt(b))
+        second = 2 / 3 * (a**1.5 - b**1.5)
+        out[i] += np.sqrt(D / np.pi) / k * (q[:i] * first + slope * (a * first - second)).sum()
+    return out
