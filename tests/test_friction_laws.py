@@ -30,7 +30,7 @@ VALUES: dict[str, dict[str, Any]] = {
     "pvt": {"reference_pressure": 2e6, "velocity_rate": 20.0},
     "custom": {"c1": 0.5, "c2": 20.0, "c3": 2e4},
 }
-P_REF, RADIUS = 15e6, 0.05
+P_REF, RADIUS = 15e6, 0.025
 
 
 def lawful(scene: Scene, word: str, text: str | None = None, **values: Any) -> Scene:
@@ -185,10 +185,10 @@ def test_neutral_numbers_are_constant_friction() -> None:
 
 @cache
 def heated(**effects: Any) -> Result:
-    """Quick strokes under a real load: what heats."""
-    motion = Motion.harmonic(0.1, 0.5, cycles=4.0)
+    """Quick strokes of small patches under a real load: what heats."""
+    motion = Motion.harmonic(0.08, 1.0, cycles=2.0)
     scene = scene_of("fenz-test2", effects, {"rtol": 1e-5}, motion=motion)
-    return simulate(lawful(scene, "pvt", reference_pressure=P_REF))
+    return simulate(lawful(scene, "pvt", reference_pressure=P_REF, patch_radius=RADIUS))
 
 
 def test_temperature_is_that_of_the_convolution() -> None:
@@ -197,15 +197,14 @@ def test_temperature_is_that_of_the_convolution() -> None:
     rows, surfaces = run.history, run.scene.bearing.surfaces
     assert rows.temperature is not None and rows.friction_coefficient is not None
     v = reference.sliding_velocity(rows.friction_state, rows.slip_velocity)
-    for i in (0, 3):
-        radius = run.scene.bearing.slider_rim_radius(i)
+    for i, least in ((0, 20.0), (3, 50.0)):
         away = surfaces[i].radius * np.sin(rows.sliding[:, i] / surfaces[i].radius)
-        p = rows.normal_force[:, i] / (np.pi * radius**2)
-        q = rows.friction_coefficient[:, i] * p * v[:, i] * reference.cover(away, radius)
+        p = rows.normal_force[:, i] / (np.pi * RADIUS**2)
+        q = rows.friction_coefficient[:, i] * p * v[:, i] * reference.cover(away, RADIUS)
         want = reference.temperature(rows.time, q, 18.0, 4.44e-6, 20.0)
         rise = want.max() - 20.0
-        assert rise > 50.0, "this would not see the heat"
-        assert np.abs(rows.temperature[:, i] - want).max() < 4 * HEAT_ERROR * rise, i
+        assert rise > least, "this would not see the heat"
+        assert np.abs(rows.temperature[:, i] - want).max() < HEAT_ERROR * rise, i
 
 
 def test_heat_is_fed_by_what_friction_loses() -> None:
@@ -221,12 +220,12 @@ def test_planar_and_spatial_runs_agree() -> None:
 
 
 def test_both_methods_agree() -> None:
-    scene = scene_of("fenz-test2", {"dimension": "planar"}, motion=Motion.harmonic(0.02, 2.0, cycles=0.5),
+    scene = scene_of("fenz-test2", {"dimension": "planar"}, motion=Motion.harmonic(0.02, 1.0, cycles=0.5),
                      output_step=0.01)  # fmt: skip
     scene = lawful(scene, "pvt", reference_pressure=P_REF)
     runs = [simulate(replace(scene, solver=Solver(method=method, rtol=1e-5))).history for method in
             ("implicit", "dopri5")]  # fmt: skip
-    for name, size in (("top_force", 2e-3), ("temperature", 2e-3), ("friction_coefficient", 1e-2)):
+    for name, size in (("top_force", 2e-3), ("temperature", 1e-2), ("friction_coefficient", 1e-2)):
         a, b = (getattr(run, name) for run in runs)
         scale = np.ptp(a, axis=0).max()
         assert np.abs(a - b)[1:].max() < size * scale, name
