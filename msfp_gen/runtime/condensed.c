@@ -62,7 +62,12 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 {
     for (int k = 0; k < NB; ++k) {
         const double *par = p->surface[k];
-        const double natural = w->contact[k][MSFP_CONTACT_N] * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+#if MSFP_RIMS
+        const double pressed = w->contact[k][MSFP_CONTACT_N] + fabs(w->rim[k][MSFP_RIM_FC]);
+#else
+        const double pressed = w->contact[k][MSFP_CONTACT_N];
+#endif
+        const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
             scale[k * ND + i] = natural > 1e-12 ? natural : 1e-12;
     }

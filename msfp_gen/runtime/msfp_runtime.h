@@ -79,7 +79,7 @@ enum {
 int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                    double f[MSFP_NB][2], double *residual, double *tangent);
 
-/* Natural size of each residual: N R (mu + 1/100) of the surface below. */
+/* Natural size of each residual: (N + rim force) R (mu + 1/100) of the surface below. */
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
 
 /* Accelerations at a given state from the condensed equations; fills at->a. */
