@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.history import Array, History
-from msfp_gen.transitions import SHARE
 
+SHARE = 0.1  # of all sliding at one instant, below which a surface only gives: its friction or its rim is elastic
 YIELDED = 0.9  # |(Y, Z)| from which friction counts as overcome; it is 1 in steady sliding (2.94)
 
 Flags = NDArray[np.bool_]
@@ -17,7 +17,7 @@ def sliding_now(history: History) -> Flags:
     """Whether each surface slides in each row, ndarray of bool, shape (T, n-1).
 
     It does where its friction is overcome, |(Y, Z)| >= `YIELDED` (2.94), acts against the slip, and the surface does at
-    least `SHARE` of all sliding of that instant: what is left is the elastic give of stuck friction.
+    least `SHARE` of all sliding of that instant.
     """
     state, slip = history.friction_state, history.slip_velocity
     speed = np.linalg.norm(slip, axis=-1)
