@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import building, running
+from msfp_gen.cli import building, judging, running
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError
@@ -26,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 # In the order in which help lists the commands.
-for group in (running, building):
+for group in (running, judging, building):
     app.add_typer(group.app)
 
 
