@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 import tomllib
 import warnings
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.errors import InputError
-from msfp_gen.output import check_folder, replacing
+from msfp_gen.output import check_folder, clear_leftovers, write_bytes
 
 if TYPE_CHECKING:
     from msfp_gen.model import Model
@@ -77,6 +76,7 @@ class Checkpoint:
         if not every >= 0:
             raise InputError(f"every = {every}: give the seconds between two checkpoints, 0 or more")
         check_folder(self.path.parent, "checkpoint")
+        clear_leftovers(self.path, age=0.0)  # one run, one file: what is half written is of a killed one
         if resume:
             self._load()
         elif self.path.exists():
@@ -131,16 +131,12 @@ class Checkpoint:
 
 
 def write(path: Path, about: Mapping[str, Any], parts: Sequence[bytes]) -> None:
-    """Write a checkpoint, whole or not at all; it is on the disk before it takes its name."""
+    """Write a checkpoint, whole or not at all."""
     header = json.dumps({**about, "sizes": [len(part) for part in parts]}).encode() + b"\n"
     digest = hashlib.sha256()
     for part in (header, *parts):
         digest.update(part)
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        for part in (MAGIC, digest.hexdigest().encode(), b"\n", header, *parts):
-            file.write(part)
-        file.flush()
-        os.fsync(file.fileno())
+    write_bytes(path, (MAGIC, digest.hexdigest().encode(), b"\n", header, *parts))
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[bytes]]:
