@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 MOVIE_SUFFIXES = (".gif", ".mp4")
-DOTS = 80  # per inch: 800 x 480 pixels, even numbers as video wants them
+DOTS = 80  # per inch: 800 x 400 pixels, even numbers as video wants them
 
 
 def animate(
@@ -53,7 +53,7 @@ def animate(
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
     frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
-    with page(10.0, 6.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
+    with page(10.0, 5.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
         update = _stage(figure, result, frames, azimuth)
         for row in range(len(frames.history.time)):
             update(row)
@@ -82,8 +82,8 @@ def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None
     """Lay out the page; what moves it to a row of `frames`."""
     found = sections(frames, azimuth)
     headline(figure, label_of(result))
-    ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.25, 1))
-    ((above,), (below,)) = right.subfigures(2, 1, squeeze=False, height_ratios=(1.7, 1))
+    ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))
+    ((above,), (below,)) = right.subfigures(2, 1, squeeze=False, height_ratios=(1.5, 1))
     stack, bars = left.subplots(), below.subplots()
     pointers = [_loop(above.subplots(), result, frames)]
     draw_bars(bars, result)
@@ -95,7 +95,7 @@ def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None
         stack.clear()
         draw_section(stack, frames, found[row], row)
         stack.set(xlim=wide, ylim=high)
-        stack.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+        stack.legend(loc="lower center", bbox_to_anchor=(0.5, 1.13), ncols=2)
         for dot, x, y in pointers:
             dot.set_data([x[row]], [y[row]])
         cursor.set_xdata([frames.history.time[row]] * 2)
