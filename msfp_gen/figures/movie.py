@@ -45,7 +45,7 @@ def animate(
     where both axes move, and the bars of sliding. `progress` takes frames done and frames in all. Raises InputError: a
     time outside the run, a path that cannot be written, or .mp4 without ffmpeg; nothing is written then.
     """
-    target = check_output(path, MOVIE_SUFFIXES, "movie")
+    target = check_movie(path)
     writer = _writer(target, frames_per_second)
     positive("seconds", seconds)
     rows = result.history.time
@@ -63,18 +63,26 @@ def animate(
     return target
 
 
+def check_movie(path: str | Path, name: str = "movie") -> Path:
+    """`path` if a movie can be put there; InputError that begins with `name` otherwise, also for want of ffmpeg."""
+    from matplotlib.animation import FFMpegWriter
+
+    target = check_output(path, MOVIE_SUFFIXES, name)
+    if target.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError(
+            f"{name} = {str(target)!r}: .mp4 needs ffmpeg, which is not on the path; install it or give .gif"
+        )
+    return target
+
+
 def _writer(target: Path, frames_per_second: int) -> Any:
-    """What makes the file; InputError with the remedy where it is missing."""
+    """What makes the file."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     if frames_per_second < 1:
         raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
     if target.suffix.lower() == ".gif":
         return PillowWriter(fps=frames_per_second)
-    if not FFMpegWriter.isAvailable():
-        raise InputError(
-            f"movie = {str(target)!r}: .mp4 needs ffmpeg, which is not on the path; install it or give .gif"
-        )
     return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
 
 
