@@ -67,8 +67,11 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_bearing(table))
 
 
-def scene_text(scene: Scene) -> str:
-    """The scene as TOML that `load_scene` reads back to an equal scene; everything in SI, bearing in full."""
+def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
+    """The scene as TOML that `load_scene` reads back to an equal scene; everything in SI, bearing in full.
+
+    motion: what to write as `[motion]` instead of what makes the scene's own; an empty table leaves it out.
+    """
     own = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
     tables = {name: getattr(scene, name) for name in _PARTS}
     return dumps(
@@ -80,7 +83,7 @@ def scene_text(scene: Scene) -> str:
                 "surfaces": [_plain(surface) for surface in scene.bearing.surfaces],
                 "bodies": [_plain(body) for body in scene.bearing.bodies],
             },
-            "motion": _motion_table(scene),
+            **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
             "top": {"kind": scene.top.kind, **_plain(scene.top)},
             **{name: _plain(value) for name, value in tables.items() if value is not None},
         }
