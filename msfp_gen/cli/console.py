@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
@@ -31,8 +32,27 @@ def words(owner: type, field: str) -> str:
 
 
 whole, number = read_as(int, "whole number"), read_as(float, "number")
-Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.nc", help="Write every row as netCDF-4.")]
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file (TOML) or the name of a preset.")]
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write every row: .nc (netCDF-4), .csv, .parquet or .mat."),
+]
+
+
+def scenes(incomplete: str) -> list[tuple[str, str]]:
+    """What a shell may complete a scene to: presets with what they are, scene files and the folders on the way."""
+    from msfp_gen.catalogue import descriptions
+
+    presets = [(name, line) for name, line in descriptions("scene").items() if name.startswith(incomplete)]
+    folder, _, start = incomplete.rpartition("/")
+    files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
+    found = [path for path in files if path.is_dir() or path.suffix == ".toml"]
+    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in found]
+
+
+SceneName = Annotated[
+    str,
+    typer.Argument(metavar="SCENE", help="A scene file (TOML) or the name of a preset.", autocompletion=scenes),
+]
 
 
 def say(text: str) -> None:
@@ -63,11 +83,12 @@ def show(tables: Iterable[Table]) -> None:
 
 
 class Progress:
-    """How far a run is, on one line of a terminal's stderr; silent elsewhere."""
+    """How far a run is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._shown = -1
+        self._begin = monotonic()
 
     def __enter__(self) -> Callable[[float, float], None] | None:
         return self._update if sys.stderr.isatty() else None
@@ -80,4 +101,6 @@ class Progress:
         percent = int(100 * time / end)
         if percent > self._shown:
             self._shown = percent
-            typer.echo(f"\r\x1b[K{self._name}: {percent} %", nl=False, err=True)
+            elapsed = monotonic() - self._begin
+            left = f", {elapsed * (end / time - 1):.0f} s left" if elapsed > 1 and time > 0 else ""
+            typer.echo(f"\r\x1b[K{self._name}: {percent} %{left}", nl=False, err=True)
