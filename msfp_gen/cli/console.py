@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
+
+from msfp_gen.errors import printable
 
 if TYPE_CHECKING:
     from msfp_gen.tables import Table
@@ -57,36 +60,37 @@ SceneName = Annotated[
 
 def say(text: str) -> None:
     """A result, on stdout."""
-    typer.echo(text)
+    typer.echo(printable(text))
 
 
 def note(text: str) -> None:
     """A line about long work, beside the results, on stderr."""
-    typer.echo(text, err=True)
+    typer.echo(printable(text), err=True)
 
 
 def fail(message: str, code: int) -> int:
     """One line on stderr, whatever the message holds."""
-    typer.echo(f"error: {' '.join(message.split())}", err=True)
+    typer.echo(printable(f"error: {' '.join(message.split())}"), err=True)
     return code
 
 
 def show(tables: Iterable[Table]) -> None:
     """Rich tables on a terminal, aligned text in a pipe."""
     if not sys.stdout.isatty():
-        typer.echo("\n\n".join(table.text for table in tables))
+        say("\n\n".join(table.text for table in tables))
         return
     from rich.console import Console
 
     for table in tables:
-        Console().print(table.rich())
+        rows = [[printable(cell) for cell in row] for row in table.rows]
+        Console().print(replace(table, title=printable(table.title), rows=rows).rich())
 
 
 class Progress:
     """How far a run is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
 
     def __init__(self, name: str) -> None:
-        self._name = name
+        self._name = printable(name)
         self._shown = -1
         self._begin = monotonic()
 
