@@ -23,6 +23,7 @@ types: $(STAMP)
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
+	$(BIN)/python docs/make_figures.py
 
 # The API reference, from the docstrings; a warning is an error.
 docs: $(STAMP)

@@ -71,6 +71,33 @@ class Result:
 
         return write_netcdf(self, path)
 
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a header of `name [unit]` and one row an instant, with scene and origin in comments.
+
+        This and the writers below raise InputError for another suffix or a folder that does not exist.
+        """
+        from msfp_gen.export import write_csv
+
+        return write_csv(self, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write flat columns as Parquet, units in their metadata; InputError with the remedy where pyarrow is missing."""
+        from msfp_gen.export import write_parquet
+
+        return write_parquet(self, path)
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write every variable for MATLAB, with structs `units`, `meaning` and `attributes`."""
+        from msfp_gen.export import write_mat
+
+        return write_mat(self, path)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the format that the suffix names: .nc, .parquet, .csv or .mat."""
+        from msfp_gen.export import save
+
+        return save(self, path)
+
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Result:
         """What `to_netcdf` wrote, its scene included. Raises InputError where `path` holds no result."""

@@ -155,7 +155,7 @@ def _run(opened: Result | Scene) -> tuple[Result, RunError | None]:
 
 
 def _drawable(scene: Scene) -> Scene:
-    """With rows close enough for smooth curves, unless the scene says how many it wants or is sampled finely itself."""
-    if scene.output_step is not None or scene.motion.max_step is not None:
+    """With rows close enough for smooth curves, and no wider than a record's samples, unless the scene has its own."""
+    if scene.output_step is not None:
         return scene
-    return replace(scene, output_step=scene.end / ROWS)
+    return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))

@@ -12,7 +12,8 @@ import typer
 from msfp_gen.cli.console import Output, Progress, SceneName, note, number, say, show, words
 from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
 from msfp_gen.errors import RunError
-from msfp_gen.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.export import check_result_path
+from msfp_gen.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.solver import Solver
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
+    "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
     "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
 def run(
@@ -52,7 +54,7 @@ def run(
     """Simulate a scene."""
     keep = Keep.of(checkpoint, every, resume)
     if output is not None:
-        check_output(output, DATASET_SUFFIXES, "--output")
+        check_result_path(output, "--output")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     from msfp_gen.scenefile import load_scene
@@ -129,7 +131,7 @@ def _report(result: Result, as_json: bool) -> None:
 def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:
     """Write what was asked for; the paths written."""
     if output is not None:
-        result.to_netcdf(output)
+        result.save(output)
     if plot is not None:
         from msfp_gen.figures import plot_result
 

@@ -52,6 +52,7 @@ def animate(
     first, last = (float(rows[0]) if start is None else start), (float(rows[-1]) if end is None else end)
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
+    at_times(result, (first, last))  # refused here, in the words that were given
     frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
     with page(10.0, 5.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
         update = _stage(figure, result, frames, azimuth)

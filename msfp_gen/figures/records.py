@@ -19,6 +19,7 @@ from msfp_gen.figures.style import (
     LINE,
     SMALL,
     THIN,
+    Scale,
     engineering,
     headline,
     page,
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
 
 ROOM = 1.25  # height of a panel over the corrected motion; what the raw one does beyond is written, not drawn
 BLANK = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}  # behind a note
-ROWS = (("acceleration", "a", "m/s²"), ("velocity", "v", "m/s"), ("displacement", "d", "m"))
+# Attribute, symbol, unit, and whether it takes a prefix: accelerations are compared in m/s^2.
+ROWS = (("acceleration", "a", "m/s²", False), ("velocity", "v", "m/s", True), ("displacement", "d", "m", True))
 
 
 def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
@@ -47,15 +49,16 @@ def plot_correction(record_before: Record, record_after: Corrected, path: str | 
     """
     raw = _integrated(record_before, float(record_after.metadata.get("window_start", 0.0)), len(record_after.time))
     moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
-    with page(4.2 * len(moving) + 0.6, 7.4, path) as figure:
+    with page(3.7 * len(moving) + 0.6, 6.8, path) as figure:
         headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and corrected")
         grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
         for column, axis in zip(grid.T, moving, strict=True):
-            for axes, (name, symbol, unit) in zip(column, ROWS, strict=True):
+            for axes, (name, symbol, unit, prefixed) in zip(column, ROWS, strict=True):
                 before, after = raw[name][:, axis], getattr(record_after, name)[:, axis]
-                scale = engineering(after, unit)
+                scale = engineering(after, unit) if prefixed else Scale(1.0, unit)
                 _compare(axes, record_after.time, before * scale.factor, after * scale.factor)
-                _note_end(axes, before, unit)
+                if prefixed:
+                    _note_end(axes, before, unit)
                 axes.set_ylabel(f"{symbol}{subscript(axis + 1)} [{scale.unit}]")
             channel = record_before.channels[axis]
             column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({channel})" if channel else ""))
@@ -132,7 +135,6 @@ def _compare(axes: Axes, time: Array, raw: Array, values: Array) -> None:
 
 def _note_end(axes: Axes, raw: Array, unit: str) -> None:
     """Where the raw velocity or displacement ends: what is not zero there is drift."""
-    if unit != "m/s²":
-        end = engineering(raw[-1:], unit)
-        axes.annotate(f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}", (0.98, 0.97), ha="right", va="top",
-                      xycoords="axes fraction", fontsize=SMALL, color=INK, bbox=BLANK)  # fmt: skip
+    end = engineering(raw[-1:], unit)
+    axes.annotate(f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}", (0.98, 0.97), ha="right", va="top",
+                  xycoords="axes fraction", fontsize=SMALL, color=INK, bbox=BLANK)  # fmt: skip

@@ -125,8 +125,8 @@ def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
         if up > 0:
             ends = np.array([(x + (level - z) * along / up, level) for level in (0.0, 1.15 * (centre[1] or z))])
             axes.plot(*(ends * MILLI).T, color=FAINT, linewidth=THIN, linestyle=(0, (6, 2)), zorder=1)
-        axes.annotate(f"c{subscript(index + 1)}", centre * MILLI, xytext=(9, 5), textcoords="offset points",
-                      fontsize=SMALL, color=colour(index + 1))  # fmt: skip
+        axes.annotate(f"c{subscript(index + 1)}", np.add(centre, (radius, 0.0)) * MILLI, xytext=(6, 0), va="center",
+                      textcoords="offset points", fontsize=SMALL, color=colour(index + 1))  # fmt: skip
 
 
 def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:

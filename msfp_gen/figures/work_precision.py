@@ -65,6 +65,7 @@ def plot_work_precision(
             row[0].set_ylabel(f"{label}, relative")
         for axes, cost in zip(grid[-1], costs, strict=True):
             axes.set_xlabel(COSTS[cost])
+            _whole_decades(axes, [given[cost] for given in columns.values() if cost in given])
         _legend(figure, grid[0, 0], columns)
     return figure
 
@@ -113,6 +114,17 @@ def _draw_panel(
             axes.annotate(name, (0.01, values[error]), xycoords=("axes fraction", "data"), xytext=(0, 2),
                           textcoords="offset points", fontsize=SMALL, color=INK, in_layout=False)  # fmt: skip
     axes.grid(which="minor", visible=False)
+
+
+def _whole_decades(axes: Axes, costs: list[Array]) -> None:
+    """Limits at powers of ten: each is a tick with a label, however narrow the data."""
+    from matplotlib.ticker import NullFormatter
+
+    values = np.concatenate(costs)
+    exponents = np.log10(values[values > 0])
+    if len(exponents):
+        axes.set_xlim(10 ** np.floor(exponents.min()), 10 ** np.ceil(exponents.max() + 1e-9))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 13, "markerfacecolor": "none",

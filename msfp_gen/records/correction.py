@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,22 @@ class Corrected:
     velocity: Array
     displacement: Array
     metadata: Mapping[str, str | float]
+
+    def scaled(self, factor: float) -> Corrected:
+        """All of it times `factor`, which joins the metadata."""
+        offset = factor * float(self.metadata["end_offset"])
+        metadata = {**self.metadata, "end_offset": offset, "scale": positive("scale", factor)}
+        return Corrected(
+            self.time, factor * self.acceleration, factor * self.velocity, factor * self.displacement, metadata
+        )
+
+    def as_record(self, source: Record) -> Record:
+        """A record of what `source` became, as `write_csv` takes it."""
+        notes = {"notes": ""}  # they go along as notes
+        return replace(
+            source, acceleration=self.acceleration, velocity=self.velocity, displacement=self.displacement,
+            quantity="acceleration", units="m/s^2", metadata={**source.metadata, **self.metadata, **notes},
+        )  # fmt: skip
 
 
 def strong_window(record: Record, duration: float, *, lead: float = 2.0) -> float:

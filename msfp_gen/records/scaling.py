@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.errors import InputError
-from msfp_gen.fields import Quantity, check_fields
+from msfp_gen.fields import Quantity, check_fields, ruled_fields
 from msfp_gen.motion_checks import finite, positive
 from msfp_gen.piecewise import Array
 from msfp_gen.records.correction import Corrected, baseline_corrected, uncorrected
@@ -73,6 +73,32 @@ class ScaleTo:
             target = asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
         return self._ratio(target, response_spectrum(motion, periods, damping=self.damping).psa[:, column])
 
+    def curve(self, period: Array) -> tuple[Array, Array] | None:
+        """The target to draw beside a spectrum: periods [s] and ordinates [m/s^2]; None for a peak acceleration."""
+        if self.pga is not None:
+            return None
+        if self.between is None:
+            level = np.full(2, float(self.sa or 0.0))
+            return np.array([0.8, 1.25]) * float(self.period or 0.0), level
+        return period, asce7_spectrum(period, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+
+    @classmethod
+    def parse(cls, text: str) -> ScaleTo:
+        """From text such as "sa=0.6 g, period=2.5 s" or "sds=1 g, sd1=0.6 g, between=0.5:4". Raises InputError."""
+        rules = {name: rule for name, rule, _ in ruled_fields(cls)}
+        values: dict[str, Any] = {}
+        for part in text.split(","):
+            name, equals, value = (piece.strip() for piece in part.partition("="))
+            if not equals or name not in rules:
+                raise InputError(f"scale_to: {part.strip()!r}; give name=value with a name of {', '.join(rules)}")
+            given = value.split(":") if ":" in value else value
+            numbers = [_number(v) for v in given] if isinstance(given, list) else _number(given)
+            try:
+                values[name] = rules[name].parse(numbers, text=True)
+            except ValueError as error:
+                raise InputError(f"scale_to.{name} = {value!r}: {error}") from None
+        return cls(**values)
+
     def _ratio(self, target: Array, found: Array) -> float:
         if not np.all(found > 0):
             raise InputError(f"scale_to.component = {self.component!r}: the motion has none; choose another component")
@@ -89,6 +115,13 @@ class ScaleTo:
             f"{self.component} to the ASCE 7 spectrum of {self.sds:.4g} and {self.sd1:.4g} m/s^2, "
             f"least squares from {low:g} to {high:g} s"
         )
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
 
 
 def prepared(

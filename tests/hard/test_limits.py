@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from stacks import (
-    LOAD,
     PLANAR,
     a_rig,
     a_stack,
@@ -43,13 +42,13 @@ def spun(seed: float, rtol: float = 1e-5, method: str = "implicit", duration: fl
 
 
 def test_free_spin_is_an_instability_of_the_equations() -> None:
-    """From the third second on the spin grows thirtyfold a second, along one curve from whatever it started: 1e-7 or 1e-4
-    rad/s, at either tolerance. The circle drives it; noise of an integrator would know of neither."""
+    """From the third second on the spin grows thirtyfold a second, along one curve, whether it started from 1e-7 or from
+    1e-5 rad/s, at either tolerance. The circle drives it; noise of an integrator would know of neither."""
     curve = spun(1e-7)
     assert curve[-1] > 1.0 and curve[0] == 1e-7
     grown = slice(6, None)  # 3 s and later
     assert np.log(curve[9] / curve[7]) > 3.0  # from 3.5 to 4.5 s
-    for other in (spun(1e-5), spun(1e-4), spun(1e-7, 1e-6)):
+    for other in (spun(1e-5), spun(1e-7, 1e-6)):
         assert other[grown] == pytest.approx(curve[grown], rel=0.05)
 
 
