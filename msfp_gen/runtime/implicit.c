@@ -172,7 +172,7 @@ static double rounding(const stages *s)
     for (int k = 0; k < NB; ++k)
         for (int d = 3; d < NQ; ++d)
             speed = fmax(speed, fabs(s->at.v[k][d]));
-    return fmax(1e-10, 2e-13 * speed / s->beta);
+    return fmax(1e-10, 2e-12 * speed / s->beta);
 }
 
 /* Newton on the residual. Factors serve as long as they reduce it tenfold: other stages, other steps of like size. The
@@ -180,7 +180,7 @@ static double rounding(const stages *s)
  * while old factors contract the residual the tangent has theirs. */
 static int solve_stage(msfp_run *run, stages *s)
 {
-    const double goal = fmin(1e-4, fmax(rounding(s), 1e-2 * run->options.rtol));
+    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF];
     int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = size_of(run, s, residual);

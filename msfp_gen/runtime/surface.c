@@ -239,6 +239,20 @@ static int condense(const double *par, const double *local, const double *f, dou
     return MSFP_OK;
 }
 
+/* How much of its rim's force a surface presses against: all of it, but no more than it carries itself where bodies may
+ * part; a rim met in flight turns the bodies and presses nothing. */
+static double rim_share(const msfp_work *w, int j)
+{
+    double carried = 0.0, met = 0.0;
+    if (!MSFP_UPLIFT || !w->rim_active[j])
+        return 1.0;
+    for (int i = 0; i < VECTOR; ++i) {
+        carried += w->force[j][i] * w->force[j][i];
+        met += w->rim[j][i] * w->rim[j][i];
+    }
+    return carried < met ? sqrt(carried / met) : 1.0;
+}
+
 /* Force, slip, friction and moment of surface j. */
 int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
 {
@@ -246,13 +260,19 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
     double drf[VECTOR * DOF], dmoment[MOMENT * DOF], dlocal[MSFP_LOCAL_SIZE * DOF];
     const double *par = p->surface[j];
     const double fp[2] = { seed->fp[j][0], seed->fp[j][1] };
+    double rim[VECTOR];
     msfp_rim_force(p, w, j, tangent ? drim : NULL);
+    const double share = rim_share(w, j);
+    for (int i = 0; i < VECTOR; ++i)
+        rim[i] = share * w->rim[j][i];
     if (tangent) {
         msfp_rim_columns(w, j, drim, drf, dmoment);
-        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j],
+        for (int i = 0; i < VECTOR * DOF; ++i)
+            drf[i] *= share;
+        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j],
                                    w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
-        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
     int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f, w->contact[j]);
     if (status == MSFP_OK && tangent)
         status = condense(par, w->local[j], f, seed->beta, w->contact[j], condensed);
