@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from msfp_gen.errors import InputError
 from msfp_gen.history import ENERGY, LABELS, Counters, Event, History, quantities
-from msfp_gen.output import DATASET_SUFFIXES, check_output, replacing
+from msfp_gen.output import DATASET_SUFFIXES, check_output, write_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +41,9 @@ def to_dataset(result: Result) -> xr.Dataset:
 
 def write_netcdf(result: Result, path: str | Path) -> Path:
     """Write the dataset of `result` to `path`, whole or not at all. Raises InputError for a path that cannot be."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     path = check_output(path, DATASET_SUFFIXES)
     dataset = result.dataset
     # Light compression: histories of stuck surfaces and closed rims are mostly repeats.
@@ -48,8 +52,11 @@ def write_netcdf(result: Result, path: str | Path) -> Path:
         for name, variable in dataset.data_vars.items()
         if "time" in variable.dims and variable.size
     }
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    # Made in memory: on a disk that is full HDF5 itself does not fail, it crashes.
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
+    write_bytes(path, [content.getbuffer()])
     return path
 
 

@@ -35,9 +35,11 @@ class CompileError(MsfpError, RuntimeError):
 class RunError(MsfpError, RuntimeError):
     """A run that could not go on: says time, surface and quantity; `result` holds what was computed until then."""
 
-    exit_code = 1
+    exit_code = 1  # 130 where it was interrupted, as shells have it
 
     def __init__(self, message: str, *, status: str = "", result: object | None = None) -> None:
         super().__init__(message)
         self.status = status
         self.result = result
+        if status == "interrupted":
+            self.exit_code = 130

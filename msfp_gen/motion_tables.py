@@ -11,13 +11,25 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from msfp_gen.errors import InputError
-from msfp_gen.fields import Notes, Quantity
+from msfp_gen.fields import Notes, Quantity, Text
 from msfp_gen.motion import Motion
 
 _LENGTH = Quantity("m", above=0.0)
 _TIME = Quantity("s", above=0.0)
 _COUNT = Quantity("", above=0.0)
 _ANGULAR = Quantity("rad/s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Paths(Text):
+    """The path of a file, or a list of them."""
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` itself, a list as a tuple; raises ValueError with the remedy alone."""
+        several = isinstance(value, list | tuple) and value and all(isinstance(item, str) for item in value)
+        if not (isinstance(value, str) or several):
+            raise ValueError("give a text in quotes, or a list of them: one file for each component")
+        return value if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,14 +111,21 @@ class Ramp(MotionTable):
 
 @dataclass(frozen=True, kw_only=True)
 class RecordMotion(MotionTable):
-    """`Motion.from_record`: a file, or a record that comes with the package."""
+    """`Motion.from_record`: one file or one for each component, or a record that comes with the package.
+
+    `scale_to` is a table of the fields of `records.ScaleTo`.
+    """
 
     kind: ClassVar[str] = "record"
-    file: str | None = None
+    file: Annotated[str | tuple[str, ...] | None, Paths()] = None
     bundled: str | None = None
     scale: Annotated[float, Quantity("")] = 1.0
+    scale_to: Mapping[str, Any] | None = None
     start: Annotated[float | None, Quantity("s", least=0.0)] = None
     duration: Annotated[float | None, _TIME] = None
+    correct: bool = True
+    corner: Annotated[float, Quantity("Hz", above=0.0)] = 0.05
+    taper: Annotated[float, _TIME] = 1.0
 
     def _motion(self) -> Motion:
         from msfp_gen import records
@@ -117,9 +136,11 @@ class RecordMotion(MotionTable):
         if self.bundled is not None:
             record = records.bundled(self.bundled)
         else:
-            record = records.read_record(_existing(self.file))
-        values = self._values("file", "bundled")
-        return Motion.from_record(record, **values | {"name": self.name or None})
+            files = [self.file] if isinstance(self.file, str) else self.file or ()
+            record = records.read_record(*map(_existing, files))
+        target = None if self.scale_to is None else records.ScaleTo(**self.scale_to)
+        values = self._values("file", "bundled", "scale_to")
+        return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +175,13 @@ class Pieces(MotionTable):
         table = {"kind": cls.kind, **{name: getattr(motion, name).tolist() for name in names}}
         rest = {"max_step": motion.max_step, "name": motion.name, "metadata": dict(motion.metadata)}
         return table | {name: value for name, value in rest.items() if value is not None}
+
+
+def placed(file: str | tuple[str, ...], folder: Path) -> str | tuple[str, ...]:
+    """The path or paths of a `file` key, relative to the folder of its scene, made absolute."""
+    if isinstance(file, str):
+        return str((folder / file).resolve())
+    return tuple(str((folder / each).resolve()) for each in file)
 
 
 def _existing(file: str | None) -> Path:

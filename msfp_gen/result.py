@@ -12,6 +12,7 @@ from msfp_gen.history import Counters, Event, History
 if TYPE_CHECKING:
     import xarray as xr
 
+    from msfp_gen.characterise import Characterisation
     from msfp_gen.scene import Scene
 
 __all__ = ["Counters", "Event", "History", "Result"]
@@ -51,6 +52,15 @@ class Result:
         from msfp_gen.summary import summarise
 
         return summarise(self)
+
+    def characterise(self) -> Characterisation:
+        """Effective stiffness, damping, stages, capacity left, velocity and heat: see docs/characterise.md.
+
+        Raises InputError where the bearing did not move.
+        """
+        from msfp_gen.characterise import characterise
+
+        return characterise(self)
 
     def to_netcdf(self, path: str | Path) -> Path:
         """Write the dataset as netCDF-4, whole or not at all; a run that failed is saved with its status.

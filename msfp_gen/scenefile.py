@@ -14,7 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.fields import located, ruled_fields
 from msfp_gen.layout import Effects, Layout
 from msfp_gen.motion import Motion
-from msfp_gen.motion_tables import KINDS, Pieces
+from msfp_gen.motion_tables import KINDS, Pieces, placed
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
 from msfp_gen.toml_text import dumps
@@ -53,7 +53,7 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Sc
     given = schema.validate_scene(table)
     motion = dict(given["motion"])
     if "file" in motion:
-        motion["file"] = str(((folder or Path()) / motion["file"]).resolve())
+        motion["file"] = placed(motion["file"], folder or Path())
     top = dict(given["top"])
     parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
     parts["bearing"] = _bearing(given["bearing"])

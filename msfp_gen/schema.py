@@ -30,6 +30,7 @@ from msfp_gen.catalogue import suggestion
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, Rule, Text, ruled_fields
 from msfp_gen.layout import Effects, Layout
+from msfp_gen.records.scaling import ScaleTo
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
 from msfp_gen.top import MassTop, PrescribedTop, RigTop
@@ -65,8 +66,13 @@ def _column(rule: Rule, value: object, *, text: bool) -> Any:
 
 def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
     """The union of tables told apart by their `kind`, and each table's model by its kind."""
-    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...)) for kind in kinds}
+    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_INNER.get(kind, {})) for kind in kinds}
     return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
+
+
+_SCALE_TO = _model(ScaleTo)
+# Tables inside the table of a kind.
+_INNER: dict[type, Table] = {motion_tables.RecordMotion: {"scale_to": (_SCALE_TO, None)}}
 
 
 def _named(value: Any) -> Any:
@@ -116,6 +122,7 @@ _TABLES: dict[str, Model] = {
     "bearing.full.bodies": _BODY,
     "bearing.preset": _PRESET,
     **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
+    "motion.record.scale_to": _SCALE_TO,
     **{f"top.{kind}": model for kind, model in _TOPS.items()},
     **_PARTS,
 }

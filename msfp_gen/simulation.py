@@ -6,11 +6,13 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.build import build_model
+from msfp_gen.checkpoint import EVERY, Checkpoint, Identity
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Array, Counters, Event, History
 from msfp_gen.packing import load_values, seated
@@ -42,7 +44,14 @@ FAILURES = {
 }
 
 
-def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
+def simulate(
+    scene: Scene,
+    *,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = EVERY,
+    resume: bool = False,
+) -> Result:
     """Integrate a scene.
 
     Parameters
@@ -51,11 +60,18 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
         Bearing, motion, top, effects, solver; see `Scene`.
     progress
         Called now and then with the time reached and the end [s].
+    checkpoint
+        A file that keeps the run: written every so many seconds, when the run is interrupted and when it ends. It
+        must not exist unless `resume` is given, and stays until its owner removes it.
+    every
+        Seconds of wall time between two checkpoints.
+    resume
+        Go on with what `checkpoint` holds, to the same rows, bit by bit.
 
     Raises
     ------
     InputError
-        The parts of the scene do not go together.
+        The parts of the scene do not go together; the checkpoint is damaged, or of another scene or build.
     RunError
         The run could not go on: the message says when, where and why, `.result` holds what was computed.
 
@@ -63,12 +79,15 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
     _check(scene)
     begin = time.perf_counter()
     model = build_model(scene.bearing.layout, scene.effects)
+    kept = None if checkpoint is None else Checkpoint(checkpoint, Identity.of(scene, model), every, resume)
     run, azimuth = _start(scene, model)
+    if kept is not None:
+        kept.restore(run)
     ready = time.perf_counter()
-    status = _advance(run, scene.end, progress)
+    status = _advance(run, scene.end, progress, kept)
     if status is None:
         status = run.status[0]
-    wall = time.perf_counter() - ready
+    wall = time.perf_counter() - ready + (kept.wall if kept is not None else 0.0)
     if not len(run.rows):
         raise RunError(_message(scene, run, status), status=status)
     result = _result(scene, model, run, azimuth, status, wall, ready - begin)
@@ -88,15 +107,21 @@ def _check(scene: Scene) -> None:
         )
 
 
-def _advance(run: Any, end: float, progress: Progress | None) -> str | None:
+def _advance(run: Any, end: float, progress: Progress | None, kept: Checkpoint | None) -> str | None:
     """Take all steps; the name of an interruption, or None."""
+    status = None
     try:
         while run.advance(CHUNK):
+            if kept is not None:
+                kept.offer(run)
             if progress is not None:
                 progress(run.time, end)
     except KeyboardInterrupt:
-        return "interrupted"
-    return None
+        status = "interrupted"
+    # A failure is met again from the same point: the last checkpoint stands.
+    if kept is not None and run.status[0] in ("ok", "stopped"):
+        kept.save(run)
+    return status
 
 
 def _start(scene: Scene, model: Model) -> tuple[Any, float]:

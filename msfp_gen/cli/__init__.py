@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import building, running
+from msfp_gen.cli import building, judging, running
 from msfp_gen.cli.console import fail, say
+from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError
 from msfp_gen.version import __version__
 
@@ -25,12 +26,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 # In the order in which help lists the commands.
-for group in (running, building):
+for group in (running, judging, building):
     app.add_typer(group.app)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input."""
+    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input, 128 + signal interrupted."""
+    with heard() as signals:
+        code = _main(argv)
+        return 128 + signals[0] if code == INTERRUPTED and signals else code
+
+
+def _main(argv: list[str] | None) -> int:
     arguments = sys.argv[1:] if argv is None else argv
     try:
         code = app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0

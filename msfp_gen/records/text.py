@@ -15,6 +15,7 @@ from msfp_gen.piecewise import Array
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _GZIP = b"\x1f\x8b"
+_DOS_END = b"\x1a"  # fills the last block of files from old systems
 
 
 class Lines:
@@ -56,6 +57,26 @@ class Lines:
             self.fail(index, f"{what} is {field.strip()}; it must be positive")
         return value
 
+    def block(self, top: int, points: int, layout: tuple[int, int]) -> tuple[Array, int]:
+        """`points` numbers from the line at `top` on, and the index of the line after them.
+
+        `layout` is (columns a line, characters a column), as in a Fortran format: neighbours may touch, so columns
+        are cut, not split at blanks.
+        """
+        per_line, width = layout
+        if not (points and per_line and width):
+            self.fail(top - 1, f"{points} points in {per_line} columns of width {width}; nothing to read")
+        values: list[float] = []
+        index = top
+        while len(values) < points:
+            row = self[index].rstrip()
+            want = min(per_line, points - len(values))
+            if len(row) != want * width:
+                self.fail(index, f"{want} columns of width {width} expected after {len(values)} of {points} points")
+            values += self.numbers(index, [row[i : i + width] for i in range(0, len(row), width)])
+            index += 1
+        return column(values), index
+
 
 def read_lines(path: Path) -> Lines:
     """The lines of a text file, unpacked if it is gzip, in UTF-8 or Latin-1."""
@@ -68,10 +89,11 @@ def read_lines(path: Path) -> Lines:
             content = gzip.decompress(content)
         except (OSError, EOFError, zlib.error):
             raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None
+    content = content.rstrip(_DOS_END)
     if not content.strip():
         raise InputError(f"{path.name}: the file is empty; give a record")
     if b"\0" in content:
-        raise InputError(f"{path.name}: a binary file; give COSMOS/CSMIP V1, PEER .AT2 or CSV text")
+        raise InputError(f"{path.name}: a binary file; give a text file of a known format (docs/data.md)")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

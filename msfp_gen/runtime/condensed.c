@@ -97,10 +97,15 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 {
     for (int k = 0; k < NB; ++k) {
         const double *par = p->surface[k];
-        const double normal = w->contact[k][MSFP_CONTACT_N] + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
-        const double natural = normal * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+#if MSFP_RIMS
+        const double met = fabs(w->rim[k][MSFP_RIM_FC]);
+#else
+        const double met = 0.0;
+#endif
+        const double pressed = w->contact[k][MSFP_CONTACT_N] + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
-            scale[k * ND + i] = fmax(i < NA ? natural : normal, 1e-12);
+            scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
     }
 }
 

@@ -203,6 +203,11 @@ static int solve_stage(msfp_run *run, stages *s)
     }
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
+    if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
+        const int status = factorise(run, s);
+        if (status)
+            return status;
+    }
     if (!run->work_sign || run->work_sign == run->determinant)
         return MSFP_OK;
     run->status_surface = run->worst_surface;

@@ -86,7 +86,7 @@ enum {
 int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                    double f[MSFP_NB][2], double *residual, double *tangent);
 
-/* Natural size of each residual: N R (mu + 1/100) of the surface below; of a force where bodies may part. */
+/* Natural size of each residual: (N + rim force) R (mu + 1/100) of the surface below; of a force where bodies may part. */
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
 
 /* Accelerations at a given state from the condensed equations; fills at->a. */
@@ -206,8 +206,10 @@ typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
     const double *jumps;
-    int jump_count, next_jump;
+    int jump_count;
     msfp_options options;
+    /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
+    int next_jump;
     msfp_state now, next;
     msfp_middle middle;
     msfp_work work;
@@ -226,6 +228,8 @@ typedef struct {
     msfp_event *events;
     size_t event_count, event_capacity;
 } msfp_run;
+#define MSFP_CHECKPOINT_BEGIN offsetof(msfp_run, next_jump)
+#define MSFP_CHECKPOINT_END offsetof(msfp_run, rows)
 
 /* Start a run: histories and jumps must outlive it. */
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
@@ -233,6 +237,10 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
                    const double *q, const double *v, const double *f);
 /* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
 int msfp_run_advance(msfp_run *run, long steps);
+/* Take over what a run of the same scene had reached: its bytes from MSFP_CHECKPOINT_BEGIN to _END, rows and events.
+ * Returns 0, MSFP_E_MEMORY, or MSFP_E_FINITE for bytes that no run of this model leaves. */
+int msfp_run_restore(msfp_run *run, const char *state, const msfp_row *rows, size_t row_count,
+                     const msfp_event *events, size_t event_count);
 void msfp_run_free(msfp_run *run);
 const char *msfp_status_name(int status);
 

@@ -1,0 +1,133 @@
+"""Pictures of ground motions: what baseline correction did, and response spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from operator import mul
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.errors import InputError
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    LINE,
+    SMALL,
+    THIN,
+    engineering,
+    headline,
+    page,
+    subscript,
+)  # fmt: skip
+from msfp_gen.history import Array
+from msfp_gen.records.record import G
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.records import Corrected, Record
+
+ROOM = 1.25  # height of a panel over the corrected motion; what the raw one does beyond is written, not drawn
+ROWS = (("acceleration", "a", "m/s²"), ("velocity", "v", "m/s"), ("displacement", "d", "m"))
+
+
+def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
+    """What baseline correction did: acceleration, velocity and displacement before (grey) and after, per component.
+
+    Before means the raw acceleration integrated from rest, mean and all, over the window that was kept. Panels are
+    scaled to the corrected motion; where the raw one leaves them its end is written in. Raises InputError for `path`.
+    """
+    raw = _integrated(record_before)
+    offset = float(record_after.metadata.get("window_start", 0.0))
+    inside = (raw["time"][:, 0] >= offset - 1e-9) & (raw["time"][:, 0] <= offset + record_after.time[-1] + 1e-9)
+    moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
+    with page(4.2 * len(moving) + 0.6, 7.4, path) as figure:
+        headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and corrected")
+        grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
+        for column, axis in zip(grid.T, moving, strict=True):
+            for axes, (name, symbol, unit) in zip(column, ROWS, strict=True):
+                before, after = raw[name][inside, axis], getattr(record_after, name)[:, axis]
+                scale = engineering(after, unit)
+                _compare(axes, raw["time"][inside, 0] - offset, before * scale.factor, record_after.time,
+                         after * scale.factor, scale.unit)  # fmt: skip
+                axes.set_ylabel(f"{symbol}{subscript(axis + 1)} [{scale.unit}]")
+            channel = record_before.channels[axis]
+            column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({channel})" if channel else ""))
+            column[-1].set_xlabel("time t [s]")
+    return figure
+
+
+def plot_response_spectrum(
+    periods: ArrayLike,
+    spectra: Mapping[str, ArrayLike],
+    path: str | Path | None = None,
+    *,
+    target: tuple[ArrayLike, ArrayLike] | None = None,
+    damping: float = 0.05,
+    title: str = "Response spectrum",
+) -> Figure:
+    """Pseudo-acceleration [m/s^2], with g to the right, over the period [s] on a logarithmic axis.
+
+    Args:
+        periods: ndarray, shape (k,), [s], above zero.
+        spectra: by label, each ndarray, shape (k,), [m/s^2].
+        path: where to write it: .png, .svg or .pdf.
+        target: periods [s] and accelerations [m/s^2] of a spectrum to hold against them.
+        damping: share of critical, for the label.
+        title: of the figure.
+
+    Raises:
+        InputError: a period that is not above zero, a spectrum of another length, or a path.
+    """
+    x = np.asarray(periods, dtype=float)
+    if x.ndim != 1 or not len(x) or not np.all(x > 0):
+        raise InputError("periods: give at least one, all above zero [s]")
+    curves = {label: np.asarray(values, dtype=float) for label, values in spectra.items()}
+    for label, values in curves.items():
+        if values.shape != x.shape:
+            raise InputError(f"spectra[{label!r}] has shape {values.shape}: give one value a period, {x.shape}")
+    with page(7.6, 4.8, path) as figure:
+        headline(figure, title)
+        axes = figure.subplots()
+        for index, (label, values) in enumerate(curves.items()):
+            axes.plot(x, values, color=COLOURS[index % len(COLOURS)], label=label)
+        if target is not None:
+            axes.plot(*(np.asarray(v, dtype=float) for v in target), color=INK, linestyle=(0, (5, 3)), label="target")
+        axes.set(xscale="log", xlabel="period T [s]", ylabel="pseudo-acceleration Sₐ [m/s²]",
+                 title=f"{100 * damping:.3g} % of critical damping")  # fmt: skip
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(bottom=0)
+        right = axes.secondary_yaxis("right", functions=(partial(mul, 1 / G), partial(mul, G)))
+        right.set_ylabel("Sₐ [g]")
+        right.spines["right"].set_visible(True)
+        axes.legend(loc="upper right")
+    return figure
+
+
+def _integrated(record: Record) -> dict[str, Array]:
+    """The raw record and its integrals from rest by the trapezoidal rule, each shape (k, 3); time in one column."""
+    velocity = _integral(record.acceleration, record.time_step)
+    displacement = _integral(velocity, record.time_step)
+    return {"time": record.time[:, None], "acceleration": record.acceleration, "velocity": velocity,
+            "displacement": displacement}  # fmt: skip
+
+
+def _integral(values: Array, step: float) -> Array:
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum((values[1:] + values[:-1]) * step / 2, axis=0)])
+
+
+def _compare(axes: Axes, raw_time: Array, raw: Array, time: Array, values: Array, unit: str) -> None:
+    axes.plot(raw_time, raw, color=FAINT, linewidth=THIN)
+    axes.plot(time, values, color=COLOURS[0], linewidth=LINE)
+    height = ROOM * float(np.abs(values).max()) or 1.0
+    axes.set_ylim(-height, height)
+    axes.margins(x=0.01)
+    if np.abs(raw).max() > height:
+        axes.annotate(f"as recorded: ends at {raw[-1]:.3g} {unit}", (0.02, 0.96),
+                      xycoords="axes fraction", va="top", fontsize=SMALL, color=INK)  # fmt: skip
