@@ -1,10 +1,10 @@
 """The seat of a slider, for bodies that may part: what holds the two sphere centres of a surface together.
 
 The report's ball joint (delta = 0) becomes a stiff, one-sided seat. With s = -delta, the compression, the largest
-penetration over the slider's footprint is |s| where s points into the footprint (the ball joint's direction is free),
-and s . n on its edge n otherwise; the force is the gradient of half the stiffness times its square, so that the seat
-stores energy and, but for its damping, neither makes nor loses any. Nothing is transmitted once the penetration is gone.
-Source: docs/uplift.md; the report names uplift as a possible extension (chapter 5).
+penetration over the slider's footprint is |s| where s points into the footprint (the ball joint's direction is
+free), and s . n on its edge n otherwise; the force is the gradient of half the stiffness times its square, so that
+the seat stores energy and, but for its damping, neither makes nor loses any. Nothing is transmitted once the
+penetration is gone. Source: docs/uplift.md; the report names uplift as a possible extension (chapter 5).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _start(p: Program, b: Blocks) -> tuple[Symbols, Symbols, Vector]:
 
 
 def _finish(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Vector, s: Vector) -> Program:
-    """Force ks depth (1 + cs d depth/dt) along the normal (Hunt and Crossley 1975), its moment on the slider, energies."""
+    """Force ks depth (1 + cs d depth/dt) along the normal (Hunt and Crossley 1975), its moment, energies."""
     rate = p.rate(depth)
     damping = p.let(par["cs"] * rate)
     elastic = p.let(par["ks"] * depth)
