@@ -63,7 +63,10 @@ class Manifest:
     def read(cls, folder: Path) -> Manifest:
         """Read it back; ValueError or TypeError if a byte of it was altered, OSError if it cannot be read."""
         content = (folder / MANIFEST_NAME).read_bytes()
-        values = dict(json.loads(content))
+        try:
+            values = dict(json.loads(content))
+        except RecursionError:
+            raise ValueError("the manifest is nested too deeply") from None
         manifest = cls(**{name: value for name, value in values.items() if name != "sha256"})
         if manifest.text.encode() != content:
             raise ValueError("the manifest is not as it was written")

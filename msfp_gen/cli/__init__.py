@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import building, judging, running
+from msfp_gen.cli import building, judging, running, storing
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError
@@ -22,11 +22,10 @@ app = typer.Typer(
     epilog="Examples:\n\n\b\n"
     "  msfp-gen demo -o out\n  msfp-gen run fenz-test2 --plot loops.png\n  msfp-gen generate 7 3 3",
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 # In the order in which help lists the commands.
-for group in (running, judging, building):
+for group in (running, judging, building, storing):
     app.add_typer(group.app)
 
 

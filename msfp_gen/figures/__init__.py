@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from msfp_gen.figures.energy import plot_energy
 from msfp_gen.figures.force_path import plot_force_path
 from msfp_gen.figures.loops import moving_axes, plot_loops, plot_orbit
-from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate
+from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
 from msfp_gen.figures.overview import plot_result
 from msfp_gen.figures.records import plot_correction, plot_response_spectrum
 from msfp_gen.figures.section import plot_section
@@ -34,6 +34,7 @@ __all__ = [
     "MOVIE_SUFFIXES",
     "STYLE",
     "animate",
+    "check_movie",
     "engineering",
     "moving_axes",
     "page",

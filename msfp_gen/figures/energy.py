@@ -49,7 +49,7 @@ def plot_energy(result: Result, path: str | Path | None = None) -> Figure:
     """
     energy = result.history.energy
     peak = max(float(np.abs(energy["input"]).max()), np.finfo(float).tiny)
-    with page(9.5, 6.0, path) as figure:
+    with page(11.5, 5.6, path) as figure:
         headline(figure, label_of(result))
         above, below = strips(figure, 2, height_ratios=(4, 1))
         _draw_budget(above, result, peak)
@@ -69,13 +69,14 @@ def _draw_budget(axes: Axes, result: Result, peak: float) -> None:
         values = history.energy[key]
         if np.abs(values).max() < VISIBLE * peak:
             continue
-        label = f"{name} ({100 * values[-1] / peak:.3g} % at the end)"
+        label = f"{name}: {100 * values[-1] / peak:.1f} %"
         above = _band(axes, history.time, above, np.maximum(values, 0), scale.factor, colour, label)
         below = _band(axes, history.time, below, np.minimum(values, 0), scale.factor, colour, None)
     axes.plot(history.time, history.energy["input"] * scale.factor, color=INK, linewidth=LINE, label="input")
     axes.set(title="Energy budget, relative to the base", ylabel=f"energy [{scale.unit}]")
     handles, labels = axes.get_legend_handles_labels()
-    axes.legend(handles[::-1], labels[::-1], loc="upper left")
+    axes.legend(handles[::-1], labels[::-1], loc="upper left", bbox_to_anchor=(1.01, 1), alignment="left",
+                title="at the end, of the peak input")  # fmt: skip
 
 
 def _band(axes: Axes, time: Array, start: Array, values: Array, factor: float, colour: str, label: str | None) -> Array:

@@ -32,7 +32,7 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
     (section,) = sections(then)
     with page(12.5, max(6.0, 1.3 * result.history.surfaces + 1), path) as figure:
         headline(figure, label_of(result))
-        ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.1))
+        ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.7))
         axes = left.subplots()
         draw_section(axes, then, section)
         draw_circles(axes, section, friction_circles(result.scene.bearing))

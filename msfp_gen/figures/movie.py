@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 MOVIE_SUFFIXES = (".gif", ".mp4")
-DOTS = 80  # per inch: 800 x 480 pixels, even numbers as video wants them
+DOTS = 80  # per inch: 800 x 400 pixels, even numbers as video wants them
 
 
 def animate(
@@ -45,7 +45,7 @@ def animate(
     where both axes move, and the bars of sliding. `progress` takes frames done and frames in all. Raises InputError: a
     time outside the run, a path that cannot be written, or .mp4 without ffmpeg; nothing is written then.
     """
-    target = check_output(path, MOVIE_SUFFIXES, "movie")
+    target = check_movie(path)
     writer = _writer(target, frames_per_second)
     positive("seconds", seconds)
     rows = result.history.time
@@ -53,7 +53,7 @@ def animate(
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
     frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
-    with page(10.0, 6.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
+    with page(10.0, 5.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
         update = _stage(figure, result, frames, azimuth)
         for row in range(len(frames.history.time)):
             update(row)
@@ -63,18 +63,26 @@ def animate(
     return target
 
 
+def check_movie(path: str | Path, name: str = "movie") -> Path:
+    """`path` if a movie can be put there; InputError that begins with `name` otherwise, also for want of ffmpeg."""
+    from matplotlib.animation import FFMpegWriter
+
+    target = check_output(path, MOVIE_SUFFIXES, name)
+    if target.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError(
+            f"{name} = {str(target)!r}: .mp4 needs ffmpeg, which is not on the path; install it or give .gif"
+        )
+    return target
+
+
 def _writer(target: Path, frames_per_second: int) -> Any:
-    """What makes the file; InputError with the remedy where it is missing."""
+    """What makes the file."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     if frames_per_second < 1:
         raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
     if target.suffix.lower() == ".gif":
         return PillowWriter(fps=frames_per_second)
-    if not FFMpegWriter.isAvailable():
-        raise InputError(
-            f"movie = {str(target)!r}: .mp4 needs ffmpeg, which is not on the path; install it or give .gif"
-        )
     return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
 
 
@@ -82,8 +90,8 @@ def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None
     """Lay out the page; what moves it to a row of `frames`."""
     found = sections(frames, azimuth)
     headline(figure, label_of(result))
-    ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.25, 1))
-    ((above,), (below,)) = right.subfigures(2, 1, squeeze=False, height_ratios=(1.7, 1))
+    ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))
+    ((above,), (below,)) = right.subfigures(2, 1, squeeze=False, height_ratios=(1.5, 1))
     stack, bars = left.subplots(), below.subplots()
     pointers = [_loop(above.subplots(), result, frames)]
     draw_bars(bars, result)
@@ -95,7 +103,7 @@ def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None
         stack.clear()
         draw_section(stack, frames, found[row], row)
         stack.set(xlim=wide, ylim=high)
-        stack.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+        stack.legend(loc="lower center", bbox_to_anchor=(0.5, 1.13), ncols=2)
         for dot, x, y in pointers:
             dot.set_data([x[row]], [y[row]])
         cursor.set_xdata([frames.history.time[row]] * 2)

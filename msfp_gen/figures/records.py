@@ -34,28 +34,28 @@ if TYPE_CHECKING:
     from msfp_gen.records import Corrected, Record
 
 ROOM = 1.25  # height of a panel over the corrected motion; what the raw one does beyond is written, not drawn
+BLANK = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}  # behind a note
 ROWS = (("acceleration", "a", "m/s²"), ("velocity", "v", "m/s"), ("displacement", "d", "m"))
 
 
 def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
     """What baseline correction did: acceleration, velocity and displacement before (grey) and after, per component.
 
-    Before means the raw acceleration integrated from rest, mean and all, over the window that was kept. Panels are
-    scaled to the corrected motion; where the raw one leaves them its end is written in. Raises InputError for `path`.
+    Before means the raw acceleration, mean and all, integrated from rest over the window that was kept. Panels are
+    scaled to the corrected motion; where the raw one ends is written in, since it may leave them. Raises InputError for
+    `path`.
     """
-    raw = _integrated(record_before)
-    offset = float(record_after.metadata.get("window_start", 0.0))
-    inside = (raw["time"][:, 0] >= offset - 1e-9) & (raw["time"][:, 0] <= offset + record_after.time[-1] + 1e-9)
+    raw = _integrated(record_before, float(record_after.metadata.get("window_start", 0.0)), len(record_after.time))
     moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
     with page(4.2 * len(moving) + 0.6, 7.4, path) as figure:
         headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and corrected")
         grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
         for column, axis in zip(grid.T, moving, strict=True):
             for axes, (name, symbol, unit) in zip(column, ROWS, strict=True):
-                before, after = raw[name][inside, axis], getattr(record_after, name)[:, axis]
+                before, after = raw[name][:, axis], getattr(record_after, name)[:, axis]
                 scale = engineering(after, unit)
-                _compare(axes, raw["time"][inside, 0] - offset, before * scale.factor, record_after.time,
-                         after * scale.factor, scale.unit)  # fmt: skip
+                _compare(axes, record_after.time, before * scale.factor, after * scale.factor)
+                _note_end(axes, before, unit)
                 axes.set_ylabel(f"{symbol}{subscript(axis + 1)} [{scale.unit}]")
             channel = record_before.channels[axis]
             column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({channel})" if channel else ""))
@@ -110,24 +110,29 @@ def plot_response_spectrum(
     return figure
 
 
-def _integrated(record: Record) -> dict[str, Array]:
-    """The raw record and its integrals from rest by the trapezoidal rule, each shape (k, 3); time in one column."""
-    velocity = _integral(record.acceleration, record.time_step)
-    displacement = _integral(velocity, record.time_step)
-    return {"time": record.time[:, None], "acceleration": record.acceleration, "velocity": velocity,
-            "displacement": displacement}  # fmt: skip
+def _integrated(record: Record, start: float, points: int) -> dict[str, Array]:
+    """A window of the raw record and its integrals from rest by the trapezoidal rule, each shape (points, 3)."""
+    first = round(start / record.time_step)
+    acceleration = record.acceleration[first : first + points]
+    velocity = _integral(acceleration, record.time_step)
+    return {"acceleration": acceleration, "velocity": velocity, "displacement": _integral(velocity, record.time_step)}
 
 
 def _integral(values: Array, step: float) -> Array:
     return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum((values[1:] + values[:-1]) * step / 2, axis=0)])
 
 
-def _compare(axes: Axes, raw_time: Array, raw: Array, time: Array, values: Array, unit: str) -> None:
-    axes.plot(raw_time, raw, color=FAINT, linewidth=THIN)
-    axes.plot(time, values, color=COLOURS[0], linewidth=LINE)
+def _compare(axes: Axes, time: Array, raw: Array, values: Array) -> None:
+    axes.plot(time[: len(raw)], raw, color=FAINT, linewidth=LINE)
+    axes.plot(time, values, color=COLOURS[0], linewidth=THIN)
     height = ROOM * float(np.abs(values).max()) or 1.0
     axes.set_ylim(-height, height)
     axes.margins(x=0.01)
-    if np.abs(raw).max() > height:
-        axes.annotate(f"as recorded: ends at {raw[-1]:.3g} {unit}", (0.02, 0.96),
-                      xycoords="axes fraction", va="top", fontsize=SMALL, color=INK)  # fmt: skip
+
+
+def _note_end(axes: Axes, raw: Array, unit: str) -> None:
+    """Where the raw velocity or displacement ends: what is not zero there is drift."""
+    if unit != "m/s²":
+        end = engineering(raw[-1:], unit)
+        axes.annotate(f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}", (0.98, 0.97), ha="right", va="top",
+                      xycoords="axes fraction", fontsize=SMALL, color=INK, bbox=BLANK)  # fmt: skip

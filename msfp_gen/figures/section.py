@@ -20,6 +20,7 @@ from msfp_gen.figures.style import (
     headline,
     label_of,
     page,
+    subscript,
 )  # fmt: skip
 from msfp_gen.history import Array
 from msfp_gen.resample import at_times
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 STEEL = ("#AEB6C0", "#DCE1E7")  # plates, and what slides between them
+WIDTH = 7.4  # of a section on the page [inch]
 OVERHANG = 0.12  # length of the force line beyond the stack, over the height of the stack
 WORDS = {(False, False): "sticks", (True, False): "slides", (False, True): "sticks, on its rim",
          (True, True): "slides, on its rim"}  # fmt: skip
@@ -56,13 +58,14 @@ def plot_section(
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
-    with page(8.6, 7.4 if friction_circles else 5.4, path) as figure:
+    tall = 7.6 if friction_circles else 1.9 + WIDTH * _aspect(section)
+    with page(5.6 if friction_circles else WIDTH + 1.2, tall, path) as figure:
         headline(figure, label_of(result))
         axes = figure.subplots()
         draw_section(axes, then, section)
         if friction_circles:
             draw_circles(axes, section, circle_radii(result.scene.bearing))
-        figure.legend(loc="outside right upper")
+        figure.legend(loc="outside lower center", ncols=2 if friction_circles else 3)
     return figure
 
 
@@ -80,7 +83,7 @@ def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> No
     for index in reversed(range(history.surfaces)):
         state = bool(slides[index]), bool(pushes[index])
         axes.plot(*(section.faces[index] * MILLI).T, color=colour(index + 1), linewidth=BOLD if state[0] else LINE,
-                  label=f"{index + 1} {WORDS[state]}", solid_capstyle="butt", zorder=3)  # fmt: skip
+                  label=f"surface {index + 1} {WORDS[state]}", solid_capstyle="butt", zorder=3)  # fmt: skip
     draw_force_line(axes, section)
     for index, point in enumerate(section.contacts * MILLI):
         axes.plot(*point, marker="o", markersize=5, color="white", markeredgecolor=colour(index + 1),
@@ -88,7 +91,7 @@ def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> No
     u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
     axes.set(
         title=f"t = {history.time[row]:.3f} s, u = {u * MILLI:.1f} mm",
-        xlabel=f"{_direction(section.azimuth)} from the middle of the base [mm]", ylabel="height [mm]",
+        xlabel=f"{_direction(section.azimuth)}, from the middle of the base [mm]", ylabel="height [mm]",
     )  # fmt: skip
     axes.set_aspect("equal", adjustable="box")
     axes.grid(visible=False)
@@ -122,7 +125,7 @@ def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
         if up > 0:
             ends = np.array([(x + (level - z) * along / up, level) for level in (0.0, 1.15 * (centre[1] or z))])
             axes.plot(*(ends * MILLI).T, color=FAINT, linewidth=THIN, linestyle=(0, (6, 2)), zorder=1)
-        axes.annotate(f"centre {index + 1}", centre * MILLI, xytext=(radius * MILLI, 0), textcoords="offset points",
+        axes.annotate(f"c{subscript(index + 1)}", centre * MILLI, xytext=(9, 5), textcoords="offset points",
                       fontsize=SMALL, color=colour(index + 1))  # fmt: skip
 
 
@@ -132,6 +135,12 @@ def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, floa
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
     room = OVERHANG * (high - low)
     return (left - room, right + room), (low - 1.2 * room, high + 1.2 * room)
+
+
+def _aspect(section: Section) -> float:
+    """Height over width of what a section shows."""
+    (left, right), (low, high) = limits([section])
+    return (high - low) / (right - left)
 
 
 def _direction(azimuth: float) -> str:

@@ -69,7 +69,7 @@ def draw_bars(axes: Axes, result: Result) -> None:
     axes.set_yticks(range(1, history.surfaces + 1), [f"surface {k}" for k in range(1, history.surfaces + 1)])
     axes.set_ylim(0.5, history.surfaces + 0.6)
     axes.grid(visible=False, axis="y")
-    axes.set_title("Which surfaces slide" + ("  (black edge: rim pushes)" if pushes.any() else ""))
+    axes.set_title("Which surfaces slide" + ("  (black: on the rim)" if pushes.any() else ""))
 
 
 def draw_sliding(figure: Any, result: Result) -> None:

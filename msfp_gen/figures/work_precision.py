@@ -111,13 +111,13 @@ def _draw_panel(
         if error in values:
             axes.axhline(values[error], color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
             axes.annotate(name, (0.01, values[error]), xycoords=("axes fraction", "data"), xytext=(0, 2),
-                          textcoords="offset points", fontsize=SMALL, color=INK)  # fmt: skip
+                          textcoords="offset points", fontsize=SMALL, color=INK, in_layout=False)  # fmt: skip
     axes.grid(which="minor", visible=False)
 
 
 RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 13, "markerfacecolor": "none",
                         "markeredgecolor": INK, "markeredgewidth": LINE, "zorder": 5}  # fmt: skip
-CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 7, "markeredgewidth": LINE, "clip_on": False}
+CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 7, "markeredgewidth": LINE}
 
 
 def _look(index: int) -> dict[str, Any]:
