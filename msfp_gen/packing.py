@@ -33,11 +33,11 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     return array
 
 
-def bodies_and_surfaces(bearing: Bearing) -> tuple[Array, Array]:
-    """Arrays (n, 7) and (n-1, 8) in the order of the columns above."""
+def bodies_and_surfaces(bearing: Bearing, surface_values: int) -> tuple[Array, Array]:
+    """Arrays (n, 7) and (n-1, surface_values) in the order of the columns above."""
     arrays = bearing.arrays()
     bodies = np.ascontiguousarray(np.column_stack([arrays[name] for name in BODY_COLUMNS]))
-    surfaces = np.ascontiguousarray(np.column_stack([arrays[name] for name in SURFACE_COLUMNS]))
+    surfaces = np.ascontiguousarray(np.column_stack([arrays[name] for name in SURFACE_COLUMNS[:surface_values]]))
     return bodies, surfaces
 
 

@@ -39,8 +39,10 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         out[MSFP_SURFACE_PARAMETERS_CC] = s[5];
         out[MSFP_SURFACE_PARAMETERS_RS] = slider[5];
         out[MSFP_SURFACE_PARAMETERS_PR] = slider[6];
-        out[MSFP_SURFACE_PARAMETERS_KS] = s[6];
-        out[MSFP_SURFACE_PARAMETERS_CS] = s[7];
+        if (MSFP_UPLIFT) {
+            out[MSFP_SURFACE_PARAMETERS_KS] = s[MSFP_SURFACE_VALUES - 2];
+            out[MSFP_SURFACE_PARAMETERS_CS] = s[MSFP_SURFACE_VALUES - 1];
+        }
         /* The resultant leans by friction from the normal, whose place the footprint bounds. */
         const double footprint = fmin(asin(fmin(slider[5] / s[0], 1.0)) + atan(s[2]), 1.5);
         out[MSFP_SURFACE_PARAMETERS_CA] = cos(footprint);

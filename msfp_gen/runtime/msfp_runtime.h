@@ -11,7 +11,7 @@ extern "C" {
 
 /* ---- values: a bearing and its top ------------------------------------------------------- */
 
-#define MSFP_SURFACE_VALUES 8 /* R, s_c, mu, d_y, k_c, c_c, seat stiffness, seat damping */
+#define MSFP_SURFACE_VALUES (MSFP_UPLIFT ? 8 : 6) /* R, s_c, mu, d_y, k_c, c_c; where bodies part, seat stiffness, damping */
 #define MSFP_BODY_VALUES 7    /* l, z, m, J transverse, J axial, r, p; the base first (m, J, z unused) */
 #define MSFP_TOP_VALUES 10    /* k, c, k_rot, c_rot, m, J transverse, J axial, h, anchor x, anchor y */
 
@@ -26,7 +26,7 @@ typedef struct {
 } msfp_parameters;
 
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies /* [N][7] */,
-                         const double *surfaces /* [NB][8] */, const double *top /* [10] */);
+                         const double *surfaces /* [NB][MSFP_SURFACE_VALUES] */, const double *top /* [10] */);
 
 /* ---- one evaluation ---------------------------------------------------------------------- */
 
