@@ -78,6 +78,12 @@ class Model:
         self.extension = extension
         self.info = info
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as what it is a model of: found in the cache, or built, where it is loaded."""
+        from msfp_gen.build import build_model
+
+        return build_model, (self.layout, self.effects)
+
     def __repr__(self) -> str:
         return f"Model({self.spec.key})"
 

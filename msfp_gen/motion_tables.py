@@ -5,6 +5,7 @@ Each class is the table of one kind; its rules serve the scene reader, and `buil
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -14,6 +15,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.fields import Notes, Quantity, Text
 from msfp_gen.motion import Motion
 
+RECORDS = "MSFP_GEN_RECORDS"  # folders, beside that of the scene file, in which records may lie
 _LENGTH = Quantity("m", above=0.0)
 _TIME = Quantity("s", above=0.0)
 _COUNT = Quantity("", above=0.0)
@@ -177,16 +179,43 @@ class Pieces(MotionTable):
         return table | {name: value for name, value in rest.items() if value is not None}
 
 
-def placed(file: str | tuple[str, ...], folder: Path) -> str | tuple[str, ...]:
-    """The path or paths of a `file` key, relative to the folder of its scene, made absolute."""
+def placed(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:
+    """The path or paths of a `file` key, relative to the folder of its scene, made absolute.
+
+    A scene file may name what lies beside it or below, and what lies in the folders that `MSFP_GEN_RECORDS` names:
+    a scene from somebody else reaches nothing more. A table made in Python (`folder` None) names what it likes.
+    """
     if isinstance(file, str):
-        return str((folder / file).resolve())
-    return tuple(str((folder / each).resolve()) for each in file)
+        return _placed(file, folder)
+    return tuple(_placed(each, folder) for each in file)
+
+
+def _placed(file: str, folder: Path | None) -> str:
+    try:
+        path = ((folder or Path()) / file).resolve()
+    except (OSError, ValueError, RuntimeError) as error:  # a NUL, a loop of links
+        raise InputError(f"motion.file = {file!r}: this is no path ({error}); give that of a record") from None
+    named = os.environ.get(RECORDS, "").split(os.pathsep)
+    homes = [folder, *(Path(each).expanduser() for each in named if each)] if folder is not None else []
+    if homes and not any(path.is_relative_to(home.resolve()) for home in homes):
+        raise InputError(
+            f"motion.file = {file!r}: outside the folder of the scene file; put the record there, or name its folder "
+            f"in the environment variable {RECORDS}"
+        )
+    return str(path)
+
+
+def is_file(path: Path) -> bool:
+    """Whether `path` is a regular file; no device, no pipe, and no name that cannot be one."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _existing(file: str | None) -> Path:
     path = Path(str(file))
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"motion.file = {str(path)!r}: no such file; paths are relative to the scene file")
     return path
 

@@ -180,11 +180,16 @@ def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: M
 def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
     """`bearing.surfaces[2].radius`, and ` (surface 3)` as the report counts; bodies start at 2, above the base."""
     parts = location[:1] + location[2:] if location[0] in _TAGGED else location
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{_key(part)}" for part in parts).lstrip(".")
     for name, word, first in (("surfaces", "surface", 1), ("bodies", "body", 2)):
         if parts[1:2] == (name,) and len(parts) > 2:
             return path, f" ({word} {int(parts[2]) + first})"
     return path, ""
+
+
+def _key(name: str) -> str:
+    """A key as TOML writes it: in quotes where it is no plain word."""
+    return name if name.replace("-", "_").isidentifier() and len(name) <= 60 else _short(name)
 
 
 def _kinds(path: str) -> str:
@@ -203,5 +208,8 @@ def _remedy(table: Model, name: str) -> str:
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to write out whole numbers of thousands of digits
+        text = "a number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."

@@ -40,7 +40,7 @@ def generate(
     show([build_table(info)])
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
 def explain(scene: SceneName) -> None:
     """Say in plain words what a scene computes."""
     from msfp_gen.explain import explain as describe
@@ -49,7 +49,7 @@ def explain(scene: SceneName) -> None:
     show(describe(load_scene(scene)))
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen presets")
 def presets() -> None:
     """List the scenes and bearings that come with msfp-gen."""
     from msfp_gen import presets as catalogue
@@ -58,7 +58,7 @@ def presets() -> None:
     show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "bearing"))
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")
 def doctor() -> None:
     """Check Python, libraries, compiler and cache."""
     from msfp_gen.doctor import diagnose

@@ -62,7 +62,7 @@ def run(
         note(f"wrote {path}")
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
 def demo(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where figures and data go.")] = Path(
         "out"

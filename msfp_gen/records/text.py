@@ -14,6 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.piecewise import Array
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_MOST = 256 << 20  # bytes of text, unpacked
 _GZIP = b"\x1f\x8b"
 _DOS_END = b"\x1a"  # fills the last block of files from old systems
 
@@ -81,14 +82,23 @@ class Lines:
 def read_lines(path: Path) -> Lines:
     """The lines of a text file, unpacked if it is gzip, in UTF-8 or Latin-1."""
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path.name}: cannot be read ({error.strerror}); check the path") from None
-    if content.startswith(_GZIP):
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path.name}: no file but a folder, pipe or device; give the path of a record")
+        with path.open("rb") as file:
+            content = file.read(_MOST + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path.name}: cannot be read ({reason}); check the path") from None
+    if content.startswith(_GZIP) and len(content) <= _MOST:
         try:
-            content = gzip.decompress(content)
+            with gzip.open(path) as packed:
+                content = packed.read(_MOST + 1)
         except (OSError, EOFError, zlib.error):
             raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None
+    if len(content) > _MOST:
+        raise InputError(f"{path.name}: more than {_MOST >> 20} MiB of text; no record is that long, give another file")
     content = content.rstrip(_DOS_END)
     if not content.strip():
         raise InputError(f"{path.name}: the file is empty; give a record")
