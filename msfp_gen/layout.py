@@ -72,6 +72,7 @@ class Effects:
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
     friction: the law of the friction coefficient.
+    uplift: whether bodies may part, fly and land (docs/uplift.md).
     """
 
     dimension: Literal["spatial", "planar"] = "spatial"
@@ -80,6 +81,7 @@ class Effects:
     rims: bool = True
     bouc_wen: Literal["report", "isotropic"] = "report"
     friction: Literal["constant"] = "constant"
+    uplift: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, "effects")
@@ -87,6 +89,11 @@ class Effects:
             raise InputError(
                 "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
                 "without inertia; give spin = 'locked' or 'patch'"
+            )
+        if self.sliders == "massless" and self.uplift:
+            raise InputError(
+                "effects.uplift = True with effects.sliders = 'massless': a body in flight moves by its inertia; "
+                "give sliders = 'inertial'"
             )
 
 
@@ -103,4 +110,4 @@ class ModelSpec:
         effects = self.effects
         rims = "rims" if effects.rims else "norims"
         words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, effects.friction)
-        return "-".join((self.layout.name, *words))
+        return "-".join((self.layout.name, *words, *(("uplift",) if effects.uplift else ())))

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BODY_COLUMNS = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
-SURFACE_COLUMNS = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping")
+SURFACE_COLUMNS = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping",
+                   "seat_stiffness", "seat_damping")  # fmt: skip
 
 
 def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
@@ -32,11 +33,11 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     return array
 
 
-def bodies_and_surfaces(bearing: Bearing) -> tuple[Array, Array]:
-    """Arrays (n, 7) and (n-1, 6) in the order of the columns above."""
+def bodies_and_surfaces(bearing: Bearing, surface_values: int) -> tuple[Array, Array]:
+    """Arrays (n, 7) and (n-1, surface_values) in the order of the columns above."""
     arrays = bearing.arrays()
     bodies = np.ascontiguousarray(np.column_stack([arrays[name] for name in BODY_COLUMNS]))
-    surfaces = np.ascontiguousarray(np.column_stack([arrays[name] for name in SURFACE_COLUMNS]))
+    surfaces = np.ascontiguousarray(np.column_stack([arrays[name] for name in SURFACE_COLUMNS[:surface_values]]))
     return bodies, surfaces
 
 
@@ -59,3 +60,15 @@ def load_values(top: Top) -> Array:
     if isinstance(top, PrescribedTop):
         return np.array([*top.force, *top.moment], dtype=float)
     return np.zeros(6)
+
+
+def seated(bearing: Bearing, top: Top | None) -> Array:
+    """Separations at which the seats carry the weights and the vertical load at rest, ndarray, shape (n-1, 3), [m]."""
+    load = 0.0 if top is None else -float(load_values(top)[2])
+    mass = top.mass if isinstance(top, MassTop) else 0.0
+    masses = np.array([body.mass for body in bearing.bodies])
+    masses[-1] += mass
+    carried = load + bearing.gravity * np.cumsum(masses[::-1])[::-1]
+    out = np.zeros((len(masses), 3))
+    out[:, 2] = -carried / np.array([surface.seat_stiffness for surface in bearing.surfaces])
+    return out

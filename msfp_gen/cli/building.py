@@ -26,9 +26,11 @@ def generate(
     sliders: Annotated[str | None, typer.Option(metavar=words(Effects, "sliders"))] = None,
     rims: Annotated[bool | None, typer.Option("--rims/--no-rims", help="Whether sliders meet rims.")] = None,
     bouc_wen: Annotated[str | None, typer.Option(metavar=words(Effects, "bouc_wen"))] = None,
+    uplift: Annotated[bool | None, typer.Option("--uplift/--no-uplift", help="Whether bodies may part.")] = None,
 ) -> None:
     """Derive, emit and compile the equations of a layout."""
-    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen}
+    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen,
+             "uplift": uplift}  # fmt: skip
     effects: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     spec = ModelSpec(Layout(n, m, p), Effects(**effects))
     from msfp_gen.build import generate_to, prepare

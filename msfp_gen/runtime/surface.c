@@ -40,7 +40,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 #endif
 }
 
-void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE])
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE])
 {
     for (int j = 0; j < NB; ++j) {
         double x[MSFP_RIM_LOCAL] = { 0 };
@@ -70,6 +70,88 @@ void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dfo
         }
 }
 
+
+#if MSFP_UPLIFT
+static const int signs[NB] = MSFP_SIGNS;
+
+/* The body that carries the footprint of surface j. */
+static int slider_of(int j) { return signs[j] > 0 ? j + 1 : j; }
+
+/* Compression along the slider's axis and across it. */
+static void compression(const msfp_work *w, int j, double *along, double *across)
+{
+    double d[3], axis[3], square = 0.0;
+    msfp_coordinates_d_get(w->x[j + 1], d);
+    msfp_body_t3_get(w->body[slider_of(j)], axis);
+    *along = -(d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]);
+    for (int i = 0; i < 3; ++i)
+        square += (d[i] + *along * axis[i]) * (d[i] + *along * axis[i]);
+    *across = sqrt(square);
+}
+
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    compression(w, j, &along, &across);
+    if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA])
+        return sqrt(along * along + across * across);
+    return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
+}
+
+/* Force of the seat of surface j, into force[j]; zero where it is open or its damping would pull. */
+void msfp_seat(const msfp_parameters *p, msfp_work *w, int j, int tangent)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    const int k = slider_of(j);
+    double *seat = w->seat[j], *dseat = w->dseat[j];
+    compression(w, j, &along, &across);
+    if (msfp_compression(p, w, j) > 0.0) {
+        if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA]) {
+            if (tangent)
+                msfp_seat_inside_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+            else
+                msfp_seat_inside(par, w->body[k], w->x[j + 1], seat);
+        } else if (tangent)
+            msfp_seat_edge_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+        else
+            msfp_seat_edge(par, w->body[k], w->x[j + 1], seat);
+    } else
+        seat[MSFP_SEAT_GRIP] = seat[MSFP_SEAT_STORED] = seat[MSFP_SEAT_POWER] = 0.0;
+    if (seat[MSFP_SEAT_GRIP] <= 0.0) {
+        memset(seat, 0, (VECTOR + MOMENT) * sizeof *seat);
+        if (tangent)
+            memset(dseat, 0, sizeof w->dseat[j]);
+    }
+    memcpy(w->force[j], seat, sizeof w->force[j]);
+    if (tangent)
+        memcpy(w->dforce[j], dseat, sizeof w->dforce[j]);
+}
+
+/* The wrench of a surface is (F, M) about the centre of its concave side; on its slider's side the seat adds its moment. */
+static void split_moment(msfp_work *w, int j, int tangent)
+{
+    const double *turning = w->seat[j] + VECTOR, *dturning = w->dseat[j] + VECTOR * DOF;
+    const int above = signs[j] > 0;
+    memcpy(w->below[j], w->moment[j], sizeof w->below[j]);
+    double *on = above ? w->moment[j] : w->below[j], *don = above ? w->dmoment[j] : w->dbelow[j];
+    if (tangent)
+        memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
+    for (int i = 0; i < MOMENT; ++i) /* moment_below is what the body below receives, reversed */
+        on[i] += above ? turning[i] : -turning[i];
+    for (int i = 0; i < MOMENT * DOF && tangent; ++i)
+        don[i] += above ? dturning[i] : -dturning[i];
+}
+#else
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    (void)p;
+    (void)w;
+    (void)j;
+    return 1.0;
+}
+#endif
 
 #define ROWS (MOMENT + FRICTION + 1) /* rows of the contact's tangent: M, dY, dZ, N */
 #define ACTIONS (MOMENT + 1)         /* what is condensed: M and N */
@@ -157,6 +239,20 @@ static int condense(const double *par, const double *local, const double *f, dou
     return MSFP_OK;
 }
 
+/* How much of its rim's force a surface presses against: all of it, but no more than it carries itself where bodies may
+ * part; a rim met in flight turns the bodies and presses nothing. */
+static double rim_share(const msfp_work *w, int j)
+{
+    double carried = 0.0, met = 0.0;
+    if (!MSFP_UPLIFT || !w->rim_active[j])
+        return 1.0;
+    for (int i = 0; i < VECTOR; ++i) {
+        carried += w->force[j][i] * w->force[j][i];
+        met += w->rim[j][i] * w->rim[j][i];
+    }
+    return carried < met ? sqrt(carried / met) : 1.0;
+}
+
 /* Force, slip, friction and moment of surface j. */
 int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
 {
@@ -164,13 +260,19 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
     double drf[VECTOR * DOF], dmoment[MOMENT * DOF], dlocal[MSFP_LOCAL_SIZE * DOF];
     const double *par = p->surface[j];
     const double fp[2] = { seed->fp[j][0], seed->fp[j][1] };
+    double rim[VECTOR];
     msfp_rim_force(p, w, j, tangent ? drim : NULL);
+    const double share = rim_share(w, j);
+    for (int i = 0; i < VECTOR; ++i)
+        rim[i] = share * w->rim[j][i];
     if (tangent) {
         msfp_rim_columns(w, j, drim, drf, dmoment);
-        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j],
+        for (int i = 0; i < VECTOR * DOF; ++i)
+            drf[i] *= share;
+        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j],
                                    w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
-        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
     int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f, w->contact[j]);
     if (status == MSFP_OK && tangent)
         status = condense(par, w->local[j], f, seed->beta, w->contact[j], condensed);
@@ -190,5 +292,8 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
         msfp_moment_to_world_tangent(w->body[j], moment, w->moment[j], w->dbody[j], dmoment, w->dmoment[j]);
     } else
         msfp_moment_to_world(w->body[j], moment, w->moment[j]);
+#if MSFP_UPLIFT
+    split_moment(w, j, tangent);
+#endif
     return MSFP_OK;
 }
