@@ -96,7 +96,8 @@ class Model:
         """The compiled stack (`Stack` of the extension) for one bearing and top."""
         if bearing.layout != self.layout:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
-        return self.extension.Stack(bearing.gravity, *bodies_and_surfaces(bearing, self.extension.SURFACE_VALUES), top_values(top, anchor))
+        values = bodies_and_surfaces(bearing, self.extension.SURFACE_VALUES)
+        return self.extension.Stack(bearing.gravity, *values, top_values(top, anchor))
 
     def evaluate(
         self,

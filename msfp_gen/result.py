@@ -81,7 +81,7 @@ class Result:
         return write_csv(self, path)
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Write flat columns as Parquet, units in their metadata; InputError with the remedy where pyarrow is missing."""
+        """Write flat columns as Parquet, units in their metadata; InputError names the remedy without pyarrow."""
         from msfp_gen.export import write_parquet
 
         return write_parquet(self, path)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import building, drawing, judging, reporting, records, reporting, running, storing
+from msfp_gen.cli import building, drawing, judging, records, reporting, running, storing
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError

@@ -12,7 +12,6 @@ import typer
 from msfp_gen.cli.console import Output, Progress, SceneName, note, number, say, show, words
 from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
 from msfp_gen.errors import RunError
-from msfp_gen.export import check_result_path
 from msfp_gen.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.solver import Solver
 
@@ -54,6 +53,8 @@ def run(
     """Simulate a scene."""
     keep = Keep.of(checkpoint, every, resume)
     if output is not None:
+        from msfp_gen.export import check_result_path
+
         check_result_path(output, "--output")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")

@@ -14,6 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.piecewise import Array
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_LARGEST = 1e100  # of what a record holds in any unit; conversions must not overflow
 _MOST = 256 << 20  # bytes of text, unpacked
 _GZIP = b"\x1f\x8b"
 _DOS_END = b"\x1a"  # fills the last block of files from old systems
@@ -43,7 +44,7 @@ class Lines:
         """`field`, text of the line at `index`, as a finite number."""
         text = field.strip()
         value = float(text) if _NUMBER.fullmatch(text) else np.nan
-        if not np.isfinite(value):
+        if not abs(value) < _LARGEST:
             self.fail(index, f"{text[:24]!r} is not a finite number; repair or cut the data")
         return value
 
