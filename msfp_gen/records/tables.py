@@ -75,7 +75,8 @@ def _intensities(record: Record, motion: Record | Corrected) -> Table:
         for i, axis in enumerate(COMPONENTS)
     ]  # fmt: skip
     columns = ("component", "PGA [g]", "PGV [cm/s]", "PGD [cm]", "Arias [m/s]", "D5-95 [s]")
-    return Table("corrected" if motion is not record else "as recorded, less its mean", columns, rows)
+    title = "as recorded, less its mean" if motion is record else "the motion of the base"
+    return Table(title, columns, rows)
 
 
 def _ordinates(motion: Record | Corrected) -> Table:
