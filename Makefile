@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test slow lint types figures clean
+.PHONY: demo test slow lint types figures docs clean
 
 demo: $(STAMP)
 	$(BIN)/msfp-gen demo -o out
@@ -23,6 +23,11 @@ types: $(STAMP)
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
+	$(BIN)/python docs/make_figures.py
+
+# The API reference, from the docstrings; a warning is an error.
+docs: $(STAMP)
+	$(BIN)/python -W error -m pdoc --math -o build/docs msfp_gen
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "msfp-gen needs Python 3.11 or newer: make PYTHON=python3.11 test")'

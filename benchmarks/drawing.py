@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, STYLE
-from msfp_gen.output import replacing
+from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page, panels
 from msfp_gen.summary import axial_load
 from msfp_gen.top import RigTop
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from reference.friction_circle import Push
 
@@ -29,25 +27,9 @@ Array = NDArray[np.float64]
 Runs = Callable[[str], "Result"]  # a scene preset's name -> its run
 
 
-@contextmanager
-def drawn(path: Path, width: float, height: float) -> Iterator[Figure]:
+def drawn(path: Path, width: float, height: float) -> AbstractContextManager[Figure]:
     """A figure in the project's style, written to `path` (whole or not at all) when the block ends without error."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        yield figure
-        with replacing(path) as temporary:
-            figure.savefig(temporary)
-
-
-def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
-    """One row of axes with titles."""
-    row: list[Axes] = list(figure.subplots(1, len(titles), squeeze=False, **options)[0])
-    for axes, title in zip(row, titles, strict=True):
-        axes.set_title(title)
-    return row
+    return page(width, height, path)
 
 
 def ratio(result: Result) -> Array:

@@ -43,11 +43,12 @@ class Blocks:
     points: Block
     base_motion: Block
     energy: Block
+    seat: Block
     coefficient: Block | None = None
     """The friction coefficient as an unknown, where it follows a law."""
 
 
-def _parameters(new: Maker, planar: bool) -> dict[str, Block]:
+def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
     """What a user gives: dimensions, masses, surfaces, the top."""
     return {
         "dimensions": new("dimensions")
@@ -80,6 +81,10 @@ def _parameters(new: Maker, planar: bool) -> dict[str, Block]:
         .scalar("cc", "N s/m", "rim damping (3.23)")
         .scalar("rs", "m", "radius of the slider that carries the contact patch")
         .scalar("pr", "m", "p, height of the rim contact above the slider's face (3.25)")
+        .scalar("ks", "N/m", "stiffness of the seat, along the force through the surface (docs/uplift.md)")
+        .scalar("cs", "s/m", "damping of the seat, over its stiffness and compression")
+        .scalar("ca", "-", "cosine of the half-angle of the footprint, as the resultant sees it")
+        .scalar("sa", "-", "its sine")
         .build(),
         "top_parameters": new("top_parameters")
         .scalar("k", "N/m", "horizontal stiffness of the rig")
@@ -96,10 +101,10 @@ def _parameters(new: Maker, planar: bool) -> dict[str, Block]:
     }
 
 
-def _motion(new: Maker, planar: bool) -> dict[str, Block]:
-    """Coordinates and kinematics of a body, and the motion of the base."""
-    return {
-        "coordinates": new("coordinates")
+def _coordinates(new: Maker, uplift: bool) -> Block:
+    """Angles of a body; with uplift also how far its sphere centre below has left that of the surface."""
+    builder = (
+        new("coordinates")
         .scalar("psi", "rad", "psi, first Euler angle", 0)
         .scalar("theta", "rad", "theta, second Euler angle")
         .scalar("phi", "rad", "phi, spin", 0)
@@ -109,7 +114,18 @@ def _motion(new: Maker, planar: bool) -> dict[str, Block]:
         .scalar("psi2", "rad/s^2", "second derivative of psi", 0)
         .scalar("theta2", "rad/s^2", "second derivative of theta")
         .scalar("phi2", "rad/s^2", "second derivative of phi", 0)
-        .build(),
+    )
+    if uplift:
+        builder.vector("d", "m", "separation delta of the sphere centres, along E1, E2, E3", POLAR)
+        builder.vector("d1", "m/s", "d delta/dt", POLAR)
+        builder.vector("d2", "m/s^2", "second derivative of delta", POLAR)
+    return builder.build()
+
+
+def _motion(new: Maker, uplift: bool) -> dict[str, Block]:
+    """Coordinates and kinematics of a body, and the motion of the base."""
+    return {
+        "coordinates": _coordinates(new, uplift),
         "body": new("body")
         .vector("t1", "-", "t_1 (2.1)", POLAR)
         .vector("t2", "-", "t_2 (2.1)", (0, 1, 0))
@@ -129,7 +145,7 @@ def _motion(new: Maker, planar: bool) -> dict[str, Block]:
         .scalar("st", "-", "sin theta")
         .scalar("ct", "-", "cos theta")
         .build(),
-        "points": _points(planar),
+        "points": _points(new),
         "base_motion": new("base_motion")
         .vector("U", "m/s", "velocity of the base", POLAR)
         .vector("B", "m/s^2", "acceleration of the base", POLAR)
@@ -143,7 +159,7 @@ def _motion(new: Maker, planar: bool) -> dict[str, Block]:
     }
 
 
-def _interfaces(new: Maker, planar: bool) -> dict[str, Block]:
+def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
     """What passes through a surface, and what decides it."""
     return {
         "vector": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
@@ -184,7 +200,7 @@ def _interfaces(new: Maker, planar: bool) -> dict[str, Block]:
     }
 
 
-def _rims(new: Maker, planar: bool) -> dict[str, Block]:
+def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
     """Gap and rim of a surface."""
     return {
         "rim": new("rim")
@@ -201,10 +217,17 @@ def _rims(new: Maker, planar: bool) -> dict[str, Block]:
         .scalar("theta1", "rad/s", "its rate")
         .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
+        "seat": new("seat")
+        .vector("F", "N", "force on the body above, along E1, E2, E3", POLAR)
+        .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)
+        .scalar("grip", "-", "1 + damping: the seat does not pull below zero")
+        .scalar("stored", "J", "elastic energy")
+        .scalar("power", "W", "rate of the elastic energy")
+        .build(),
     }
 
 
-def _balances(new: Maker, planar: bool) -> dict[str, Block]:
+def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
     """What a body's balances and the top give."""
     return {
         "top_wrench": new("top_wrench")
@@ -220,18 +243,18 @@ def _balances(new: Maker, planar: bool) -> dict[str, Block]:
     }
 
 
-def make_blocks(planar: bool) -> Blocks:
-    """The blocks of a planar or spatial model."""
+def make_blocks(planar: bool, uplift: bool = False) -> Blocks:
+    """The blocks of a planar or spatial model, with or without bodies that part."""
 
     def new(name: str) -> BlockBuilder:
         return BlockBuilder(name, planar)
 
     rooms = (_parameters, _motion, _interfaces, _rims, _balances)
-    return Blocks(**{name: block for room in rooms for name, block in room(new, planar).items()})
+    return Blocks(**{name: block for room in rooms for name, block in room(new, uplift).items()})
 
 
-def _points(planar: bool) -> Block:
-    builder = BlockBuilder("points", planar)
+def _points(new: Maker) -> Block:
+    builder = new("points")
     for name, meaning in (
         ("lo", "r_k-1,k bottom centre"),
         ("cm", "r_k centre of mass"),

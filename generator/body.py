@@ -79,6 +79,17 @@ def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Ve
     return p.let_vector(r, "r"), v, p.rate_vector(v)
 
 
+def seat_of(p: Program, up: Symbols, x: Symbols) -> Vector:
+    """Sphere centre of the body at its lower end: that of the surface below, moved by delta where bodies may part."""
+    p.declare_rates(up["C"], up["V"])
+    p.declare_rates(up["V"], up["A"])
+    if "d" not in x:
+        return up["C"]  # type: ignore[no-any-return]
+    p.declare_rates(x["d"], x["d1"])
+    p.declare_rates(x["d1"], x["d2"])
+    return p.let_vector(add(up["C"], x["d"]), "seat")
+
+
 def forward(b: Blocks) -> Program:
     """Body k from body k-1: (2.1)-(2.6), (3.4)-(3.12) and their derivatives."""
     p = Program(
@@ -89,10 +100,9 @@ def forward(b: Blocks) -> Program:
     up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=True)
     out = turn(p, up, x)
-    p.declare_rates(up["C"], up["V"])
-    p.declare_rates(up["V"], up["A"])
-    out["C"], out["V"], out["A"] = point(p, up["C"], par["e"], out["t3"])
-    out["rc"], out["vc"], out["ac"] = point(p, up["C"], par["c"], out["t3"])
+    seat = seat_of(p, up, x)
+    out["C"], out["V"], out["A"] = point(p, seat, par["e"], out["t3"])
+    out["rc"], out["vc"], out["ac"] = point(p, seat, par["c"], out["t3"])
     p.write(b.body, out, tangents=[q for q in b.body.quantities if q not in ("rc", "vc")])
     return p
 
@@ -104,8 +114,7 @@ def named_points(b: Blocks) -> Program:
     up: Symbols = p.read(b.body, "u", active=False)
     x: Symbols = p.read(b.coordinates, "x", active=False)
     t3 = turn(p, up, x)["t3"]
-    p.declare_rates(up["C"], up["V"])
-    p.declare_rates(up["V"], up["A"])
+    seat = seat_of(p, up, x)
     concave_up = (1 + d["sign_lower"]) / 2
     bottom = p.let(-d["sign_lower"] * d["radius_lower"])
     centroid = p.let(bottom + concave_up * d["centroid"] + (1 - concave_up) * (d["height"] - d["centroid"]))
@@ -113,7 +122,7 @@ def named_points(b: Blocks) -> Program:
     distances = {"lo": bottom, "cm": centroid, "up": top, "sc": p.let(top + d["sign_upper"] * d["radius_upper"])}
     out: Symbols = {}
     for name, distance in distances.items():
-        out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, up["C"], distance, t3)
+        out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, seat, distance, t3)
     p.write(b.points, out, tangents=False)
     return p
 
@@ -231,7 +240,11 @@ def force_to_world(b: Blocks) -> Program:
     return p
 
 
-def to_local(b: Blocks) -> Program:
+LEAST_FORCE = sp.Float("1e-6")
+"""What a parted surface still carries [N], so that the direction of its force is defined (docs/uplift.md)."""
+
+
+def to_local(b: Blocks, uplift: bool) -> Program:
     """Contact force and relative angular velocity of a surface in the basis of the body below it."""
     p = Program(
         "surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)"
@@ -242,12 +255,13 @@ def to_local(b: Blocks) -> Program:
     lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
     total: Symbols = p.read(b.vector, "tot")
     rim: Symbols = p.read(b.vector, "rim")
+    least: Vector = (sp.Integer(0), sp.Integer(0), LEAST_FORCE if uplift else sp.Integer(0))
     sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
     zero = sp.Integer(0)
     t2: Vector = (zero, cos_psi, sin_psi)
     t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
     relative = add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
-    force = subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"])
+    contact = subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"])
     tilt = {"tilt": cos_psi * cos_theta} if "tilt" in b.local.quantities else {}
-    p.write(b.local, {"p": force, "dw": relative, **tilt})
+    p.write(b.local, {"p": add(contact, least), "dw": relative, **tilt})
     return p

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.layout import ModelSpec
 
-from . import body, contact, laws, top
+from . import body, contact, laws, seat, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -26,11 +26,18 @@ class Equations:
             return ("theta",)
         return ("psi", "theta") if self.spec.effects.spin == "locked" else ("psi", "theta", "phi")
 
+    @property
+    def separations(self) -> tuple[str, ...]:
+        """Components of one surface's separation that are unknown."""
+        if not self.spec.effects.uplift:
+            return ()
+        return ("dx", "dz") if self.spec.effects.dimension == "planar" else ("dx", "dy", "dz")
+
 
 def derive(spec: ModelSpec) -> Equations:
     """Derive the programs; what an effect leaves out never enters them."""
     effects = spec.effects
-    blocks = laws.with_law(make_blocks(planar=effects.dimension == "planar"), effects.law)
+    blocks = laws.with_law(make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift), effects.law)
     patch = effects.spin == "patch" and effects.dimension == "spatial"
     law = contact.Law(effects.bouc_wen, patch, effects.law)
     massless = effects.sliders == "massless"
@@ -38,7 +45,7 @@ def derive(spec: ModelSpec) -> Equations:
         body.arms(blocks),
         body.forward(blocks),
         body.named_points(blocks),
-        body.to_local(blocks),
+        body.to_local(blocks, effects.uplift),
         contact.contact(blocks, law),
         contact.report_contact(blocks, law),
         body.to_world(blocks),
@@ -53,4 +60,6 @@ def derive(spec: ModelSpec) -> Equations:
     ]
     if effects.rims:
         programs.append(contact.rim(blocks))
+    if effects.uplift:
+        programs += [seat.seat_inside(blocks), seat.seat_edge(blocks)]
     return Equations(spec, blocks, tuple(programs))

@@ -31,7 +31,9 @@ class Surface:
 
     radius: R, of the sphere [m]. capacity: s_c, the arc at which the rim is met (2.101) [m]. friction: mu.
     yield_displacement: d_y of the Bouc-Wen law [m]; the report's R_gamma/R_0 (2.94) with its numbers in SI is 1/d_y.
-    rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103). The rest are numbers of laws of the friction coefficient
+    rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
+    seat_stiffness [N/m], seat_damping [s/m]: of the contact across the surface, where bodies may part: force
+    k s (1 + c ds/dt) at compression s (docs/uplift.md). The rest are numbers of laws of the friction coefficient
     (docs/friction.md): given where `Effects.friction` takes them and nowhere else. Raises InputError.
     """
 
@@ -41,6 +43,8 @@ class Surface:
     yield_displacement: Annotated[float, _LENGTH]
     rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
     rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+    seat_stiffness: Annotated[float, Quantity("N/m", above=0.0)] = 5e9
+    seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 1.0
     friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
     velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None
     velocity_drop: Annotated[float | None, Quantity("", least=0.0)] = None

@@ -39,6 +39,7 @@ class BuildInfo:
     `path` is the extension, `folder` holds it with its sources, manifest and `build.log`. `cached` says that it was
     there already. `stages` are the seconds of derive, lower, emit and compile when it was built, now or earlier;
     `seconds` is the time that this call took. `statements` and `operations` count the emitted kernels.
+    `key` is the cache key: everything that decides what the model computes.
     """
 
     path: Path
@@ -50,6 +51,7 @@ class BuildInfo:
     seconds: float
     statements: int
     operations: int
+    key: str = ""
 
 
 def build_model(layout: Layout, effects: Effects | None = None, *, progress: Progress | None = None) -> Model:
@@ -93,7 +95,7 @@ def prepare(spec: ModelSpec, progress: Progress | None = None) -> BuildInfo:
     return BuildInfo(
         path=entry.folder / manifest.extension, folder=entry.folder, module=entry.module, spec=spec.key,
         cached=not built, stages=manifest.stages, seconds=perf_counter() - begin,
-        statements=manifest.statements, operations=manifest.operations,
+        statements=manifest.statements, operations=manifest.operations, key=entry.key,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import os
 import shutil
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -49,14 +49,28 @@ class Manifest:
     operations: int
     stages: dict[str, float]
 
+    @property
+    def text(self) -> str:
+        """The file: JSON that ends with the sha256 of everything else in it."""
+        values = asdict(self)
+        return json.dumps(values | {"sha256": _sha256(json.dumps(values))}, indent=1) + "\n"
+
     def write(self, folder: Path) -> None:
         """Write `manifest.json` into `folder`."""
-        (folder / MANIFEST_NAME).write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+        (folder / MANIFEST_NAME).write_bytes(self.text.encode())
 
     @classmethod
     def read(cls, folder: Path) -> Manifest:
-        """Read it back; ValueError or TypeError if it is not one, OSError if it cannot be read."""
-        return cls(**json.loads((folder / MANIFEST_NAME).read_text(encoding="utf-8")))
+        """Read it back; ValueError or TypeError if a byte of it was altered, OSError if it cannot be read."""
+        content = (folder / MANIFEST_NAME).read_bytes()
+        try:
+            values = dict(json.loads(content))
+        except RecursionError:
+            raise ValueError("the manifest is nested too deeply") from None
+        manifest = cls(**{name: value for name, value in values.items() if name != "sha256"})
+        if manifest.text.encode() != content:
+            raise ValueError("the manifest is not as it was written")
+        return manifest
 
 
 def cache_root() -> Path:
@@ -95,6 +109,7 @@ class Entry:
         """The entry of a model; costs some milliseconds."""
         compiler = find_compiler()
         inputs = {
+            "manifest": 2,
             "spec": spec.key,
             "sources": _digest_rooms(),
             "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
@@ -112,13 +127,17 @@ class Entry:
             return None
         try:
             manifest = Manifest.read(self.folder)
-            digests = digest(self.folder / manifest.extension), manifest.files[manifest.extension]
-            sound = manifest.key == self.key and digests[0] == digests[1]
-        except (OSError, ValueError, TypeError, KeyError):
+            sound = manifest.key == self.key and manifest.extension in manifest.files
+            # The sources too: `generate_to` hands them out.
+            sound = sound and all(digest(self.folder / name) == known for name, known in manifest.files.items())
+        except (OSError, ValueError, TypeError):
             sound = False
         # A folder that is gone by now is being replaced by another process.
         if not sound and self.folder.is_dir():
             warnings.warn(f"{self.folder} is damaged and is built again", RuntimeWarning, stacklevel=3)
+        if sound:
+            with suppress(OSError):  # when it was last used, for `msfp-gen cache --prune`
+                os.utime(self.folder / MANIFEST_NAME)
         return manifest if sound else None
 
     @contextmanager
@@ -171,6 +190,10 @@ def writing(folder: Path, field: str = "MSFP_GEN_CACHE") -> Iterator[None]:
 def digest(path: Path) -> str:
     """The sha256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _digest_rooms() -> str:

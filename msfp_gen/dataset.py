@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from msfp_gen.errors import InputError
 from msfp_gen.history import ENERGY, LABELS, Counters, Event, History, quantities
-from msfp_gen.output import DATASET_SUFFIXES, check_output, replacing
+from msfp_gen.output import DATASET_SUFFIXES, check_output, write_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +41,11 @@ def to_dataset(result: Result) -> xr.Dataset:
 
 def write_netcdf(result: Result, path: str | Path) -> Path:
     """Write the dataset of `result` to `path`, whole or not at all. Raises InputError for a path that cannot be."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from msfp_gen.kept_motion import COMPRESSED, GROUP, PIECES, to_pieces
+
     path = check_output(path, DATASET_SUFFIXES)
     dataset = result.dataset
     # Light compression: histories of stuck surfaces and closed rims are mostly repeats.
@@ -48,17 +54,25 @@ def write_netcdf(result: Result, path: str | Path) -> Path:
         for name, variable in dataset.data_vars.items()
         if "time" in variable.dims and variable.size
     }
-    with replacing(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    # Made in memory: on a disk that is full HDF5 itself does not fail, it crashes.
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
+        if dataset.attrs["motion"] == PIECES:
+            to_pieces(result.scene.motion).dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+    write_bytes(path, [content.getbuffer()])
     return path
 
 
-def read_netcdf(path: str | Path) -> xr.Dataset:
-    """The dataset that `Result.to_netcdf` wrote, in memory. Raises InputError where `path` is not such a file."""
+def read_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
+    """The dataset that `Result.to_netcdf` wrote, in memory. Raises InputError where `path` is not such a file.
+
+    group: of the file; "motion" holds the motion of the base where the scene alone would not make it again.
+    """
     import xarray as xr
 
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        with xr.open_dataset(path, engine="h5netcdf", group=group) as dataset:
             return dataset.load()
     except OSError as error:
         raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
@@ -66,6 +80,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
 
 def read_result(path: str | Path) -> Result:
     """The result that `Result.to_netcdf` wrote, its scene included. Raises InputError where `path` holds none."""
+    from msfp_gen.kept_motion import GROUP, PIECES, from_pieces
     from msfp_gen.result import Result
     from msfp_gen.scenefile import scene_from_table
 
@@ -73,8 +88,11 @@ def read_result(path: str | Path) -> Result:
     if dataset.attrs.get("source") != "msfp-gen":
         raise InputError(f"path = {str(path)!r}: no result of msfp-gen; give a file that `run -o` wrote")
     attributes = dataset.attrs
+    scene = tomllib.loads(attributes["scene"])
+    if attributes.get("motion") == PIECES:
+        scene["motion"] = from_pieces(read_netcdf(path, GROUP))
     return Result(
-        scene_from_table(tomllib.loads(attributes["scene"])), _history(dataset), _event_list(dataset),
+        scene_from_table(scene), _history(dataset), _event_list(dataset),
         Counters(**_without(COUNTER, attributes)), attributes["status"], attributes["message"],
         _without(PROVENANCE, attributes),
     )  # fmt: skip
@@ -114,14 +132,15 @@ def _events(result: Result) -> Variables:
 
 
 def _attributes(result: Result) -> dict[str, str | int | float]:
-    from msfp_gen.scenefile import scene_text
+    from msfp_gen.kept_motion import PIECES, RECIPE, needs_pieces, recipe
 
     return {
         "title": result.scene.name or "unnamed",
         "source": "msfp-gen",
         "status": result.status,
         "message": result.message,
-        "scene": scene_text(result.scene),
+        "scene": recipe(result.scene),
+        "motion": PIECES if needs_pieces(result.scene) else RECIPE,
         **_prefixed(COUNTER, asdict(result.counters)),
         **_prefixed(PROVENANCE, result.provenance),
     }

@@ -33,6 +33,8 @@ MEANINGS: dict[tuple[str, object], str] = {
     ("rims", False): "surfaces have no rims: sliders may pass their capacity",
     ("bouc_wen", "report"): "switches for each axis (2.94)-(2.98)",
     ("bouc_wen", "isotropic"): "one switch along the slip, the same in every direction",
+    ("uplift", False): "bodies never part; a run in which they would stops with a named error",
+    ("uplift", True): "bodies may part, fly and land at every surface",
     ("friction", "constant"): "the friction coefficient does not change",
     ("friction", "velocity"): "it rises with the sliding velocity, exponentially from friction_slow to friction",
     ("friction", "pvt"): "it follows pressure, velocity and temperature (Kumar et al. 2015)",

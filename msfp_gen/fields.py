@@ -55,9 +55,9 @@ class Quantity:
         kind = Integral if self.whole else Real
         if isinstance(value, bool) or not isinstance(value, kind):
             raise ValueError(self._remedy())
-        number = int(value) if self.whole else float(value)  # type: ignore[call-overload]
+        number = int(value) if self.whole else _float(value)  # type: ignore[call-overload]
         low = (self.above is not None and number <= self.above) or (self.least is not None and number < self.least)
-        if low or not math.isfinite(number):
+        if low or not math.isfinite(_float(number)):
             raise ValueError(self._remedy())
         return number
 
@@ -101,7 +101,7 @@ class Notes:
     def parse(self, value: object, *, text: bool = False) -> dict[str, str | float]:
         """A copy of `value`; raises ValueError with the remedy alone."""
         fine = isinstance(value, Mapping) and all(
-            isinstance(key, str) and (isinstance(item, str) or (isinstance(item, Real) and math.isfinite(item)))
+            isinstance(key, str) and (isinstance(item, str) or (isinstance(item, Real) and math.isfinite(_float(item))))
             for key, item in value.items()
         )
         if not fine:
@@ -166,6 +166,14 @@ def _rule(hint: Any) -> Rule | None:
     if get_origin(hint) is Literal:
         return Choice(get_args(hint))
     return next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Rule)), None)
+
+
+def _float(value: Any) -> float:
+    """`value` as a float; infinite where it is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _is_sequence(value: object) -> bool:

@@ -36,6 +36,8 @@ ENERGY: dict[str, str] = {
     "rim_stored": "energy stored in the rims",
     "rim_dissipated": "energy dissipated at the rims",
     "top_dissipated": "energy dissipated by the dampers of the top",
+    "seat_stored": "energy stored in the seats of the surfaces, where bodies may part",
+    "seat_dissipated": "energy dissipated in those seats, landings included",
     "numerical": "input less everything else: what the method adds or loses",
 }
 
@@ -73,6 +75,10 @@ class History:
     sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
     gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
     rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
+    separation: Annotated[
+        Array, Rows(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
+    ]
+    lift: Annotated[Array, Rows(("surface",), "m", "how far the surface is open; 0 while it is closed")]
     interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
     slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
     base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
@@ -132,11 +138,11 @@ def quantities() -> dict[str, Rows]:
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """Something that happened at one instant: a rim met or left, or the stop asked for (surface 0)."""
+    """Something that happened at one instant: a rim met or left, bodies that part or land, the stop (surface 0)."""
 
     time: float  # [s]
     surface: int  # 1..n-1, bottom first
-    kind: Literal["rim_contact", "rim_release", "stop"]
+    kind: Literal["rim_contact", "rim_release", "stop", "lift_off", "landing"]
     displacement: Array  # shape (3,), [m]
     top_force: Array  # shape (3,), [N]
 

@@ -74,6 +74,7 @@ class Effects:
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
     friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature ("pvt"),
     or custom: the formula in friction_law (docs/friction.md).
+    uplift: whether bodies may part, fly and land (docs/uplift.md).
     """
 
     dimension: Literal["spatial", "planar"] = "spatial"
@@ -83,6 +84,7 @@ class Effects:
     bouc_wen: Literal["report", "isotropic"] = "report"
     friction: Literal["constant", "velocity", "pvt", "custom"] = "constant"
     friction_law: str | None = None
+    uplift: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, "effects")
@@ -94,6 +96,11 @@ class Effects:
             raise InputError(
                 "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
                 "without inertia; give spin = 'locked' or 'patch'"
+            )
+        if self.sliders == "massless" and self.uplift:
+            raise InputError(
+                "effects.uplift = True with effects.sliders = 'massless': a body in flight moves by its inertia; "
+                "give sliders = 'inertial'"
             )
 
     @property
@@ -116,4 +123,4 @@ class ModelSpec:
         rims = "rims" if effects.rims else "norims"
         friction = effects.friction + (f"[{effects.friction_law.replace(' ', '')}]" if effects.friction_law else "")
         words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, friction)
-        return "-".join((self.layout.name, *words))
+        return "-".join((self.layout.name, *words, *(("uplift",) if effects.uplift else ())))

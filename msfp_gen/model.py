@@ -81,6 +81,12 @@ class Model:
         self.extension = extension
         self.info = info
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as what it is a model of: found in the cache, or built, where it is loaded."""
+        from msfp_gen.build import build_model
+
+        return build_model, (self.layout, self.effects)
+
     def __repr__(self) -> str:
         return f"Model({self.spec.key})"
 
@@ -94,8 +100,8 @@ class Model:
         if bearing.layout != self.layout:
             raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
         check_bearing(self.effects.law, self.effects.friction, bearing)
-        bodies, surfaces = bodies_and_surfaces(bearing, self.effects.law)
-        return self.extension.Stack(bearing.gravity, bodies, surfaces, top_values(top, anchor))
+        values = bodies_and_surfaces(bearing, self.effects)
+        return self.extension.Stack(bearing.gravity, *values, top_values(top, anchor))
 
     def evaluate(
         self,

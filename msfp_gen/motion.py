@@ -17,7 +17,7 @@ from msfp_gen.piecewise import Array, Metadata, Pieces
 if TYPE_CHECKING:
     from os import PathLike
 
-    from msfp_gen.records import Record
+    from msfp_gen.records import Record, ScaleTo
 
 CHANNELS = ("u_g1", "u_g2", "u_g3", "psi_1", "theta_1", "phi_1")
 # Which of psi_1, theta_1, phi_1 turn -> the only plane such rocking stays in, and the channel across that plane.
@@ -25,6 +25,8 @@ _ROCKING_PLANES: dict[tuple[bool, ...], tuple[float, int]] = {
     (False, True, False): (0.0, 1),
     (True, False, False): (np.pi / 2, 0),
 }
+
+_BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "acceleration": "from_acceleration"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,6 +225,17 @@ class Motion:
         return cls._of(samples.integrated(time, acceleration), name)
 
     @classmethod
+    def from_velocity(cls, time: ArrayLike, velocity: ArrayLike, *, name: str = "") -> Motion:
+        """Sampled velocity, interpolated by a cubic spline and integrated from zero displacement.
+
+        Args:
+            time: shape (k,), [s], rising, k >= 4; a first time other than zero is moved to zero and kept in metadata.
+            velocity: shape (k, 3), [m/s]; where it is not zero at first, a run starts with everything moving along.
+            name: a label.
+        """
+        return cls._of(samples.integrated_once(time, velocity), name)
+
+    @classmethod
     def harmonic(
         cls,
         amplitude: float,
@@ -287,8 +300,12 @@ class Motion:
         record: Record,
         *,
         scale: float = 1.0,
+        scale_to: ScaleTo | None = None,
         start: float | None = None,
         duration: float | None = None,
+        correct: bool = True,
+        corner: float = 0.05,
+        taper: float = 1.0,
         name: str | None = None,
     ) -> Motion:
         """A recorded acceleration, baseline corrected (`records.baseline_corrected`), as displacement from rest.
@@ -296,20 +313,24 @@ class Motion:
         Args:
             record: from `records.read_record` or `records.bundled`.
             scale: multiplies the motion.
+            scale_to: a target that the corrected motion is scaled to instead; metadata `scale` says by how much.
             start: first time kept [s]; None with a duration: its strongest part by Arias intensity.
             duration: length kept [s]; None: to the end.
+            correct: False takes the record as it is (`records.uncorrected`): for one corrected by its agency.
+            corner: of the high-pass [Hz].
+            taper: length of the smooth start and end [s].
             name: a label; None: the record's.
         """
-        from msfp_gen.records import baseline_corrected
+        from msfp_gen.records import prepared
 
-        corrected = baseline_corrected(record, start=start, duration=duration)
-        return cls._of(samples.recorded(corrected, scale), record.name if name is None else name)
+        ready, factor = prepared(record, scale, scale_to, start, duration, correct, corner, taper)
+        return cls._of(samples.recorded(ready, factor), record.name if name is None else name)
 
     @classmethod
     def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:
-        """A table of time with displacements or accelerations and units in its header: see `records.read_table`."""
+        """A table over time of displacements, velocities or accelerations with units: see `records.read_table`."""
         from msfp_gen.records import read_table
 
         table = read_table(path)
-        build: Callable[..., Motion] = cls.from_arrays if table.quantity == "displacement" else cls.from_acceleration
+        build: Callable[..., Motion] = getattr(cls, _BUILDERS[table.quantity])
         return build(table.time, table.values, name=name or table.name)

@@ -78,7 +78,10 @@ def checked_pieces(
     if len(missing):
         raise InputError(f"jumps: {missing[0]:g} s is not a knot; put a knot there")
     for derivative, (quantity, remedy) in enumerate(_JUMPS):
-        size, allowance = piecewise.knot_jumps(k, c, derivative)
+        with np.errstate(over="ignore", invalid="ignore"):
+            size, allowance = piecewise.knot_jumps(k, c, derivative)
+        if not (np.isfinite(size).all() and np.isfinite(allowance).all()):
+            raise InputError(f"motion: the {quantity} is not finite within {k[-1]:g} s; give smaller numbers")
         bad = np.abs(size) > allowance
         if derivative == 2:
             bad &= ~np.isin(k[1:-1], j)[:, None]

@@ -5,19 +5,33 @@ Each class is the table of one kind; its rules serve the scene reader, and `buil
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from msfp_gen.errors import InputError
-from msfp_gen.fields import Notes, Quantity
+from msfp_gen.fields import Notes, Quantity, Text
 from msfp_gen.motion import Motion
 
+RECORDS = "MSFP_GEN_RECORDS"  # folders, beside that of the scene file, in which records may lie
 _LENGTH = Quantity("m", above=0.0)
 _TIME = Quantity("s", above=0.0)
 _COUNT = Quantity("", above=0.0)
 _ANGULAR = Quantity("rad/s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Paths(Text):
+    """The path of a file, or a list of them."""
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` itself, a list as a tuple; raises ValueError with the remedy alone."""
+        several = isinstance(value, list | tuple) and value and all(isinstance(item, str) for item in value)
+        if not (isinstance(value, str) or several):
+            raise ValueError("give a text in quotes, or a list of them: one file for each component")
+        return value if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,14 +113,21 @@ class Ramp(MotionTable):
 
 @dataclass(frozen=True, kw_only=True)
 class RecordMotion(MotionTable):
-    """`Motion.from_record`: a file, or a record that comes with the package."""
+    """`Motion.from_record`: one file or one for each component, or a record that comes with the package.
+
+    `scale_to` is a table of the fields of `records.ScaleTo`.
+    """
 
     kind: ClassVar[str] = "record"
-    file: str | None = None
+    file: Annotated[str | tuple[str, ...] | None, Paths()] = None
     bundled: str | None = None
     scale: Annotated[float, Quantity("")] = 1.0
+    scale_to: Mapping[str, Any] | None = None
     start: Annotated[float | None, Quantity("s", least=0.0)] = None
     duration: Annotated[float | None, _TIME] = None
+    correct: bool = True
+    corner: Annotated[float, Quantity("Hz", above=0.0)] = 0.05
+    taper: Annotated[float, _TIME] = 1.0
 
     def _motion(self) -> Motion:
         from msfp_gen import records
@@ -117,9 +138,11 @@ class RecordMotion(MotionTable):
         if self.bundled is not None:
             record = records.bundled(self.bundled)
         else:
-            record = records.read_record(_existing(self.file))
-        values = self._values("file", "bundled")
-        return Motion.from_record(record, **values | {"name": self.name or None})
+            files = [self.file] if isinstance(self.file, str) else self.file or ()
+            record = records.read_record(*map(_existing, files))
+        target = None if self.scale_to is None else records.ScaleTo(**self.scale_to)
+        values = self._values("file", "bundled", "scale_to")
+        return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,9 +179,43 @@ class Pieces(MotionTable):
         return table | {name: value for name, value in rest.items() if value is not None}
 
 
+def placed(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:
+    """The path or paths of a `file` key, relative to the folder of its scene, made absolute.
+
+    A scene file may name what lies beside it or below, and what lies in the folders that `MSFP_GEN_RECORDS` names:
+    a scene from somebody else reaches nothing more. A table made in Python (`folder` None) names what it likes.
+    """
+    if isinstance(file, str):
+        return _placed(file, folder)
+    return tuple(_placed(each, folder) for each in file)
+
+
+def _placed(file: str, folder: Path | None) -> str:
+    try:
+        path = ((folder or Path()) / file).resolve()
+    except (OSError, ValueError, RuntimeError) as error:  # a NUL, a loop of links
+        raise InputError(f"motion.file = {file!r}: this is no path ({error}); give that of a record") from None
+    named = os.environ.get(RECORDS, "").split(os.pathsep)
+    homes = [folder, *(Path(each).expanduser() for each in named if each)] if folder is not None else []
+    if homes and not any(path.is_relative_to(home.resolve()) for home in homes):
+        raise InputError(
+            f"motion.file = {file!r}: outside the folder of the scene file; put the record there, or name its folder "
+            f"in the environment variable {RECORDS}"
+        )
+    return str(path)
+
+
+def is_file(path: Path) -> bool:
+    """Whether `path` is a regular file; no device, no pipe, and no name that cannot be one."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def _existing(file: str | None) -> Path:
     path = Path(str(file))
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"motion.file = {str(path)!r}: no such file; paths are relative to the scene file")
     return path
 

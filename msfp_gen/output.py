@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from glob import escape
 from pathlib import Path
 from secrets import token_hex
 
@@ -35,13 +37,34 @@ def check_folder(folder: Path, name: str = "output") -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`, renamed to `path` when the block succeeds and removed when it fails."""
+    """A temporary name beside `path`, renamed to `path` when the block succeeds and removed when it fails.
+
+    A process that is killed while it writes leaves its temporary file; the next write to `path` clears it away.
+    """
+    clear_leftovers(path)
     temporary = path.with_name(f".{path.stem}-{token_hex(4)}{path.suffix}")
     try:
         yield temporary
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path, parts: Iterable[bytes | memoryview]) -> None:
+    """Write a file, whole or not at all; it is on the disk before it takes its name. OSError where the disk refuses."""
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        file.writelines(parts)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def clear_leftovers(path: Path, age: float = 3600.0) -> None:
+    """Remove temporary files beside `path` that nobody has written to for `age` seconds."""
+    limit = time.time() - age
+    for left in path.parent.glob(f".{escape(path.stem)}-{'[0-9a-f]' * 8}{escape(path.suffix)}"):
+        with suppress(OSError):
+            if left.stat().st_mtime <= limit:
+                left.unlink()
 
 
 def make_folder(folder: Path, name: str = "output") -> None:

@@ -13,12 +13,13 @@ from msfp_gen.top import MassTop, PrescribedTop, RigTop, Top
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
-    from msfp_gen.friction_laws import Law
+    from msfp_gen.layout import Effects
 
 Array = NDArray[np.float64]
 
 BODY_COLUMNS = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
 SURFACE_COLUMNS = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping")
+SEAT_COLUMNS = ("seat_stiffness", "seat_damping")
 
 
 def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
@@ -34,15 +35,15 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     return array
 
 
-def bodies_and_surfaces(bearing: Bearing, law: Law | None = None) -> tuple[Array, Array]:
-    """Arrays (n, 7) and (n-1, 6) in the order of the columns above; a law of friction adds its own to a surface."""
+def bodies_and_surfaces(bearing: Bearing, effects: Effects) -> tuple[Array, Array]:
+    """Arrays (n, 7) and (n-1, 6) in the order of the columns above; uplift and a law of friction add to a surface."""
     arrays = bearing.arrays()
     bodies = np.ascontiguousarray(np.column_stack([arrays[name] for name in BODY_COLUMNS]))
-    surfaces = np.column_stack([arrays[name] for name in SURFACE_COLUMNS])
-    if law is not None:
-        rows = [numbers(law, bearing, index) for index in range(len(surfaces))]
-        surfaces = np.column_stack([surfaces, [[row[name] for name in law.columns] for row in rows]])
-    return bodies, np.ascontiguousarray(surfaces)
+    columns = [arrays[name] for name in SURFACE_COLUMNS + (SEAT_COLUMNS if effects.uplift else ())]
+    if (law := effects.law) is not None:
+        rows = [numbers(law, bearing, index) for index in range(bearing.layout.surfaces)]
+        columns += [np.array([row[name] for row in rows]) for name in law.columns]
+    return bodies, np.ascontiguousarray(np.column_stack(columns))
 
 
 def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
@@ -64,3 +65,15 @@ def load_values(top: Top) -> Array:
     if isinstance(top, PrescribedTop):
         return np.array([*top.force, *top.moment], dtype=float)
     return np.zeros(6)
+
+
+def seated(bearing: Bearing, top: Top | None) -> Array:
+    """Separations at which the seats carry the weights and the vertical load at rest, ndarray, shape (n-1, 3), [m]."""
+    load = 0.0 if top is None else -float(load_values(top)[2])
+    mass = top.mass if isinstance(top, MassTop) else 0.0
+    masses = np.array([body.mass for body in bearing.bodies])
+    masses[-1] += mass
+    carried = load + bearing.gravity * np.cumsum(masses[::-1])[::-1]
+    out = np.zeros((len(masses), 3))
+    out[:, 2] = -carried / np.array([surface.seat_stiffness for surface in bearing.surfaces])
+    return out

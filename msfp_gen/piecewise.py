@@ -84,15 +84,18 @@ def shifted(knots: Array, coefficients: Array, new_knots: Array) -> Array:
 def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Array, Array]:
     """Jumps at the inner knots and what rounding may leave there, both ndarray, shape (k-1, channels).
 
-    The rounding allowance is 1e-9 of the largest value of the derivative, and what cancellation in the values
-    costs: eps |u| / h**derivative over the shorter neighbour. The three components of a vector share one allowance:
-    where the frame is turned, each takes a part of the rounding of the others.
+    The rounding allowance is 1e-9 of the largest size of the derivative inside the pieces (a motion that rests at
+    every knot has none there), and what cancellation in the values costs: eps |u| / h**derivative over the shorter
+    neighbour. The three components of a vector share one allowance: where the frame is turned, each takes a part of
+    the rounding of the others.
     """
     h = np.diff(knots)
     left = _horner(coefficients[:-1], h[:-1, None], derivative)
     right = _horner(coefficients[1:], np.zeros((len(h) - 1, 1)), derivative)
     level = _vector_sizes(coefficients[:, :, 0])
-    largest = _FALLING[derivative, derivative] * _vector_sizes(coefficients[:, :, derivative])
+    powers = h[:, None, None] ** np.arange(ORDER - derivative)
+    terms = np.abs(coefficients[:, :, derivative:]) * _FALLING[derivative, derivative:] * powers
+    largest = _vector_sizes(terms.sum(axis=2))
     short = np.minimum(h[:-1], h[1:])[:, None]
     allowance = 1e-9 * largest + 64 * np.finfo(float).eps * level / short**derivative
     return right - left, allowance

@@ -12,6 +12,7 @@ from msfp_gen.history import Counters, Event, History
 if TYPE_CHECKING:
     import xarray as xr
 
+    from msfp_gen.characterise import Characterisation
     from msfp_gen.scene import Scene
 
 __all__ = ["Counters", "Event", "History", "Result"]
@@ -52,6 +53,15 @@ class Result:
 
         return summarise(self)
 
+    def characterise(self) -> Characterisation:
+        """Effective stiffness, damping, stages, capacity left, velocity and heat: see docs/characterise.md.
+
+        Raises InputError where the bearing did not move.
+        """
+        from msfp_gen.characterise import characterise
+
+        return characterise(self)
+
     def to_netcdf(self, path: str | Path) -> Path:
         """Write the dataset as netCDF-4, whole or not at all; a run that failed is saved with its status.
 
@@ -60,6 +70,33 @@ class Result:
         from msfp_gen.dataset import write_netcdf
 
         return write_netcdf(self, path)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a header of `name [unit]` and one row an instant, with scene and origin in comments.
+
+        This and the writers below raise InputError for another suffix or a folder that does not exist.
+        """
+        from msfp_gen.export import write_csv
+
+        return write_csv(self, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write flat columns as Parquet, units in their metadata; InputError names the remedy without pyarrow."""
+        from msfp_gen.export import write_parquet
+
+        return write_parquet(self, path)
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write every variable for MATLAB, with structs `units`, `meaning` and `attributes`."""
+        from msfp_gen.export import write_mat
+
+        return write_mat(self, path)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the format that the suffix names: .nc, .parquet, .csv or .mat."""
+        from msfp_gen.export import save
+
+        return save(self, path)
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Result:

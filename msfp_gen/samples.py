@@ -47,6 +47,18 @@ def integrated(time: ArrayLike, acceleration: ArrayLike) -> Pieces:
     return Pieces(times, from_rates(times, velocity, rate), _resolved(times), metadata)
 
 
+def integrated_once(time: ArrayLike, velocity: ArrayLike) -> Pieces:
+    """Velocity (k, 3) [m/s], interpolated by a cubic spline (not-a-knot) and integrated exactly from zero."""
+    from scipy.interpolate import CubicSpline
+
+    times, metadata = _from_zero(time)
+    rates = np.zeros((2, len(times), 6))
+    rates[0, :, :3] = series("velocity", velocity, (len(times), 3))
+    rates[1] = CubicSpline(times, rates[0])(times, 1)
+    metadata |= {"source": "velocity samples, cubic spline", "initial_speed": float(np.linalg.norm(rates[0, 0]))}
+    return Pieces(times, from_rates(times, rates[0], rates[1]), _resolved(times), metadata)
+
+
 def recorded(corrected: Corrected, scale: float) -> Pieces:
     """A corrected record, times `scale`."""
     rates = np.zeros((2, len(corrected.time), 6))

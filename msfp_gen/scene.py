@@ -17,6 +17,7 @@ from msfp_gen.solver import Solver
 from msfp_gen.top import PrescribedTop, Top
 
 _TIME = Quantity("s", above=0.0)
+MOST_ROWS = 1e8  # of output: some 100 GB
 Triples = tuple[tuple[float, float, float], ...]
 Pairs = tuple[tuple[float, float], ...]
 
@@ -117,6 +118,11 @@ class Scene:
             )
         if self.output_step is not None and self.output_step > self.end:
             raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")
+        if self.output_step is not None and self.end / self.output_step > MOST_ROWS:
+            raise InputError(
+                f"output_step = {self.output_step}: {self.end / self.output_step:.1e} rows are more than a machine "
+                f"holds; give at least {self.end / MOST_ROWS:.2g} [s]"
+            )
 
     def _check_sizes(self) -> None:
         state, count = self.initial_state, self.bearing.layout.surfaces

@@ -14,7 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.fields import located, ruled_fields
 from msfp_gen.layout import Effects, Layout
 from msfp_gen.motion import Motion
-from msfp_gen.motion_tables import KINDS, Pieces
+from msfp_gen.motion_tables import KINDS, Pieces, is_file, placed
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
 from msfp_gen.toml_text import dumps
@@ -34,18 +34,27 @@ def load_scene(source: str | Path) -> Scene:
     if str(source) in known:
         return scene_from_table(catalogue.scene_table(str(source)))
     path = Path(source)
-    if not path.is_file():
+    if not is_file(path):
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        return scene_from_table(table, path.parent)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: no valid TOML: {error}") from None
+        return scene_from_table(_toml(path.read_text(encoding="utf-8-sig")), path.parent)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _toml(text: str) -> Table:
+    """TOML as a table; InputError for everything that is none."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("no valid TOML: tables or lists are nested too deeply; a scene needs few levels") from None
+    except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
+        raise InputError(f"no valid TOML: {str(error).partition(';')[0]}") from None
 
 
 def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Scene:
@@ -53,7 +62,7 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Sc
     given = schema.validate_scene(table)
     motion = dict(given["motion"])
     if "file" in motion:
-        motion["file"] = str(((folder or Path()) / motion["file"]).resolve())
+        motion["file"] = placed(motion["file"], folder)
     top = dict(given["top"])
     parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
     parts["bearing"] = _bearing(given["bearing"])
@@ -67,8 +76,11 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_bearing(table))
 
 
-def scene_text(scene: Scene) -> str:
-    """The scene as TOML that `load_scene` reads back to an equal scene; everything in SI, bearing in full."""
+def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
+    """The scene as TOML that `load_scene` reads back to an equal scene; everything in SI, bearing in full.
+
+    motion: what to write as `[motion]` instead of what makes the scene's own; an empty table leaves it out.
+    """
     own = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
     tables = {name: getattr(scene, name) for name in _PARTS}
     return dumps(
@@ -80,7 +92,7 @@ def scene_text(scene: Scene) -> str:
                 "surfaces": [_plain(surface) for surface in scene.bearing.surfaces],
                 "bodies": [_plain(body) for body in scene.bearing.bodies],
             },
-            "motion": _motion_table(scene),
+            **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
             "top": {"kind": scene.top.kind, **_plain(scene.top)},
             **{name: _plain(value) for name, value in tables.items() if value is not None},
         }

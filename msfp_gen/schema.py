@@ -30,6 +30,7 @@ from msfp_gen.catalogue import suggestion
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, Rule, Text, ruled_fields
 from msfp_gen.layout import Effects, Layout
+from msfp_gen.records.scaling import ScaleTo
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
 from msfp_gen.top import MassTop, PrescribedTop, RigTop
@@ -65,8 +66,13 @@ def _column(rule: Rule, value: object, *, text: bool) -> Any:
 
 def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
     """The union of tables told apart by their `kind`, and each table's model by its kind."""
-    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...)) for kind in kinds}
+    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_INNER.get(kind, {})) for kind in kinds}
     return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
+
+
+_SCALE_TO = _model(ScaleTo)
+# Tables inside the table of a kind.
+_INNER: dict[type, Table] = {motion_tables.RecordMotion: {"scale_to": (_SCALE_TO, None)}}
 
 
 def _named(value: Any) -> Any:
@@ -116,6 +122,7 @@ _TABLES: dict[str, Model] = {
     "bearing.full.bodies": _BODY,
     "bearing.preset": _PRESET,
     **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
+    "motion.record.scale_to": _SCALE_TO,
     **{f"top.{kind}": model for kind, model in _TOPS.items()},
     **_PARTS,
 }
@@ -173,11 +180,16 @@ def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: M
 def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
     """`bearing.surfaces[2].radius`, and ` (surface 3)` as the report counts; bodies start at 2, above the base."""
     parts = location[:1] + location[2:] if location[0] in _TAGGED else location
-    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).lstrip(".")
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{_key(part)}" for part in parts).lstrip(".")
     for name, word, first in (("surfaces", "surface", 1), ("bodies", "body", 2)):
         if parts[1:2] == (name,) and len(parts) > 2:
             return path, f" ({word} {int(parts[2]) + first})"
     return path, ""
+
+
+def _key(name: str) -> str:
+    """A key as TOML writes it: in quotes where it is no plain word."""
+    return name if name.replace("-", "_").isidentifier() and len(name) <= 60 else _short(name)
 
 
 def _kinds(path: str) -> str:
@@ -196,5 +208,8 @@ def _remedy(table: Model, name: str) -> str:
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to write out whole numbers of thousands of digits
+        text = "a number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."

@@ -6,14 +6,16 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.build import build_model
+from msfp_gen.checkpoint import EVERY, Checkpoint, Identity
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Array, Counters, Event, History
-from msfp_gen.packing import load_values
+from msfp_gen.packing import load_values, seated
 from msfp_gen.plane import out_of_plane, tilts_into_plane, turned, turned_pairs
 from msfp_gen.version import __version__
 
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 Progress = Callable[[float, float], None]
 CHUNK = 4000  # steps between two looks at Ctrl-C and at the progress
 
-EVENT_KINDS = ("rim_contact", "rim_release", "stop")
+EVENT_KINDS = ("rim_contact", "rim_release", "stop", "lift_off", "landing")
 FAILURES = {
     "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
     "lower the friction or the motion",
@@ -42,7 +44,14 @@ FAILURES = {
 }
 
 
-def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
+def simulate(
+    scene: Scene,
+    *,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = EVERY,
+    resume: bool = False,
+) -> Result:
     """Integrate a scene.
 
     Parameters
@@ -51,11 +60,18 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
         Bearing, motion, top, effects, solver; see `Scene`.
     progress
         Called now and then with the time reached and the end [s].
+    checkpoint
+        A file that keeps the run: written every so many seconds, when the run is interrupted and when it ends. It
+        must not exist unless `resume` is given, and stays until its owner removes it.
+    every
+        Seconds of wall time between two checkpoints.
+    resume
+        Go on with what `checkpoint` holds, to the same rows, bit by bit.
 
     Raises
     ------
     InputError
-        The parts of the scene do not go together.
+        The parts of the scene do not go together; the checkpoint is damaged, or of another scene or build.
     RunError
         The run could not go on: the message says when, where and why, `.result` holds what was computed.
 
@@ -63,12 +79,15 @@ def simulate(scene: Scene, *, progress: Progress | None = None) -> Result:
     _check(scene)
     begin = time.perf_counter()
     model = build_model(scene.bearing.layout, scene.effects)
+    kept = None if checkpoint is None else Checkpoint(checkpoint, Identity.of(scene, model), every, resume)
     run, azimuth = _start(scene, model)
+    if kept is not None:
+        kept.restore(run)
     ready = time.perf_counter()
-    status = _advance(run, scene.end, progress)
+    status = _advance(run, scene.end, progress, kept)
     if status is None:
         status = run.status[0]
-    wall = time.perf_counter() - ready
+    wall = time.perf_counter() - ready + (kept.wall if kept is not None else 0.0)
     if not len(run.rows):
         raise RunError(_message(scene, run, status), status=status)
     result = _result(scene, model, run, azimuth, status, wall, ready - begin)
@@ -82,17 +101,27 @@ def _check(scene: Scene) -> None:
         raise InputError(
             "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
         )
+    if scene.effects.uplift and scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': the report's equations keep all surfaces closed; use 'implicit' with uplift"
+        )
 
 
-def _advance(run: Any, end: float, progress: Progress | None) -> str | None:
+def _advance(run: Any, end: float, progress: Progress | None, kept: Checkpoint | None) -> str | None:
     """Take all steps; the name of an interruption, or None."""
+    status = None
     try:
         while run.advance(CHUNK):
+            if kept is not None:
+                kept.offer(run)
             if progress is not None:
                 progress(run.time, end)
     except KeyboardInterrupt:
-        return "interrupted"
-    return None
+        status = "interrupted"
+    # A failure is met again from the same point: the last checkpoint stands.
+    if kept is not None and run.status[0] in ("ok", "stopped"):
+        kept.save(run)
+    return status
 
 
 def _start(scene: Scene, model: Model) -> tuple[Any, float]:
@@ -115,6 +144,8 @@ def _start(scene: Scene, model: Model) -> tuple[Any, float]:
         h = np.ascontiguousarray(turned_pairs(h, azimuth))
         if np.any(np.abs(h[:, 1]) > 1e-12):
             raise InputError("initial_state.h leaves the vertical plane of the motion: use dimension = 'spatial'")
+    if model.effects.uplift:
+        q, v = np.hstack([q, seated(scene.bearing, scene.top)]), np.hstack([v, np.zeros((count, 3))])
     pieces = np.zeros((1, 6, 6))
     pieces[0, :, 0] = load
     stack = model.stack(scene.bearing, scene.top, anchor=motion.displacement(0.0)[:2])
@@ -155,6 +186,8 @@ def _history(model: Model, rows: Array, azimuth: float) -> History:
     finite = np.isfinite(rows).all(axis=1)
     f = model.unpack(rows if finite.all() else rows[: int(finite.argmin())])
     turn = azimuth
+    parted = f["q"][..., 3:] if model.effects.uplift else np.zeros_like(f["force"])
+    lift = np.maximum(0.0, -f["compression"]) if model.effects.uplift else np.zeros_like(f["normal"])
     base, top = out_of_plane(f["base"], turn, "vector"), out_of_plane(f["top"], turn, "vector")
     across = base - top
     work = f["work"]
@@ -168,20 +201,24 @@ def _history(model: Model, rows: Array, azimuth: float) -> History:
         "rim_stored": f["rim_stored"] - f["rim_stored"][0],
         "rim_dissipated": work[:, 3] - (f["rim_stored"] - f["rim_stored"][0]),
         "top_dissipated": work[:, 4],
+        "seat_stored": f["seat_stored"] - f["seat_stored"][0],
+        "seat_dissipated": work[:, 5],
     }
     energy["kinetic"] = energy["kinetic"] - energy["kinetic"][0]
     energy["numerical"] = energy["input"] - np.sum([v for k, v in energy.items() if k != "input"], axis=0)
     return History(
         time=f["time"],
-        tilt_angles=out_of_plane(f["q"], turn, "angles"),
-        tilt_rates=out_of_plane(f["v"], turn, "angles"),
-        tilt_accelerations=out_of_plane(f["a"], turn, "angles"),
+        tilt_angles=out_of_plane(f["q"][..., :3], turn, "angles"),
+        tilt_rates=out_of_plane(f["v"][..., :3], turn, "angles"),
+        tilt_accelerations=out_of_plane(f["a"][..., :3], turn, "angles"),
         friction_state=out_of_plane(f["f"], turn, "pair"),
         normal_force=f["normal"],
         contact_angles=out_of_plane(f["angles"], turn, "pair_angles"),
         sliding=f["sliding"],
         gap=f["gap"],
         rim_force=f["rim"],
+        separation=out_of_plane(parted, turn, "vector"),
+        lift=lift,
         interface_force=out_of_plane(f["force"], turn, "vector"),
         slip_velocity=out_of_plane(f["slip"], turn, "pair"),
         base_displacement=base,

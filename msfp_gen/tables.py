@@ -65,7 +65,7 @@ def summary_tables(result: Result) -> list[Table]:
     summary = result.summary
     tables = [_run_table(summary), _surface_table(result)]
     if "transitions" in summary:
-        tables.append(_transition_table(summary["transitions"]))
+        tables.append(transition_table(summary["transitions"]))
     return tables
 
 
@@ -138,7 +138,8 @@ def _surface_table(result: Result) -> Table:
     return Table("surfaces, bottom first", columns, rows)
 
 
-def _transition_table(transitions: Mapping[str, float | None]) -> Table:
+def transition_table(transitions: Mapping[str, float | None]) -> Table:
+    """The stages of a monotonic run, as `summary` names them."""
     rows = []
     for key, value in transitions.items():
         kind = key.rstrip("0123456789")

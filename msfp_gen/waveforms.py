@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from msfp_gen.errors import InputError
 from msfp_gen.motion_checks import positive
 from msfp_gen.piecewise import Array, Pieces, hermite5
 
 Wave = tuple[Array, Array, Array]
+MOST_PIECES = 2e6  # 0.6 GB of polynomials
 
 
 def smoothstep(time: Array, rise: float) -> Wave:
@@ -42,6 +44,11 @@ def sampling(rise: float, duration: float, shortest_period: float) -> Array:
     128 a period, and 128 over the rise, which ends on a knot.
     """
     step = shortest_period / 128
+    if not duration / step <= MOST_PIECES:
+        raise InputError(
+            f"cycles: {duration:.4g} s of waves of {shortest_period:.4g} s need more than {MOST_PIECES:.0e} pieces; "
+            "give fewer cycles or a shorter lead_in"
+        )
     start = np.linspace(0.0, rise, 1 + max(128, int(np.ceil(rise / step))))
     rest = np.linspace(rise, duration, 1 + max(1, int(np.ceil((duration - rise) / step))))
     return np.concatenate([start, rest[1:]])

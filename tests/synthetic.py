@@ -35,7 +35,8 @@ def history(
         time=np.linspace(0, duration, rows), tilt_angles=body, tilt_rates=body, tilt_accelerations=body,
         friction_state=pair + np.array([0.25, -0.5]), normal_force=surface + LOAD, contact_angles=pair,
         sliding=np.asarray(sliding),
-        gap=np.asarray(capacities) - sliding, rim_force=surface, interface_force=body, slip_velocity=pair,
+        gap=np.asarray(capacities) - sliding, rim_force=surface, separation=body, lift=surface,
+        interface_force=body, slip_velocity=pair,
         base_displacement=axis, top_displacement=axis, displacement=np.asarray(u), top_force=np.asarray(force),
         top_moment=axis, energy=energy,
     )  # fmt: skip

@@ -274,3 +274,15 @@ def test_bad_input_is_refused_in_one_line(make, message):
     with pytest.raises(InputError, match=message) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+def test_motion_that_rests_at_every_knot_may_carry_rounding():
+    """Its acceleration is zero at all knots: what rounding leaves there is measured by what it is in between."""
+    knots, coefficients = np.array([0.0, 50.0, 125.0]), np.zeros((2, 6, 6))
+    for i, (h, d) in enumerate([(50.0, 0.1), (75.0, -0.15)]):
+        coefficients[i, 0, 0] = 0.1 * i
+        coefficients[i, 0, 3:] = 10 * d / h**3, -15 * d / h**4, 6 * d / h**5
+    assert Motion(knots=knots, coefficients=coefficients).displacement(125.0)[0] == pytest.approx(-0.05, rel=1e-9)
+    coefficients[0, 0, 2] = 1e-9  # a jump of 2e-9 m/s^2 beside a peak of 2e-4 m/s^2
+    with pytest.raises(InputError):
+        Motion(knots=knots, coefficients=coefficients)

@@ -20,8 +20,11 @@ def test_catalogue_is_complete_and_described():
     expected = {f"fenz-test{k}" for k in range(1, 6)} | {"fenz-monotonic", "unusual-tfp"}
     expected |= {f"becker-{shape}-{mm}" for shape in ("circle", "eight") for mm in ORBITS}
     expected |= {"ridgecrest-ccc", "ridgecrest-clc"}
+    kinds = {"single", "single-articulated", "double", "double-articulated", "quintuple"}
+    expected |= {f"{kind}-push" for kind in (*kinds, "triple")}
     assert set(presets.names("scene")) == expected
-    assert set(presets.names("bearing")) == {"fenz-tfp", "becker-tfp", "prototype-tfp"}
+    bearings = {"fenz-tfp", "becker-tfp", "prototype-tfp"} | {f"{kind}-fp" for kind in kinds}
+    assert set(presets.names("bearing")) == bearings
     assert presets.names() == presets.names("bearing") | presets.names("scene")
     assert all(line and "\n" not in line for line in presets.names().values())
 

@@ -17,7 +17,7 @@ from msfp_gen.records import (
     Record,
     baseline_corrected,
     bundled,
-    read_at2,
+    read_peer,
     read_record,
     read_table,
     strong_window,
@@ -113,11 +113,11 @@ def test_at2_with_stuck_negatives_and_a_short_last_row(write, counts):
 
 def test_at2_components_of_different_length(write):
     shorter = AT2.replace("NPTS=     9", "NPTS=     8").replace("  .9000E-02\n", "")
-    record = read_at2(write(AT2, "a.at2"), write(shorter, "b.at2"), write(AT2, "c.at2"))
+    record = read_peer(write(AT2, "a.at2"), write(shorter, "b.at2"), write(AT2, "c.at2"))
     assert record.acceleration.shape == (8, 3)
     assert record.notes == ("channels cut to their common window of 8 points (were 9, 8, 9)",)
-    with pytest.raises(InputError, match=r"d\.at2: time step 0\.02 s, but a\.at2 has 0\.01 s"):
-        read_at2(write(AT2, "a.at2"), write(AT2.replace(".01000", ".02000"), "d.at2"))
+    with pytest.raises(InputError, match=r"d\.at2, line 3: time step 0\.02 s differs from the first channel's 0\.01 s"):
+        read_peer(write(AT2, "a.at2"), write(AT2.replace(".01000", ".02000"), "d.at2"))
 
 
 def test_tables_of_accelerations_and_displacements(write):
@@ -157,11 +157,9 @@ V1_FAULTS = {
 }
 AT2_FAULTS = {
     "count mismatch": (AT2.replace("NPTS=     9", "NPTS=    10"), "line 4: NPTS promises 10 values, the file holds 9"),
-    "velocity": (
-        AT2.replace("ACCELERATION TIME HISTORY IN UNITS OF G", "VELOCITY IN UNITS OF CM/S"),
-        "not acceleration",
-    ),
-    "centimetres": (AT2.replace("UNITS OF G", "UNITS OF CM/S/S"), "not acceleration in g"),
+    "velocity in g": (AT2.replace("ACCELERATION", "VELOCITY"), "line 3: 'G' is no unit of velocity"),
+    "centimetres": (AT2.replace("UNITS OF G", "UNITS OF CM/S"), "line 3: 'CM/S' is no unit of acceleration"),
+    "furlongs": (AT2.replace("UNITS OF G", "UNITS OF FURLONGS"), "line 3: unknown unit 'FURLONGS'; known: g, "),
     "no unit": (AT2.replace("UNITS OF G", ""), "no line before this one"),
     "endless count": (AT2.replace("NPTS=     9", "NPTS=" + "9" * 5000), "does not give NPTS and DT"),
     "no step": (AT2.replace("DT=   .01000 SEC", ""), "does not give NPTS and DT"),
@@ -178,7 +176,7 @@ CSV_FAULTS = {
     "gallon": (CSV.replace("[g]", "[gallon]"), "column a1"),
     "no time": (CSV.replace("time [s]", "a2 [g]"), "give time and at least one"),
     "time alone": ("time [s]\n0\n1\n2\n3\n", "give time and at least one"),
-    "mixed": (CSV.replace("a3 [cm/s^2]", "u3 [cm]"), "give a1, a2, a3 or u1, u2, u3"),
+    "mixed": (CSV.replace("a3 [cm/s^2]", "u3 [cm]"), "give a1, a2, a3 or v1, v2, v3 or u1, u2, u3"),
     "twice": (CSV.replace("a3", "a1"), "each once"),
     "short row": (CSV + "0.09, 1\n", "line 12: 2 columns, the header names 3"),
     "decimal commas": (CSV.replace("0.1", "0,1"), "columns, the header names 3"),
@@ -186,7 +184,8 @@ CSV_FAULTS = {
     "uneven": (CSV + "0.10, 1, 1\n", "not evenly spaced"),
     "repeated": (CSV + "0.08, 1, 1\n", "not evenly spaced"),
     "no rows": ("time [s], a1 [g]\n", "no rows of numbers"),
-    "displacement": (CSV.replace("a1 [g]", "u1 [m]").replace("a3 [cm/s^2]", "u3 [m]"), "use Motion.from_csv"),
+    "gram": (CSV.replace("[g]", "[gram]"), "column a1: the unit 'gram' is not a unit"),
+    "nan": (CSV + "0.09, nan, 1\n", "line 12: 'nan' is not a finite number"),
 }
 OTHER_FAULTS = {
     "empty": (b"", "the file is empty"),

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import building, running
+from msfp_gen.cli import building, drawing, judging, records, reporting, running, storing
 from msfp_gen.cli.console import fail, say
+from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError
 from msfp_gen.version import __version__
 
@@ -21,16 +22,21 @@ app = typer.Typer(
     epilog="Examples:\n\n\b\n"
     "  msfp-gen demo -o out\n  msfp-gen run fenz-test2 --plot loops.png\n  msfp-gen generate 7 3 3",
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 # In the order in which help lists the commands.
-for group in (running, building):
+for group in (running, drawing, judging, reporting, records, building, storing):
     app.add_typer(group.app)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input."""
+    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input, 128 + signal interrupted."""
+    with heard() as signals:
+        code = _main(argv)
+        return 128 + signals[0] if code == INTERRUPTED and signals else code
+
+
+def _main(argv: list[str] | None) -> int:
     arguments = sys.argv[1:] if argv is None else argv
     try:
         code = app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0

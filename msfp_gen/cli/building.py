@@ -30,10 +30,11 @@ def generate(
     friction_law: Annotated[
         str | None, typer.Option(metavar="FORMULA", help="Of custom friction: mu * (1 - c1 * exp(-c2 * v)).")
     ] = None,
+    uplift: Annotated[bool | None, typer.Option("--uplift/--no-uplift", help="Whether bodies may part.")] = None,
 ) -> None:
     """Derive, emit and compile the equations of a layout."""
-    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen}
-    given |= {"friction": friction, "friction_law": friction_law}
+    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen,
+             "friction": friction, "friction_law": friction_law, "uplift": uplift}  # fmt: skip
     effects: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     spec = ModelSpec(Layout(n, m, p), Effects(**effects))
     from msfp_gen.build import generate_to, prepare
@@ -43,7 +44,7 @@ def generate(
     show([build_table(info)])
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
 def explain(scene: SceneName) -> None:
     """Say in plain words what a scene computes."""
     from msfp_gen.explain import explain as describe
@@ -52,7 +53,7 @@ def explain(scene: SceneName) -> None:
     show(describe(load_scene(scene)))
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen presets")
 def presets() -> None:
     """List the scenes and bearings that come with msfp-gen."""
     from msfp_gen import presets as catalogue
@@ -61,7 +62,7 @@ def presets() -> None:
     show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "bearing"))
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")
 def doctor() -> None:
     """Check Python, libraries, compiler and cache."""
     from msfp_gen.doctor import diagnose

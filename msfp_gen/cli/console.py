@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
+
+from msfp_gen.errors import printable
 
 if TYPE_CHECKING:
     from msfp_gen.tables import Table
@@ -31,43 +35,64 @@ def words(owner: type, field: str) -> str:
 
 
 whole, number = read_as(int, "whole number"), read_as(float, "number")
-Output = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.nc", help="Write every row as netCDF-4.")]
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file (TOML) or the name of a preset.")]
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write every row: .nc (netCDF-4), .csv, .parquet or .mat."),
+]
+
+
+def scenes(incomplete: str) -> list[tuple[str, str]]:
+    """What a shell may complete a scene to: presets with what they are, scene files and the folders on the way."""
+    from msfp_gen.catalogue import descriptions
+
+    presets = [(name, line) for name, line in descriptions("scene").items() if name.startswith(incomplete)]
+    folder, _, start = incomplete.rpartition("/")
+    files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
+    found = [path for path in files if path.is_dir() or path.suffix == ".toml"]
+    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in found]
+
+
+SceneName = Annotated[
+    str,
+    typer.Argument(metavar="SCENE", help="A scene file (TOML) or the name of a preset.", autocompletion=scenes),
+]
 
 
 def say(text: str) -> None:
     """A result, on stdout."""
-    typer.echo(text)
+    typer.echo(printable(text))
 
 
 def note(text: str) -> None:
     """A line about long work, beside the results, on stderr."""
-    typer.echo(text, err=True)
+    typer.echo(printable(text), err=True)
 
 
 def fail(message: str, code: int) -> int:
     """One line on stderr, whatever the message holds."""
-    typer.echo(f"error: {' '.join(message.split())}", err=True)
+    typer.echo(printable(f"error: {' '.join(message.split())}"), err=True)
     return code
 
 
 def show(tables: Iterable[Table]) -> None:
     """Rich tables on a terminal, aligned text in a pipe."""
     if not sys.stdout.isatty():
-        typer.echo("\n\n".join(table.text for table in tables))
+        say("\n\n".join(table.text for table in tables))
         return
     from rich.console import Console
 
     for table in tables:
-        Console().print(table.rich())
+        rows = [[printable(cell) for cell in row] for row in table.rows]
+        Console().print(replace(table, title=printable(table.title), rows=rows).rich())
 
 
 class Progress:
-    """How far a run is, on one line of a terminal's stderr; silent elsewhere."""
+    """How far a run is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
 
     def __init__(self, name: str) -> None:
-        self._name = name
+        self._name = printable(name)
         self._shown = -1
+        self._begin = monotonic()
 
     def __enter__(self) -> Callable[[float, float], None] | None:
         return self._update if sys.stderr.isatty() else None
@@ -80,4 +105,6 @@ class Progress:
         percent = int(100 * time / end)
         if percent > self._shown:
             self._shown = percent
-            typer.echo(f"\r\x1b[K{self._name}: {percent} %", nl=False, err=True)
+            elapsed = monotonic() - self._begin
+            left = f", {elapsed * (end / time - 1):.0f} s left" if elapsed > 1 and time > 0 else ""
+            typer.echo(f"\r\x1b[K{self._name}: {percent} %{left}", nl=False, err=True)

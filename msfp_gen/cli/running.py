@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msfp_gen.cli.console import Output, Progress, SceneName, note, number, say, show, words
+from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
 from msfp_gen.errors import RunError
-from msfp_gen.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.solver import Solver
 
 if TYPE_CHECKING:
@@ -24,7 +25,9 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json"
+    epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
+    "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
+    "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
 def run(
     scene: SceneName,
@@ -43,20 +46,26 @@ def run(
     duration: Annotated[
         float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this time.")
     ] = None,
+    checkpoint: CheckpointFile = None,
+    every: Every = None,
+    resume: ResumeFile = None,
 ) -> None:
     """Simulate a scene."""
+    keep = Keep.of(checkpoint, every, resume)
     if output is not None:
-        check_output(output, DATASET_SUFFIXES, "--output")
+        from msfp_gen.export import check_result_path
+
+        check_result_path(output, "--output")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     from msfp_gen.scenefile import load_scene
 
     chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json):
+    for path in _run(chosen, output, plot, as_json, keep):
         note(f"wrote {path}")
 
 
-@app.command()
+@app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
 def demo(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where figures and data go.")] = Path(
         "out"
@@ -80,20 +89,24 @@ def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
     return scene if duration is None else replace(scene, duration=duration)
 
 
-def _run(scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False) -> list[Path]:
+def _run(
+    scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False, keep: Keep = NOT_KEPT
+) -> list[Path]:
     """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
-    result, failure = _simulate(scene)
-    saved = []
+    result, failure = _simulate(scene, keep)
+    saved: list[Path] = []
     if result is not None:
         _report(result, as_json)
-        saved = _save(result, output, plot)
+        with keep.while_saving():
+            saved = _save(result, output, plot)
     if failure is not None:
         kept = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
-        raise RunError(f"{failure}{kept}", status=failure.status, result=result) from failure
+        raise RunError(f"{failure}{kept}{keep.hint(failure)}", status=failure.status, result=result) from failure
+    keep.done()
     return saved
 
 
-def _simulate(scene: Scene) -> tuple[Result | None, RunError | None]:
+def _simulate(scene: Scene, keep: Keep) -> tuple[Result | None, RunError | None]:
     """The result, and why the run failed if it did: what was computed until then is worth keeping."""
     from msfp_gen.build import build_model
     from msfp_gen.result import Result
@@ -102,7 +115,7 @@ def _simulate(scene: Scene) -> tuple[Result | None, RunError | None]:
     build_model(scene.bearing.layout, scene.effects, progress=note)
     with Progress(scene.name or "run") as progress:
         try:
-            return simulate(scene, progress=progress), None
+            return simulate(scene, progress=progress, **keep.arguments), None
         except RunError as error:
             return error.result if isinstance(error.result, Result) else None, error
 
@@ -119,7 +132,7 @@ def _report(result: Result, as_json: bool) -> None:
 def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:
     """Write what was asked for; the paths written."""
     if output is not None:
-        result.to_netcdf(output)
+        result.save(output)
     if plot is not None:
         from msfp_gen.figures import plot_result
 

@@ -1,4 +1,7 @@
-"""CSV with a header that names times, components and units: `time [s], a1 [m/s^2], a2 [g]` or `time [s], u1 [mm]`."""
+"""CSV with a header that names times, components and units: `time [s], a1 [m/s^2], a2 [g]` or `time [s], u1 [mm]`.
+
+Read, and written from any record.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from msfp_gen.errors import InputError
+from msfp_gen.output import check_output, replacing
 from msfp_gen.piecewise import Array
-from msfp_gen.records.record import Record, common_window, stem
+from msfp_gen.records.record import Record, common_window, derived_note, differentiated, stem
 from msfp_gen.records.text import Lines, column, read_lines
 
-_COLUMN = re.compile(r"\s*(\w+)\s*\[([^\]]*)\]\s*")
-_QUANTITIES = {"a": ("acceleration", "m/s^2"), "u": ("displacement", "m")}
+_COLUMN = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*")
+_QUANTITIES = {"a": ("acceleration", "m/s^2"), "v": ("velocity", "m/s"), "u": ("displacement", "m")}
 _UNEVEN = 1e-3  # share of a time step by which printed times may miss an even spacing
 
 
@@ -25,9 +29,9 @@ class Table:
 
     Attributes:
         name: from the file.
-        quantity: "acceleration" or "displacement".
+        quantity: "acceleration", "velocity" or "displacement".
         time: ndarray, shape (k,), [s].
-        values: ndarray, shape (k, 3), [m/s^2] or [m].
+        values: ndarray, shape (k, 3), [m/s^2], [m/s] or [m].
         units: the header's units.
         notes: which components are missing and taken as zero.
     """
@@ -46,7 +50,7 @@ def understands(lines: Lines) -> bool:
 
 
 def read_table(path: str | PathLike[str]) -> Table:
-    """A table of accelerations (a1, a2, a3) or displacements (u1, u2, u3) over `time`; lines of # are comments.
+    """A table of accelerations (a1, a2, a3), velocities (v1, ...) or displacements (u1, ...); lines of # are comments.
 
     Raises InputError naming file, line and reason.
     """
@@ -54,10 +58,8 @@ def read_table(path: str | PathLike[str]) -> Table:
 
 
 def read(lines: Lines) -> Record:
-    """The record in a table of accelerations at even time steps."""
+    """The record in a table at even time steps."""
     table = _table(lines)
-    if table.quantity != "acceleration":
-        raise InputError(f"{lines.path.name}: holds displacements (u1, ...); use Motion.from_csv")
     steps = np.diff(table.time)
     step = float((table.time[-1] - table.time[0]) / len(steps)) if len(steps) else 0.0
     even = table.time[0] + step * np.arange(len(table.time))
@@ -66,13 +68,27 @@ def read(lines: Lines) -> Record:
             f"{lines.path.name}: times are not evenly spaced, or fewer than 4; resample, or use Motion.from_csv"
         )
     return Record(
-        name=table.name,
-        time_step=step,
-        acceleration=table.values,
-        units=table.units,
-        metadata={"format": "CSV", "file": lines.path.name},
-        notes=table.notes,
-    )
+        name=table.name, time_step=step, units=table.units, notes=table.notes + derived_note(table.quantity),
+        metadata={"format": "CSV", "file": lines.path.name}, quantity=table.quantity,
+        **differentiated(table.quantity, table.values, step),
+    )  # fmt: skip
+
+
+def write_csv(record: Record, path: str | PathLike[str]) -> Path:
+    """Write time and accelerations with their units in the header and where they came from in comments.
+
+    `read_record` reads it back to the last digit. Raises InputError for a path that cannot be written.
+    """
+    target = check_output(Path(path), (".csv",))
+    about = {"record": record.name, "station": record.station, "start": record.start_time, **record.metadata}
+    lines = [f"# {key}: {' '.join(str(value).split())}" for key, value in about.items() if value]
+    lines += [f"# note: {note}" for note in record.notes]
+    lines.append("time [s], " + ", ".join(f"a{i} [m/s^2]" for i in (1, 2, 3)))
+    rows = np.column_stack([record.time, record.acceleration]).tolist()
+    lines += [", ".join(map(repr, row)) for row in rows]
+    with replacing(target) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return target
 
 
 def _first(lines: Lines) -> tuple[int, str]:
@@ -112,13 +128,13 @@ def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str]
                 head, f"column {text.strip()[:24]!r} is not of the form `name [unit]`, as in: time [s], a1 [m/s^2]"
             )
     found = [m for m in matches if m is not None]
-    names, units = [m[1].lower() for m in found], [m[2].strip() for m in found]
+    names, units = [m[1].lower() for m in found], [(m[2] or m[3] or "").strip() for m in found]
     parts = [n for n in names if n != "time"]
     if "time" not in names or not parts or len(set(names)) < len(names):
         lines.fail(head, f"columns {', '.join(names)}; give time and at least one of a1, a2, a3, each once")
     letter = parts[0][:1]
     if letter not in _QUANTITIES or any(p not in {f"{letter}{i}" for i in (1, 2, 3)} for p in parts):
-        lines.fail(head, f"columns {', '.join(parts)}; give a1, a2, a3 or u1, u2, u3")
+        lines.fail(head, f"columns {', '.join(parts)}; give a1, a2, a3 or v1, v2, v3 or u1, u2, u3")
     factors = []
     for name, unit in zip(names, units, strict=True):
         try:

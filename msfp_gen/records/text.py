@@ -14,7 +14,10 @@ from msfp_gen.errors import InputError
 from msfp_gen.piecewise import Array
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_LARGEST = 1e100  # of what a record holds in any unit; conversions must not overflow
+_MOST = 256 << 20  # bytes of text, unpacked
 _GZIP = b"\x1f\x8b"
+_DOS_END = b"\x1a"  # fills the last block of files from old systems
 
 
 class Lines:
@@ -41,7 +44,7 @@ class Lines:
         """`field`, text of the line at `index`, as a finite number."""
         text = field.strip()
         value = float(text) if _NUMBER.fullmatch(text) else np.nan
-        if not np.isfinite(value):
+        if not abs(value) < _LARGEST:
             self.fail(index, f"{text[:24]!r} is not a finite number; repair or cut the data")
         return value
 
@@ -56,22 +59,52 @@ class Lines:
             self.fail(index, f"{what} is {field.strip()}; it must be positive")
         return value
 
+    def block(self, top: int, points: int, layout: tuple[int, int]) -> tuple[Array, int]:
+        """`points` numbers from the line at `top` on, and the index of the line after them.
+
+        `layout` is (columns a line, characters a column), as in a Fortran format: neighbours may touch, so columns
+        are cut, not split at blanks.
+        """
+        per_line, width = layout
+        if not (points and per_line and width):
+            self.fail(top - 1, f"{points} points in {per_line} columns of width {width}; nothing to read")
+        values: list[float] = []
+        index = top
+        while len(values) < points:
+            row = self[index].rstrip()
+            want = min(per_line, points - len(values))
+            if len(row) != want * width:
+                self.fail(index, f"{want} columns of width {width} expected after {len(values)} of {points} points")
+            values += self.numbers(index, [row[i : i + width] for i in range(0, len(row), width)])
+            index += 1
+        return column(values), index
+
 
 def read_lines(path: Path) -> Lines:
     """The lines of a text file, unpacked if it is gzip, in UTF-8 or Latin-1."""
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path.name}: cannot be read ({error.strerror}); check the path") from None
-    if content.startswith(_GZIP):
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path.name}: no file but a folder, pipe or device; give the path of a record")
+        with path.open("rb") as file:
+            content = file.read(_MOST + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path.name}: cannot be read ({reason}); check the path") from None
+    if content.startswith(_GZIP) and len(content) <= _MOST:
         try:
-            content = gzip.decompress(content)
+            with gzip.open(path) as packed:
+                content = packed.read(_MOST + 1)
         except (OSError, EOFError, zlib.error):
             raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None
+    if len(content) > _MOST:
+        raise InputError(f"{path.name}: more than {_MOST >> 20} MiB of text; no record is that long, give another file")
+    content = content.rstrip(_DOS_END)
     if not content.strip():
         raise InputError(f"{path.name}: the file is empty; give a record")
     if b"\0" in content:
-        raise InputError(f"{path.name}: a binary file; give COSMOS/CSMIP V1, PEER .AT2 or CSV text")
+        raise InputError(f"{path.name}: a binary file; give a text file of a known format (docs/data.md)")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

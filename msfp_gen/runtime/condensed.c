@@ -3,11 +3,7 @@
 #include <string.h>
 #include "stack.h"
 
-static int angle_of(int i)
-{
-    static const int angles[ND] = MSFP_ANGLES;
-    return angles[i];
-}
+static const int unknown[ND] = MSFP_FREE;
 
 static void seed_columns(msfp_work *w, const msfp_seed *seed)
 {
@@ -15,11 +11,49 @@ static void seed_columns(msfp_work *w, const msfp_seed *seed)
     memset(w->dbody[0], 0, sizeof w->dbody[0]);
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i) {
-            const int column = k * ND + i;
-            w->dx[k + 1][coordinate(0, i) * DOF + column] = seed->cq;
-            w->dx[k + 1][coordinate(1, i) * DOF + column] = seed->cv;
-            w->dx[k + 1][coordinate(2, i) * DOF + column] = seed->ca;
+            const double factors[3] = { seed->cq, seed->cv, seed->ca };
+            for (int order = 0; order < 3; ++order)
+                w->dx[k + 1][field(order, i) * DOF + k * ND + i] = factors[order];
         }
+}
+
+#if MSFP_UPLIFT
+/* What the seat carries and what the motion above asks for are one force: rows of surface j, below its moments. */
+static void part(const msfp_parameters *p, msfp_work *w, int j, const double *asked, const double *dasked, double *residual, double *tangent)
+{
+    msfp_seat(p, w, j, tangent != NULL);
+    for (int i = 0; i < SPACE; ++i) {
+        const int row = j * ND + NA + i;
+        residual[row] = asked[i] - w->force[j][i];
+        for (int c = 0; c < DOF && tangent; ++c)
+            tangent[row * DOF + c] = dasked[i * DOF + c] - w->dforce[j][i * DOF + c];
+    }
+}
+#endif
+
+/* Forces through the surfaces: what the motion asks for, summed from the top down. Where bodies may part, the seats
+ * carry them and the sums are rows of the residual. */
+static void forces(const msfp_parameters *p, msfp_work *w, double *residual, double *tangent)
+{
+    double sum[VECTOR], dsum[VECTOR * DOF];
+    memcpy(sum, w->force[NB], sizeof sum);
+    if (tangent)
+        memcpy(dsum, w->dforce[NB], sizeof dsum);
+    for (int j = NB - 1; j >= 0; --j) {
+        double *force = w->force[j], *dforce = w->dforce[j];
+        if (tangent)
+            msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], sum, force, w->dbody[j + 1], dsum, dforce);
+        else
+            msfp_interface_force(p->body[j + 1], w->body[j + 1], sum, force);
+        memcpy(sum, force, sizeof sum);
+        if (tangent)
+            memcpy(dsum, dforce, sizeof dsum);
+#if MSFP_UPLIFT
+        part(p, w, j, sum, dsum, residual, tangent);
+#else
+        (void)residual;
+#endif
+    }
 }
 
 int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
@@ -33,13 +67,7 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
         msfp_top_columns(p, at, w, NULL);
     } else
         msfp_top(p, at, w);
-    for (int j = NB - 1; j >= 0; --j) {
-        if (tangent)
-            msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j],
-                                         w->dbody[j + 1], w->dforce[j + 1], w->dforce[j]);
-        else
-            msfp_interface_force(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j]);
-    }
+    forces(p, w, residual, tangent);
 #if MSFP_LAW
     msfp_surroundings(at, w);
 #endif
@@ -49,13 +77,20 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
             return status;
     }
     for (int k = 1; k <= NB; ++k) {
+        const double *above = w->moment[k], *dabove = w->dmoment[k];
+#if MSFP_UPLIFT
+        if (k < NB) {
+            above = w->below[k];
+            dabove = w->dbelow[k];
+        }
+#endif
         if (tangent) {
-            msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out,
-                                         w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], w->dmoment[k], dout);
-            memcpy(tangent + (k - 1) * ND * DOF, dout, ND * DOF * sizeof *tangent);
+            msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out,
+                                         w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], dabove, dout);
+            memcpy(tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *tangent);
         } else
-            msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out);
-        memcpy(residual + (k - 1) * ND, out, ND * sizeof *residual);
+            msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out);
+        memcpy(residual + (k - 1) * ND, out, NA * sizeof *residual);
         w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
     }
     return MSFP_OK;
@@ -65,15 +100,21 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 {
     for (int k = 0; k < NB; ++k) {
         const double *par = p->surface[k];
-        const double natural = w->contact[k][MSFP_CONTACT_N] * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+#if MSFP_RIMS
+        const double met = fabs(w->rim[k][MSFP_RIM_FC]);
+#else
+        const double met = 0.0;
+#endif
+        const double pressed = w->contact[k][MSFP_CONTACT_N] + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
-            scale[k * ND + i] = natural > 1e-12 ? natural : 1e-12;
+            scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
     }
 }
 
 int msfp_pulling(const msfp_work *w)
 {
-    for (int j = 0; j < NB; ++j) {
+    for (int j = 0; j < NB && !MSFP_UPLIFT; ++j) {
         double p[3];
         msfp_local_p_get(w->local[j], p);
         if (p[2] <= 0.0)
@@ -119,7 +160,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         msfp_lu_solve(tangent, DOF, pivots, residual);
         for (int k = 0; k < NB; ++k)
             for (int i = 0; i < ND; ++i)
-                at->a[k][angle_of(i)] -= residual[k * ND + i];
+                at->a[k][unknown[i]] -= residual[k * ND + i];
     }
     return MSFP_E_NEWTON;
 }

@@ -5,6 +5,7 @@
 #include "heat.h"
 
 #define NB MSFP_NB
+#define NQ MSFP_NQ
 #define STAGES 7
 
 static const double a[STAGES][STAGES - 1] = {
@@ -21,7 +22,7 @@ static const double c[STAGES] = { 0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1 }
 static const double e[STAGES] = { 71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40 };
 
 typedef struct {
-    double v[NB][3], a[NB][3], f[NB][2];
+    double v[NB][NQ], a[NB][NQ], f[NB][2];
 } slope;
 
 /* State derivatives at a point: Newton on the report's unknowns, warm from the last stage. */
@@ -57,7 +58,7 @@ static void combine(const msfp_state *now, const slope *k, const double *weights
     memcpy(at->f, now->f, sizeof at->f);
     for (int i = 0; i < count; ++i)
         for (int b = 0; b < NB; ++b) {
-            for (int d = 0; d < 3; ++d) {
+            for (int d = 0; d < NQ; ++d) {
                 at->q[b][d] += h * weights[i] * k[i].v[b][d];
                 at->v[b][d] += h * weights[i] * k[i].a[b][d];
             }
@@ -93,7 +94,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
 {
     slope k[STAGES];
     msfp_point at;
-    double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    double dq[NB][NQ] = { { 0 } }, dv[NB][NQ] = { { 0 } }, df[NB][2] = { { 0 } };
     run->middle.share = 0.0;
     memset(&at, 0, sizeof at);
     msfp_heat_begin(run);
@@ -111,7 +112,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     }
     for (int i = 0; i < STAGES; ++i)
         for (int b = 0; b < NB; ++b) {
-            for (int d = 0; d < 3; ++d) {
+            for (int d = 0; d < NQ; ++d) {
                 dq[b][d] += h * e[i] * k[i].v[b][d];
                 dv[b][d] += h * e[i] * k[i].a[b][d];
             }

@@ -11,6 +11,7 @@
 #define DOF MSFP_DOF
 #define NB MSFP_NB
 #define ND MSFP_ND
+#define NQ MSFP_NQ
 
 #define STAGES 3
 typedef struct {
@@ -34,11 +35,11 @@ static const tableau method = {
     3.0
 };
 
-static const int angles[ND] = MSFP_ANGLES;
+static const int unknown[ND] = MSFP_FREE;
 
 typedef struct {
-    double v[STAGES][NB][3], a[STAGES][NB][3], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
-    double Q[NB][3], V[NB][3];
+    double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
+    double Q[NB][NQ], V[NB][NQ];
     double beta;
     msfp_seed seed;
     msfp_point at;
@@ -50,7 +51,7 @@ static void prepare(const msfp_run *run, stages *s, int i, double h)
 {
     const msfp_state *now = &run->now;
     for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < 3; ++d) {
+        for (int d = 0; d < NQ; ++d) {
             s->Q[k][d] = now->q[k][d];
             s->V[k][d] = now->v[k][d];
             for (int j = 0; j < i; ++j) {
@@ -69,11 +70,11 @@ static void prepare(const msfp_run *run, stages *s, int i, double h)
 static void place(stages *s)
 {
     for (int k = 0; k < NB; ++k)
-        for (int d = 0; d < 3; ++d)
+        for (int d = 0; d < NQ; ++d)
             s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i)
-            s->at.a[k][angles[i]] = (s->at.v[k][angles[i]] - s->V[k][angles[i]]) / s->beta;
+            s->at.a[k][unknown[i]] = (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]) / s->beta;
 }
 
 static void over_normal(const msfp_work *w, double *residual);
@@ -100,13 +101,15 @@ static void move(stages *s, const double *step, double factor)
 {
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i)
-            s->at.v[k][angles[i]] -= factor * step[k * ND + i];
+            s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
 }
 
 /* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that
  * nearly vanishes, and a heavy top makes N itself depend strongly on the rates. Dividing removes that product. */
 static void over_normal(const msfp_work *w, double *residual)
 {
+    if (MSFP_UPLIFT) /* N follows from the seat, not from the rates, and may vanish */
+        return;
     for (int k = 0; k < NB; ++k)
         for (int i = k * ND; i < (k + 1) * ND; ++i)
             residual[i] /= w->contact[k][MSFP_CONTACT_N];
@@ -114,6 +117,8 @@ static void over_normal(const msfp_work *w, double *residual)
 
 static void tangent_over_normal(const msfp_work *w, const double *residual, double *tangent)
 {
+    if (MSFP_UPLIFT)
+        return;
     for (int k = 0; k < NB; ++k) {
         const double inverse = 1.0 / w->contact[k][MSFP_CONTACT_N];
         for (int i = k * ND; i < (k + 1) * ND; ++i)
@@ -161,12 +166,22 @@ static double take_step(msfp_run *run, stages *s, double *residual, double size,
     return next;
 }
 
+/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
+static double rounding(const stages *s)
+{
+    double speed = 0.0;
+    for (int k = 0; k < NB; ++k)
+        for (int d = 3; d < NQ; ++d)
+            speed = fmax(speed, fabs(s->at.v[k][d]));
+    return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
 /* Newton on the residual. Factors serve as long as they reduce it tenfold: other stages, other steps of like size. The
  * switches of friction and rims make it semi-smooth. The sign of the determinant is looked at with every factorisation;
  * while old factors contract the residual the tangent has theirs. */
 static int solve_stage(msfp_run *run, stages *s)
 {
-    const double goal = fmin(1e-4, fmax(1e-10, 1e-2 * run->options.rtol));
+    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF];
     int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = size_of(run, s, residual);
@@ -189,6 +204,11 @@ static int solve_stage(msfp_run *run, stages *s)
     }
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
+    if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
+        const int status = factorise(run, s);
+        if (status)
+            return status;
+    }
     if (!run->work_sign || run->work_sign == run->determinant)
         return MSFP_OK;
     run->status_surface = run->worst_surface;
@@ -203,7 +223,7 @@ static void guess(const msfp_run *run, stages *s, int i, double h, int extrapola
     if (extrapolate)
         for (int k = 0; k < NB; ++k)
             for (int d = 0; d < ND; ++d) {
-                const int j = angles[d];
+                const int j = unknown[d];
                 const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / method.c[1] : h * run->now.a[k][j];
                 s->at.v[k][j] += method.c[i] * slope;
             }
@@ -253,14 +273,14 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 /* The embedded estimate of an undamped fast mode is of the size of its ringing, however well the method damps it.
  * Filter it as Hosea and Shampine (1996) do, by (1 - beta J)^-1: the last stage with its history moved by the
  * estimate, solved with the factors at hand. */
-static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3], double df[NB][2])
+static void filter(msfp_run *run, stages *s, double dq[NB][NQ], double dv[NB][NQ], double df[NB][2])
 {
     stages moved = *s;
     double residual[DOF];
     if (run->factored_beta != s->beta)
         return;
     for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < 3; ++d) {
+        for (int d = 0; d < NQ; ++d) {
             moved.Q[k][d] += dq[k][d];
             moved.V[k][d] += dv[k][d];
         }
@@ -274,7 +294,7 @@ static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3],
     if (!(size_of(run, &moved, residual) < INFINITY))
         return;
     for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < 3; ++d)
+        for (int d = 0; d < NQ; ++d)
             dq[k][d] = moved.at.q[k][d] - s->at.q[k][d];
         for (int d = 0; d < 2; ++d)
             df[k][d] = moved.f[k][d] - s->f[k][d];
@@ -284,7 +304,7 @@ static void filter(msfp_run *run, stages *s, double dq[NB][3], double dv[NB][3],
 int msfp_step_implicit(msfp_run *run, double h, double *error)
 {
     stages s;
-    double dq[NB][3] = { { 0 } }, dv[NB][3] = { { 0 } }, df[NB][2] = { { 0 } };
+    double dq[NB][NQ] = { { 0 } }, dv[NB][NQ] = { { 0 } }, df[NB][2] = { { 0 } };
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
     s.beta = method.gamma * h;
@@ -321,7 +341,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     }
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < STAGES; ++i) {
-            for (int d = 0; d < 3; ++d) {
+            for (int d = 0; d < NQ; ++d) {
                 dq[k][d] += h * method.e[i] * s.v[i][k][d];
                 dv[k][d] += h * method.e[i] * s.a[i][k][d];
             }

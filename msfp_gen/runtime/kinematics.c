@@ -39,6 +39,14 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         out[MSFP_SURFACE_PARAMETERS_CC] = s[5];
         out[MSFP_SURFACE_PARAMETERS_RS] = slider[5];
         out[MSFP_SURFACE_PARAMETERS_PR] = slider[6];
+        if (MSFP_UPLIFT) {
+            out[MSFP_SURFACE_PARAMETERS_KS] = s[6];
+            out[MSFP_SURFACE_PARAMETERS_CS] = s[7];
+        }
+        /* The resultant leans by friction from the normal, whose place the footprint bounds. */
+        const double footprint = fmin(asin(fmin(slider[5] / s[0], 1.0)) + atan(s[2]), 1.5);
+        out[MSFP_SURFACE_PARAMETERS_CA] = cos(footprint);
+        out[MSFP_SURFACE_PARAMETERS_SA] = sin(footprint);
         for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* a law's numbers come last in both */
             out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
         p->rim_cosine[j] = cos(s[1] / s[0]);
@@ -55,15 +63,25 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
     t[MSFP_TOP_PARAMETERS_G] = gravity;
     const double anchor[3] = { top[8], top[9], 0.0 };
     msfp_top_parameters_x0_put(t, anchor);
+    p->weight = top[4] * gravity;
+    for (int k = 1; k <= NB; ++k)
+        p->weight += bodies[k * MSFP_BODY_VALUES + 2] * gravity;
 }
 
 
-static void load_coordinates(double *x, const double *q, const double *v, const double *a)
+static void load_coordinates(double *x, const double *q, const double *v, const double *a, int parting)
 {
     const double *orders[3] = { q, v, a };
     for (int order = 0; order < 3; ++order)
         for (int i = 0; i < (MSFP_PLANAR ? 1 : 3); ++i)
             x[coordinate(order, i)] = orders[order][MSFP_PLANAR ? 1 : i];
+#if MSFP_UPLIFT
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < SPACE; ++i)
+            x[separation(order, i)] = parting ? orders[order][3 + (MSFP_PLANAR ? 2 * i : i)] : 0.0;
+#else
+    (void)parting;
+#endif
 }
 
 /* What carries the base: the inertial frame at r_01. */
@@ -83,10 +101,10 @@ void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *
 {
     double below[MSFP_BODY_SIZE];
     msfp_ground(at, below);
-    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3);
+    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     msfp_forward(p->body[0], below, w->x[0], w->body[0]);
     for (int k = 1; k <= NB; ++k) {
-        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1]);
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
         msfp_forward(p->body[k], w->body[k - 1], w->x[k], w->body[k]);
     }
 }
@@ -115,6 +133,7 @@ void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
     load_top(at, force, moment);
     msfp_top_wrench(p->top, w->body[NB], w->x[NB], force, moment, wrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
+    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
 void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */)
@@ -125,6 +144,7 @@ void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work 
     const double *df = dload ? dload : zero, *dm = dload ? dload + VECTOR * DOF : zero;
     msfp_top_wrench_tangent(p->top, w->body[NB], w->x[NB], force, moment, wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
+    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
     memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);
     memcpy(w->dmoment[NB], dwrench + VECTOR * DOF, sizeof w->dmoment[NB]);
 }

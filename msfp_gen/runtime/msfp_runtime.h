@@ -17,7 +17,8 @@ extern "C" {
 #define MSFP_HEAT 0
 #endif
 
-#define MSFP_SURFACE_VALUES (6 + MSFP_LAW_VALUES) /* R, s_c, mu, d_y, k_c, c_c; numbers of a law of friction */
+/* R, s_c, mu, d_y, k_c, c_c; where bodies part, seat stiffness and damping; numbers of a law of friction */
+#define MSFP_SURFACE_VALUES (6 + 2 * MSFP_UPLIFT + MSFP_LAW_VALUES)
 #define MSFP_BODY_VALUES 7    /* l, z, m, J transverse, J axial, r, p; the base first (m, J, z unused) */
 #define MSFP_TOP_VALUES 10    /* k, c, k_rot, c_rot, m, J transverse, J axial, h, anchor x, anchor y */
 
@@ -28,18 +29,20 @@ typedef struct {
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
     double top[MSFP_TOP_PARAMETERS_SIZE];
     double rim_cosine[MSFP_NB]; /* cos(s_c/R) */
+    double weight;              /* of the moving bodies and the supported mass */
 } msfp_parameters;
 
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies /* [N][7] */,
-                         const double *surfaces /* [NB][SURFACE_VALUES] */, const double *top /* [10] */);
+                         const double *surfaces /* [NB][MSFP_SURFACE_VALUES] */, const double *top /* [10] */);
 
 /* ---- one evaluation ---------------------------------------------------------------------- */
 
-/* Where the equations are evaluated. Angles psi, theta, phi of the moving bodies; Y, Z of the surfaces. */
+/* Where the equations are evaluated. Coordinates of the moving bodies: psi, theta, phi, and where bodies may part the
+ * separation of the sphere centres below; Y, Z of the surfaces. */
 typedef struct {
     double base[3][6]; /* u_g1..3, psi_1, theta_1, phi_1; first and second derivatives */
     double load[6];    /* force and moment that the outside applies to the top plate at r_nn */
-    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];
     double f[MSFP_NB][2];
 #if MSFP_HEAT
     double rise[MSFP_NB], warming; /* temperature above the start is rise + warming * flux */
@@ -67,6 +70,11 @@ typedef struct {
     double coefficient[MSFP_NB][MSFP_COEFFICIENT_SIZE]; /* mu: what Newton starts from; 0 does */
 #endif
     double lock[MSFP_NB]; /* axial moments that hold phi'' = 0 where spin is locked */
+    double reference;     /* weight and load: what forces are measured by where nothing else is at hand */
+#if MSFP_UPLIFT
+    double seat[MSFP_NB][MSFP_SEAT_SIZE], below[MSFP_NB][MSFP_MOMENT_SIZE]; /* moment on the body below, about its own centre */
+    double dseat[MSFP_NB][MSFP_SEAT_SIZE * MSFP_DOF], dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
+#endif
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
     double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
@@ -91,7 +99,7 @@ enum {
 int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                    double f[MSFP_NB][2], double *residual, double *tangent);
 
-/* Natural size of each residual: N R (mu + 1/100) of the surface below. */
+/* Natural size of each residual: (N + rim force) R (mu + 1/100) of the surface below; of a force where bodies may part. */
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
 
 /* Accelerations at a given state from the condensed equations; fills at->a. */
@@ -119,10 +127,13 @@ void msfp_report(const msfp_parameters *p, const msfp_point *at, const double *u
 int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm, msfp_solution *out);
 
 /* Sliding displacements and gaps (3.20), (3.21). */
-void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
 /* Surface (1-based) whose interface would have to pull: P . t_3 <= 0 (docs/model.md, choice 11). 0: none. */
 int msfp_pulling(const msfp_work *w);
+
+/* How far the seat of surface j is compressed; negative: how far it is open. 1 where bodies cannot part. */
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
 
@@ -164,16 +175,19 @@ typedef struct {
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
        MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
 
-/* Integrals over the run, in order: work put in, recoverable friction, dissipated friction, rims, top dampers. */
-enum { MSFP_WORK_INPUT, MSFP_WORK_FRICTION_STORED, MSFP_WORK_FRICTION, MSFP_WORK_RIM, MSFP_WORK_TOP, MSFP_WORKS };
+/* Integrals over the run, in order: work put in, recoverable friction, dissipated friction, rims, top dampers, seats. */
+enum { MSFP_WORK_INPUT, MSFP_WORK_FRICTION_STORED, MSFP_WORK_FRICTION, MSFP_WORK_RIM, MSFP_WORK_TOP, MSFP_WORK_SEAT, MSFP_WORKS };
 
 /* One row of output. */
 typedef struct {
     double time;
-    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
     double normal[MSFP_NB], angles[MSFP_NB][2], sliding[MSFP_NB], gap[MSFP_NB], rim[MSFP_NB], force[MSFP_NB][3], slip[MSFP_NB][2];
+#if MSFP_UPLIFT
+    double compression[MSFP_NB]; /* of the seats; negative: how far they are open */
+#endif
     double base[3], top[3], top_force[3], top_moment[3];
-    double kinetic, potential, restraint, rim_stored;
+    double kinetic, potential, restraint, rim_stored, seat_stored;
     double work[MSFP_WORKS];
 #if MSFP_LAW
     double mu[MSFP_NB];
@@ -187,14 +201,18 @@ typedef struct {
 typedef struct {
     double time;
     int surface; /* 1-based; 0: none */
-    int kind;    /* 0 rim contact, 1 rim release, 2 stop */
+    int kind;    /* 0 rim contact, 1 rim release, 2 stop, 3 lift-off, 4 landing */
     double displacement[3], top_force[3];
 } msfp_event;
+
+/* Event functions of a run: the gap of every rim, what is left to the stop displacement, and how far every seat is
+ * compressed where bodies may part. */
+#define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
 
 /* Values at the end of a step from which the next goes on. */
 typedef struct {
     double t;
-    double q[MSFP_NB][3], v[MSFP_NB][3], a[MSFP_NB][3], f[MSFP_NB][2], df[MSFP_NB][2];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
     double work[MSFP_WORKS], power[MSFP_WORKS];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
@@ -204,7 +222,7 @@ typedef struct {
 /* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
 typedef struct {
     double share; /* of the step */
-    double q[MSFP_NB][3], v[MSFP_NB][3], f[MSFP_NB][2];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif
@@ -214,8 +232,10 @@ typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
     const double *jumps;
-    int jump_count, next_jump;
+    int jump_count;
     msfp_options options;
+    /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
+    int next_jump;
     msfp_state now, next;
     msfp_middle middle;
     msfp_work work;
@@ -226,7 +246,7 @@ typedef struct {
 #endif
     double h, previous_error, output_time;
     double start[3]; /* r_01 - r_nn at the start */
-    double events_now[MSFP_NB + 1]; /* event functions at the present state */
+    double events_now[MSFP_EVENTS]; /* event functions at the present state */
     double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
     int pivots[MSFP_DOF];
     double unknowns[MSFP_UNKNOWNS];
@@ -239,6 +259,8 @@ typedef struct {
     msfp_event *events;
     size_t event_count, event_capacity;
 } msfp_run;
+#define MSFP_CHECKPOINT_BEGIN offsetof(msfp_run, next_jump)
+#define MSFP_CHECKPOINT_END offsetof(msfp_run, rows)
 
 /* Start a run: histories and jumps must outlive it. */
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
@@ -246,6 +268,10 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
                    const double *q, const double *v, const double *f);
 /* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
 int msfp_run_advance(msfp_run *run, long steps);
+/* Take over what a run of the same scene had reached: its bytes from MSFP_CHECKPOINT_BEGIN to _END, rows and events.
+ * Returns 0, MSFP_E_MEMORY, or MSFP_E_FINITE for bytes that no run of this model leaves. */
+int msfp_run_restore(msfp_run *run, const char *state, const msfp_row *rows, size_t row_count,
+                     const msfp_event *events, size_t event_count);
 void msfp_run_free(msfp_run *run);
 const char *msfp_status_name(int status);
 
@@ -258,7 +284,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 /* Whether the model holds at a state: no interface pulls, no angle is singular. 0 or a status. */
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */
-double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const double dv[MSFP_NB][3], const double df[MSFP_NB][2]);
+double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], const double dv[MSFP_NB][MSFP_NQ], const double df[MSFP_NB][2]);
 /* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
 int msfp_step_implicit(msfp_run *run, double h, double *error);
 int msfp_step_dopri5(msfp_run *run, double h, double *error);

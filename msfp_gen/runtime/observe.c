@@ -57,6 +57,21 @@ static void friction_power(const double *par, const double f[2], const double *c
     *stored += force * (yu + zv - square * drive);
 }
 
+/* Loss in the dampers of the seats. */
+static double seat_power(const msfp_work *w)
+{
+    double lost = 0.0;
+#if MSFP_UPLIFT
+    for (int j = 0; j < NB; ++j) {
+        const double grip = w->seat[j][MSFP_SEAT_GRIP], power = w->seat[j][MSFP_SEAT_POWER];
+        lost += grip > 0.0 ? power * (grip - 1.0) : -power;
+    }
+#else
+    (void)w;
+#endif
+    return lost;
+}
+
 static double rim_power(const msfp_work *w, int j)
 {
     double moment[3], turning[3];
@@ -110,6 +125,7 @@ void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[
     energies(p, at, w, total);
     memset(power, 0, MSFP_WORKS * sizeof *power);
     power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
+    power[MSFP_WORK_SEAT] = seat_power(w);
     for (int j = 0; j < NB; ++j) {
         friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
         if (w->rim_active[j])
@@ -191,4 +207,11 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     row->potential = total[1];
     row->restraint = restraint_energy(p, w);
     row->rim_stored = rim_energy(p, w, row->gap);
+    row->seat_stored = 0.0;
+#if MSFP_UPLIFT
+    for (int j = 0; j < NB; ++j) {
+        row->compression[j] = msfp_compression(p, w, j);
+        row->seat_stored += w->seat[j][MSFP_SEAT_STORED];
+    }
+#endif
 }

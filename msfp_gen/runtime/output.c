@@ -29,7 +29,7 @@ void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
     const double h = b->t - a->t;
     out->t = a->t + s * h;
     for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < 3; ++d) {
+        for (int d = 0; d < MSFP_NQ; ++d) {
             out->q[k][d] = inside(a->q[k][d], a->v[k][d], m->q[k][d], b->q[k][d], b->v[k][d], h, m->share, s);
             out->v[k][d] = inside(a->v[k][d], a->a[k][d], m->v[k][d], b->v[k][d], b->a[k][d], h, m->share, s);
             out->a[k][d] = (1.0 - s) * a->a[k][d] + s * b->a[k][d];

@@ -5,9 +5,10 @@
 #include "run.h"
 #include "heat.h"
 
-#define SMALLEST_STEP 1e-9 /* [s], far below any period of a bearing */
+#define SMALLEST_STEP 1e-9     /* [s], far below any period of a bearing */
+#define SHORTEST_TO_EVENT 1e-6 /* [s]; an event nearer than this is stepped over: rounding would drown a step to it */
 
-static const int angles[MSFP_ND] = MSFP_ANGLES;
+static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
@@ -24,13 +25,22 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
     msfp_history_at(&run->load, t, 1, (double(*)[6])at->load);
 }
 
-double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][3], const double dv[MSFP_NB][3], const double df[MSFP_NB][2])
+/* Absolute tolerance of a coordinate: the solver's for angles; a separation's that of the force it stands for, as for Y, Z. */
+static double absolute(const msfp_run *run, int j, int d)
 {
-    const double rtol = run->options.rtol, atol = run->options.atol_angle;
+    if (d < 3)
+        return run->options.atol_angle;
+    return 10.0 * run->options.rtol * run->work.reference / run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KS];
+}
+
+double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], const double dv[MSFP_NB][MSFP_NQ], const double df[MSFP_NB][2])
+{
+    const double rtol = run->options.rtol;
     double worst = 0.0;
     for (int k = 0; k < NB; ++k) {
         for (int i = 0; i < MSFP_ND; ++i) {
-            const int d = angles[i];
+            const int d = unknown[i];
+            const double atol = absolute(run, k, d);
             const double q = fmax(fabs(run->now.q[k][d]), fabs(run->next.q[k][d]));
             worst = fmax(worst, fabs(dq[k][d]) / (atol + rtol * q));
             if (dv)
@@ -51,7 +61,7 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
             run->status_surface = j + 1;
             return MSFP_E_FINITE;
         }
-        if (p[2] <= 0.0) {
+        if (p[2] <= 0.0 && !MSFP_UPLIFT) {
             run->status_surface = j + 1;
             run->status_value = p[2];
             return MSFP_E_UPLIFT;
@@ -67,9 +77,10 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
 
 /* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
 
-#define EVENTS (NB + 1)
+#define EVENTS MSFP_EVENTS
+#define FIRST_SEAT (NB + 1)
 
-/* Event functions of a state: the gaps, and what is left to the stop displacement. */
+/* Event functions of a state: the gaps, what is left to the stop displacement, compressions. */
 static void event_values(msfp_run *run, const msfp_state *s, double *g)
 {
     double sliding[NB][MSFP_GAP_SIZE], u[3];
@@ -83,10 +94,17 @@ static void event_values(msfp_run *run, const msfp_state *s, double *g)
         msfp_across(run, &row, u);
         g[NB] = run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]);
     }
+#if MSFP_UPLIFT
+    msfp_observe_state(run, s, &row);
+    for (int j = 0; j < NB; ++j)
+        g[FIRST_SEAT + j] = row.compression[j];
+#endif
 }
 
 static double event_tolerance(const msfp_run *run, int i)
 {
+    if (i >= FIRST_SEAT)
+        return 0.1 * absolute(run, i - FIRST_SEAT, 3);
     return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
 }
 
@@ -97,7 +115,7 @@ static double first_event(msfp_run *run, const double *before, const double *aft
     for (int i = 0; i < EVENTS; ++i) {
         const double tolerance = event_tolerance(run, i);
         const int met = before[i] > tolerance && after[i] < -tolerance;
-        const int left = i < NB && before[i] < -tolerance && after[i] > tolerance;
+        const int left = i != NB && before[i] < -tolerance && after[i] > tolerance;
         if (!(met || left) || (i < NB && !MSFP_RIMS))
             continue;
         double low = 0.0, high = 1.0;
@@ -131,6 +149,9 @@ static int record_events(msfp_run *run, const double *before, const double *afte
         else if (before[j] <= 0.0 && after[j] > 0.0)
             msfp_write_event(run, &run->next, j + 1, 1);
     }
+    for (int j = 0, i = FIRST_SEAT; i < EVENTS; ++i, ++j)
+        if ((before[i] > 0.0) != (after[i] > 0.0))
+            msfp_write_event(run, &run->next, j + 1, after[i] > 0.0 ? 4 : 3);
     if (after[NB] <= event_tolerance(run, NB) || (run->options.stop_all_rims && all_rims_met(after))) {
         msfp_write_event(run, &run->next, 0, 2);
         stop = 1;
@@ -302,7 +323,7 @@ static int one_step(msfp_run *run)
         const double share = relocations < 4 ? first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
-        h *= share;
+        h = fmin(0.99 * h, fmax(h * share, SHORTEST_TO_EVENT));
     }
     if (fabs(run->next.t - target(run)) <= same_time(run->next.t)) /* land on the target exactly */
         run->next.t = target(run);

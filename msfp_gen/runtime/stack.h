@@ -5,9 +5,11 @@
 
 #define DOF MSFP_DOF
 #define NB MSFP_NB
+#define NA MSFP_NA
 #define ND MSFP_ND
 #define VECTOR MSFP_FORCE_SIZE  /* components of a force */
 #define MOMENT MSFP_MOMENT_SIZE /* components of a moment */
+#define SPACE MSFP_SPACE         /* directions of a translation */
 #define FRICTION MSFP_FRICTION_SIZE
 #define PAIR (MSFP_PLANAR ? 1 : 2) /* tilts of a body */
 #if MSFP_LAW
@@ -19,12 +21,31 @@
 /* Field of block coordinates: angle i of order 0, 1, 2. */
 static inline int coordinate(int order, int i) { return MSFP_PLANAR ? order : 3 * order + i; }
 
+#if MSFP_UPLIFT
+/* Field of block coordinates: component i of the separation, order 0, 1, 2. */
+static inline int separation(int order, int i) { return MSFP_COORDINATES_DX + SPACE * order + i; }
+#endif
+
+/* Field of block coordinates: unknown i of a body. */
+static inline int field(int order, int i)
+{
+#if MSFP_UPLIFT
+    if (i >= NA)
+        return separation(order, i - NA);
+#endif
+    return coordinate(order, i);
+}
+
 /* kinematics.c */
 void msfp_ground(const msfp_point *at, double *body);
 void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w);
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */);
+
+/* seat.c */
+void msfp_seat(const msfp_parameters *p, msfp_work *w, int j, int tangent);
+void msfp_split_moment(msfp_work *w, int j, int tangent);
 
 /* surface.c */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);

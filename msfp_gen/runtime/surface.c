@@ -40,7 +40,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 #endif
 }
 
-void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][3], double sliding[MSFP_NB][MSFP_GAP_SIZE])
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE])
 {
     for (int j = 0; j < NB; ++j) {
         double x[MSFP_RIM_LOCAL] = { 0 };
@@ -69,7 +69,6 @@ void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dfo
             }
         }
 }
-
 
 #define OWN (FRICTION + MSFP_LAW) /* local unknowns: Y, Z, and mu where it follows a law */
 #define ROWS (MOMENT + OWN + 1)  /* rows of the contact's tangent: M, dY, dZ, mu, N */
@@ -202,6 +201,20 @@ static int condense(const double *par, const double *local, const double *f LAW(
     return MSFP_OK;
 }
 
+/* How much of its rim's force a surface presses against: all of it, but no more than it carries itself where bodies may
+ * part; a rim met in flight turns the bodies and presses nothing. */
+static double rim_share(const msfp_work *w, int j)
+{
+    double carried = 0.0, met = 0.0;
+    if (!MSFP_UPLIFT || !w->rim_active[j])
+        return 1.0;
+    for (int i = 0; i < VECTOR; ++i) {
+        carried += w->force[j][i] * w->force[j][i];
+        met += w->rim[j][i] * w->rim[j][i];
+    }
+    return carried < met ? sqrt(carried / met) : 1.0;
+}
+
 /* Force, slip, friction and moment of surface j. */
 int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
 {
@@ -209,13 +222,19 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
     double drf[VECTOR * DOF], dmoment[MOMENT * DOF], dlocal[MSFP_LOCAL_SIZE * DOF];
     const double *par = p->surface[j];
     const double fp[2] = { seed->fp[j][0], seed->fp[j][1] };
+    double rim[VECTOR];
     msfp_rim_force(p, w, j, tangent ? drim : NULL);
+    const double share = rim_share(w, j);
+    for (int i = 0; i < VECTOR; ++i)
+        rim[i] = share * w->rim[j][i];
     if (tangent) {
         msfp_rim_columns(w, j, drim, drf, dmoment);
-        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j],
+        for (int i = 0; i < VECTOR * DOF; ++i)
+            drf[i] *= share;
+        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j],
                                    w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
     } else
-        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
     int status = friction_stage(par, w->local[j], fp, seed->beta, fmax(seed->accuracy, 1e-12), f LAW(w->coefficient[j]), w->contact[j]);
     if (status == MSFP_OK && tangent)
         status = condense(par, w->local[j], f LAW(w->coefficient[j]), seed->beta, w->contact[j], condensed);
@@ -235,5 +254,8 @@ int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, 
         msfp_moment_to_world_tangent(w->body[j], moment, w->moment[j], w->dbody[j], dmoment, w->dmoment[j]);
     } else
         msfp_moment_to_world(w->body[j], moment, w->moment[j]);
+#if MSFP_UPLIFT
+    msfp_split_moment(w, j, tangent);
+#endif
     return MSFP_OK;
 }

@@ -220,9 +220,9 @@ def transitions(push: Push, end: float) -> list[Transition]:
     raise ArithmeticError(f"stages change without end near displacement {story[-1].at.displacement:.6g} m")
 
 
-def force_at(push: Push, displacements: Sequence[float]) -> Array:
-    """Horizontal force [N] that a monotonic push needs at each displacement [m] > 0."""
-    story = transitions(push, max(displacements))
+def force_at(push: Push, displacements: Sequence[float], story: list[Transition] | None = None) -> Array:
+    """Horizontal force [N] that a monotonic push needs at each displacement [m] > 0; story: its transitions."""
+    story = story or transitions(push, max(displacements))
     stages = [max((s.at for s in story if s.at.displacement <= d), key=lambda at: at.displacement)
               for d in displacements]  # fmt: skip
     # of several transitions at one place the last one told counts

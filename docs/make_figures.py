@@ -1,0 +1,84 @@
+"""Draw the pictures of docs/figures.md: `python docs/make_figures.py`. Takes the folder to write into."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msfp_gen import figures, load_scene, simulate
+from msfp_gen.records import baseline_corrected, bundled, response_spectrum
+from msfp_gen.result import Result
+
+FOLDER = Path(__file__).resolve().parent / "figures"
+RECORD = "ridgecrest-2019-ci-clc"
+ROWS = 3000
+TOLERANCES = 10.0 ** -np.arange(2, 7)
+
+
+def run(name: str, sliders: str = "inertial", **solver: Any) -> Result:
+    """The run of a preset, with rows close enough for smooth curves."""
+    scene = load_scene(name)
+    step = min(scene.end / ROWS, scene.motion.max_step or scene.end)
+    effects = replace(scene.effects, sliders=sliders)
+    return simulate(replace(scene, output_step=step, effects=effects, solver=replace(scene.solver, **solver)))
+
+
+def draw_runs(folder: Path) -> None:
+    """Figures of test 5 of the report, of an orbit and of an earthquake."""
+    test, quake = run("fenz-test5"), run("ridgecrest-clc")
+    for name in ("loops", "sliding", "stages", "energy"):
+        figures.FIGURES[name](test, folder / f"gallery-{name}.png")
+    figures.plot_orbit(run("becker-eight-125"), folder / "gallery-orbit.png")
+    figures.plot_stages(quake, folder / "gallery-stages-record.png")
+    figures.plot_section(test, folder / "gallery-section.png")
+    figures.plot_section(test, folder / "gallery-circles.png", time=65.0, friction_circles=True)
+    figures.plot_force_path(test, folder / "gallery-force-path.png", time=65.0)
+    figures.animate(test, folder / "gallery-movie.gif", seconds=3.0, frames_per_second=6, start=173.6, end=243.0)
+
+
+def draw_record(folder: Path) -> None:
+    """What correction did to a record, and its spectra."""
+    raw = bundled(RECORD)
+    corrected = baseline_corrected(raw, duration=60.0)
+    figures.plot_correction(raw, corrected, folder / "gallery-correction.png")
+    found = response_spectrum(corrected)
+    curves = dict(zip(("E1", "E2", "E3"), found.psa.T, strict=False))
+    figures.plot_response_spectrum(found.period, curves, folder / "gallery-spectrum.png", title=raw.name)
+
+
+def draw_cost(folder: Path) -> None:
+    """Error of the top force against cost for one test, with and without the mass of the sliders."""
+    exact = run("fenz-test2", rtol=1e-9).history.top_force[:, 0]
+    table = {}
+    for label, sliders in (("implicit", "inertial"), ("implicit, massless sliders", "massless")):
+        columns: dict[str, list[float]] = {"seconds": [], "newton": [], "force_max": [], "force_rms": []}
+        for rtol in TOLERANCES:
+            result = run("fenz-test2", sliders, rtol=float(rtol))
+            error = np.abs(result.history.top_force[:, 0] - exact) / np.abs(exact).max()
+            point = (
+                result.counters.wall_time,
+                result.counters.newton_iterations,
+                error.max(),
+                np.sqrt(np.mean(error**2)),
+            )
+            for column, value in zip(columns.values(), point, strict=True):
+                column.append(float(value))
+        table[label] = columns
+    named = {"force_max": "largest error of the top force", "force_rms": "RMS error of the top force"}
+    figures.plot_work_precision(table, folder / "gallery-work-precision.png", errors=named, title="fenz-test2")
+
+
+def main(folder: Path = FOLDER) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    draw_runs(folder)
+    draw_record(folder)
+    draw_cost(folder)
+    print(f"figures in {folder}")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""The three loops of a bounding analysis in one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.bounding.runs import CASES
+from msfp_gen.figures import COLOURS, INK, MILLI, engineering, moving_axes, page
+from msfp_gen.figures.style import THIN, headline, subscript
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.bounding.runs import Bounds, Case
+
+# The nominal loop is drawn last, on top of the bounds.
+LOOKS: dict[str, dict[str, Any]] = {"lower": {"color": COLOURS[0], "linestyle": "--"}, "upper": {"color": COLOURS[1]},
+         "nominal": {"color": INK}}  # fmt: skip
+
+
+def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
+    """Top force [kN] over displacement across the bearing [mm], lower, nominal and upper, along each axis that moves.
+
+    A run that failed is drawn as far as it came. Raises InputError for a path that cannot be written.
+    """
+    drawn = [case for name in LOOKS for case in found.cases if case.name == name and case.result is not None]
+    axes = sorted({axis for case in drawn if case.result for axis in moving_axes(case.result)}) or [0]
+    with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
+        name = next(case.scene.name for case in found.cases if case.name == "nominal") or "unnamed scene"
+        headline(figure, f"{name}: bounds by {found.table.name}")
+        for axis, place in zip(axes, figure.subplots(1, len(axes), squeeze=False)[0], strict=True):
+            _draw(place, found, drawn, axis)
+    return figure
+
+
+def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
+    forces = [case.result.history.top_force[:, axis] for case in cases if case.result]
+    scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
+    for case, force in zip(cases, forces, strict=True):
+        assert case.result is not None
+        u = case.result.history.displacement[:, axis] * MILLI
+        axes.plot(u, force * scale.factor, label=_label(found, case), linewidth=THIN, **LOOKS[case.name])
+    sign = subscript(axis + 1)
+    axes.set(title=f"Force and displacement along E{sign}", xlabel=f"displacement across the bearing u{sign} [mm]",
+             ylabel=f"force on the top support F{sign} [{scale.unit}]")  # fmt: skip
+    axes.margins(0.06)
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda i: CASES.index(cases[i].name))
+    axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
+
+
+def _label(found: Bounds, case: Case) -> str:
+    """The case with its factors; one number where all surfaces share it."""
+    parts = []
+    for named, factors in found.lambdas.items():
+        values = list(dict.fromkeys(f"{value:.3g}" for value in factors[case.name]))
+        parts.append(f"{named.replace('_', ' ')} × {' / '.join(values)}")
+    return f"{case.name}: {', '.join(parts)}" + (", run failed" if case.failure else "")

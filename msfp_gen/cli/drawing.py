@@ -1,0 +1,161 @@
+"""Commands that draw: plot, animate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msfp_gen.cli.console import Progress, note, number, whole
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.output import FIGURE_SUFFIXES, check_output, make_folder
+
+if TYPE_CHECKING:
+    from msfp_gen.result import Result
+    from msfp_gen.scene import Scene
+
+ROWS = 4000  # of a run that is made to be drawn: the solver's own steps may lie far apart
+EVERY = "all"
+
+app = typer.Typer()
+Source = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")]
+Azimuth = Annotated[
+    float | None,
+    typer.Option(parser=number, metavar="DEGREES", help="Plane of the section, from E1; default: of the displacement."),
+]
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen plot fenz-test5 --figure stages -o stages.png\n"
+    "  msfp-gen plot out.nc --figure all -o figures\n"
+    "  msfp-gen plot out.nc --figure section --time 90 --friction-circles -o section.svg"
+)
+def plot(
+    source: Source,
+    figure: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="overview|loops|orbit|sliding|stages|force-path|energy|section|all"),
+    ] = "overview",
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE|DIR", help="A .png, .svg or .pdf, or a folder for NAME.png.")
+    ] = Path(),
+    time: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="SECONDS", help="Instant of section and force-path; default: the peak."),
+    ] = None,
+    azimuth: Azimuth = None,
+    friction_circles: Annotated[
+        bool, typer.Option("--friction-circles", help="Sphere centres and friction circles in the section.")
+    ] = False,
+) -> None:
+    """Draw a run: one figure, or all of them."""
+    targets = _targets(figure, output)
+    angle = None if azimuth is None else math.radians(azimuth)
+    _reject_unused(targets, {"--time": time}, ("section", "force-path"))
+    _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
+    opened = _opened(source)
+    make_folder(next(iter(targets.values())).parent, "--output")
+    result, failure = _run(opened)
+    from msfp_gen.figures import FIGURES, plot_force_path, plot_section
+    from msfp_gen.resample import at_times
+
+    if time is not None:
+        at_times(result, time)  # refused before anything is written
+    for name, path in targets.items():
+        if name == "section":
+            plot_section(result, path, time=time, azimuth=angle, friction_circles=friction_circles)
+        elif name == "force-path":
+            plot_force_path(result, path, time=time)
+        else:
+            FIGURES[name](result, path)
+        note(f"wrote {path}")
+    if failure is not None:
+        raise failure
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen animate fenz-test5 -o test5.gif\n"
+    "  msfp-gen animate out.nc --start 5 --end 25 --seconds 20 -o slow.mp4"
+)
+def animate(
+    source: Source,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="A .gif, or an .mp4 by ffmpeg.")],
+    seconds: Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Length of the movie.")] = 8.0,
+    rate: Annotated[int, typer.Option(parser=whole, metavar="NUMBER", help="Frames a second.")] = 12,
+    start: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="First instant of the run that is shown.")
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="Last instant of the run that is shown.")
+    ] = None,
+    azimuth: Azimuth = None,
+) -> None:
+    """Film the stack as it moves, beside its loop and the bars of sliding."""
+    from msfp_gen.figures import animate as film
+    from msfp_gen.figures import check_movie
+
+    check_movie(output, "--output")
+    result, failure = _run(_opened(source))
+    angle = None if azimuth is None else math.radians(azimuth)
+    with Progress("frames") as progress:
+        film(result, output, seconds=seconds, frames_per_second=rate, start=start, end=end, azimuth=angle,
+             progress=progress)  # fmt: skip
+    note(f"wrote {output}")
+    if failure is not None:
+        raise failure
+
+
+def _targets(figure: str, output: Path) -> dict[str, Path]:
+    """Where each figure goes; judged before anything is run."""
+    from msfp_gen.figures import FIGURES
+
+    if figure not in (*FIGURES, EVERY):
+        raise InputError(f"--figure = {figure!r}: give one of {', '.join((*FIGURES, EVERY))}")
+    if figure != EVERY and output.suffix:
+        return {figure: check_output(output, FIGURE_SUFFIXES, "--output")}
+    if output.suffix.lower() in FIGURE_SUFFIXES:
+        raise InputError(f"--output = {str(output)!r}: --figure all writes several files; give a folder")
+    return {name: output / f"{name}.png" for name in (FIGURES if figure == EVERY else (figure,))}
+
+
+def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], users: tuple[str, ...]) -> None:
+    """InputError for an option that no figure asked for would take."""
+    for option, value in options.items():
+        if value is not None and not set(users) & set(targets):
+            raise InputError(f"{option}: only {' and '.join(users)} take it; give --figure {users[0]} with it")
+
+
+def _opened(source: str) -> Result | Scene:
+    """A saved result, or a scene to run."""
+    from msfp_gen.result import Result
+    from msfp_gen.scenefile import load_scene
+
+    return Result.from_netcdf(source) if source.lower().endswith(".nc") else _drawable(load_scene(source))
+
+
+def _run(opened: Result | Scene) -> tuple[Result, RunError | None]:
+    """The result, and why its run failed if it did: what was computed until then is worth drawing."""
+    from msfp_gen.build import build_model
+    from msfp_gen.result import Result
+    from msfp_gen.simulation import simulate
+
+    if isinstance(opened, Result):
+        return opened, None
+    build_model(opened.bearing.layout, opened.effects, progress=note)
+    with Progress(opened.name or "run") as progress:
+        try:
+            return simulate(opened, progress=progress), None
+        except RunError as error:
+            if not isinstance(error.result, Result):
+                raise
+            return error.result, error
+
+
+def _drawable(scene: Scene) -> Scene:
+    """With rows close enough for smooth curves, and no wider than a record's samples, unless the scene has its own."""
+    if scene.output_step is not None:
+        return scene
+    return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))

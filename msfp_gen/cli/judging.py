@@ -1,0 +1,130 @@
+"""Commands about what engineers sign off: characterise, bound, factors."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.errors import RunError
+
+if TYPE_CHECKING:
+    from msfp_gen.bounding import Bounds
+    from msfp_gen.result import Result
+
+app = typer.Typer()
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen characterise fenz-test5\n"
+    "  msfp-gen characterise out.nc --json\n  msfp-gen characterise scene.toml -o cycles.csv"
+)
+def characterise(
+    source: Annotated[
+        str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write one row a cycle as CSV.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Effective stiffness, damping, stages, capacity left, velocity and heat of a run, per cycle and envelope."""
+    from msfp_gen.characterise import characterise as judge
+    from msfp_gen.characterise.tables import CSV_SUFFIXES, characterisation_tables, write_csv
+    from msfp_gen.output import check_output
+
+    if output is not None:
+        check_output(output, CSV_SUFFIXES, "--output")
+    found = judge(_result(source))
+    if as_json:
+        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        show(characterisation_tables(found))
+    if output is not None:
+        note(f"wrote {write_csv(found, output)}")
+
+
+def _result(source: str) -> Result:
+    """A saved result, or the run of a scene."""
+    if source.lower().endswith(".nc"):
+        from msfp_gen.dataset import read_result
+
+        return read_result(source)
+    from msfp_gen.build import build_model
+    from msfp_gen.scenefile import load_scene
+    from msfp_gen.simulation import simulate
+
+    scene = load_scene(source)
+    build_model(scene.bearing.layout, scene.effects, progress=note)
+    with Progress(scene.name or "run") as progress:
+        return simulate(scene, progress=progress)
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen bound fenz-test5\n  msfp-gen bound scene.toml --factors mine.toml -o bounds\n"
+    "  msfp-gen factors asce7 > mine.toml   # a table to edit"
+)
+def bound(
+    scene: SceneName,
+    factors: Annotated[
+        str, typer.Option(metavar="FILE|NAME", help="A table of factors (TOML), or the name of one; see `factors`.")
+    ] = "asce7",
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put runs, numbers and the figure here.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a scene at its lower bounds, as it stands and at its upper bounds, by lambda factors of a code."""
+    from msfp_gen.bounding import bound as run_bounds
+    from msfp_gen.bounding import bounded_scenes, load_factors
+    from msfp_gen.bounding.tables import bounding_tables
+    from msfp_gen.build import build_model
+    from msfp_gen.output import make_folder
+    from msfp_gen.scenefile import load_scene
+
+    chosen, table = load_scene(scene), load_factors(factors)
+    bounded_scenes(chosen, table)  # a table that does not fit is refused before anything is made
+    if output is not None:
+        make_folder(output, "--output")
+    build_model(chosen.bearing.layout, chosen.effects, progress=note)
+    with ExitStack() as stack:
+        found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
+    if as_json:
+        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        show(bounding_tables(found))
+    written = _save(found, output) if output is not None else []
+    for path in written:
+        note(f"wrote {path}")
+    if not found.succeeded:
+        failed = "; ".join(f"{case.name}: {case.failure}" for case in found.cases if case.failure)
+        raise RunError(f"not every bound could be run; {failed}", status="bound")
+
+
+@app.command(epilog="Examples:\n\n\b\n  msfp-gen factors\n  msfp-gen factors asce7 > mine.toml")
+def factors(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Print this table, to be edited.")] = None,
+) -> None:
+    """List the tables of lambda factors that come with msfp-gen, or print one."""
+    from msfp_gen.bounding import factor_tables, factor_text
+    from msfp_gen.tables import Table
+
+    if name is None:
+        show([Table("tables of property-modification factors", (), list(factor_tables().items()))])
+    else:
+        say(factor_text(name).rstrip("\n"))
+
+
+def _save(found: Bounds, folder: Path) -> list[Path]:
+    """Every run as netCDF, the numbers as CSV, the loops as a figure; the paths written."""
+    from msfp_gen.bounding.figure import plot_bounds
+    from msfp_gen.bounding.tables import write_quantities
+
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases if case.result is not None]
+    plot_bounds(found, folder / "bounds.png")
+    return [*written, write_quantities(found, folder / "bounds.csv"), folder / "bounds.png"]

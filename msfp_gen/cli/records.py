@@ -1,0 +1,119 @@
+"""Commands about ground motions: record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msfp_gen.cli.console import note, number, show
+from msfp_gen.output import FIGURE_SUFFIXES, check_output
+
+if TYPE_CHECKING:
+    from msfp_gen.records import Corrected, Record, ScaleTo
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen record RSN6_180.AT2 RSN6_270.AT2 RSN6_UP.AT2\n"
+    "  msfp-gen record station.v2 --as-is --duration 40\n"
+    "  msfp-gen record ridgecrest-2019-ci-clc --duration 60 --plot correction.png --spectrum spectrum.csv\n"
+    '  msfp-gen record quake.v1 --scale-to "sa=0.6 g, period=2.5 s" -o scaled.csv\n'
+    '  msfp-gen record quake.v1 --scale-to "sds=1 g, sd1=0.6 g, between=0.5:4, component=rotd50" --spectrum fit.png'
+)
+def record(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="A record, one file for each component, or a bundled name.")
+    ],
+    correct: Annotated[
+        bool, typer.Option("--correct", help="Correct the baseline; any option below asks for it too.")
+    ] = False,
+    as_is: Annotated[
+        bool, typer.Option("--as-is", help="Integrate what is in the file: for records corrected by their agency.")
+    ] = False,
+    start: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="First time kept.", show_default="strongest")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="Length kept.", show_default="all")
+    ] = None,
+    corner: Annotated[float | None, typer.Option(parser=number, metavar="HZ", help="Of the high-pass; 0.05.")] = None,
+    scale_to: Annotated[str | None, typer.Option(metavar="TARGET", help="A peak, an ordinate, or a spectrum.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw what the correction did.")] = None,
+    spectrum: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the response spectrum: .csv, or a figure.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write the accelerations with units.")
+    ] = None,
+) -> None:
+    """Read a ground motion; correct, scale and draw it; print its peaks and its spectrum."""
+    for path, name, suffixes in (
+        (plot, "--plot", FIGURE_SUFFIXES),
+        (spectrum, "--spectrum", (".csv", *FIGURE_SUFFIXES)),
+        (output, "--output", (".csv",)),
+    ):
+        if path is not None:
+            check_output(path, suffixes, name)
+    from msfp_gen.records import ScaleTo
+    from msfp_gen.records.tables import record_tables
+
+    target = None if scale_to is None else ScaleTo.parse(scale_to)
+    raw = _read(files)
+    wanted = correct or as_is or plot is not None or any(v is not None for v in (start, duration, corner, target))
+    ready, factor = _prepared(raw, target, start, duration, not as_is, corner) if wanted else (None, 1.0)
+    motion = raw if ready is None else ready if target is None else ready.scaled(factor)
+    show(record_tables(raw, motion))
+    if plot is not None and ready is not None:  # before scaling: the picture is of the correction
+        from msfp_gen.figures import plot_correction
+
+        plot_correction(raw, ready, plot)
+    if spectrum is not None:
+        _write_spectrum(raw, motion, target, spectrum)
+    if output is not None:
+        _write_record(raw, motion, output)
+    for path in filter(None, (plot, spectrum, output)):
+        note(f"wrote {path}")
+
+
+def _read(files: list[str]) -> Record:
+    from msfp_gen.records import BUNDLED, bundled, read_record
+
+    return bundled(files[0]) if len(files) == 1 and files[0] in BUNDLED else read_record(*files)
+
+
+def _prepared(
+    raw: Record, target: ScaleTo | None, start: float | None, duration: float | None, correct: bool,
+    corner: float | None,
+) -> tuple[Corrected, float]:  # fmt: skip
+    """The record corrected, and its scale."""
+    from msfp_gen.records import prepared
+
+    return prepared(raw, 1.0, target, start, duration, correct, 0.05 if corner is None else corner, 1.0)
+
+
+def _write_record(raw: Record, motion: Record | Corrected, path: Path) -> None:
+    from msfp_gen.records import Corrected, write_csv
+
+    write_csv(motion.as_record(raw) if isinstance(motion, Corrected) else motion, path)
+
+
+def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | None, path: Path) -> None:
+    from msfp_gen.records import response_spectrum
+    from msfp_gen.records.spectrum import MEASURES
+
+    found = response_spectrum(motion)
+    if path.suffix.lower() == ".csv":
+        found.to_csv(path)
+        return
+    from msfp_gen.figures import plot_response_spectrum
+
+    curves = dict(zip(MEASURES, found.psa.T, strict=True))
+    if not raw.acceleration[:, 2].any():
+        del curves["E3"]
+    design = None if target is None else target.curve(found.period)
+    plot_response_spectrum(
+        found.period, curves, path, target=design, damping=found.damping, title=raw.name or "Response spectrum"
+    )

@@ -1,0 +1,65 @@
+"""Pictures of runs and records in one style (docs/figures.md): each is a function that also writes its file.
+
+matplotlib is loaded when the first picture is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msfp_gen.figures.energy import plot_energy
+from msfp_gen.figures.force_path import plot_force_path
+from msfp_gen.figures.loops import moving_axes, plot_loops, plot_orbit
+from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
+from msfp_gen.figures.overview import plot_result
+from msfp_gen.figures.records import plot_correction, plot_response_spectrum
+from msfp_gen.figures.section import plot_section
+from msfp_gen.figures.sliding import plot_sliding, plot_stages
+from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, STYLE, engineering, page, panels
+from msfp_gen.figures.work_precision import plot_work_precision
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from msfp_gen.result import Result
+
+__all__ = [
+    "COLOURS",
+    "FAINT",
+    "FIGURES",
+    "INK",
+    "MILLI",
+    "MOVIE_SUFFIXES",
+    "STYLE",
+    "animate",
+    "check_movie",
+    "engineering",
+    "moving_axes",
+    "page",
+    "panels",
+    "plot_correction",
+    "plot_energy",
+    "plot_force_path",
+    "plot_loops",
+    "plot_orbit",
+    "plot_response_spectrum",
+    "plot_result",
+    "plot_section",
+    "plot_sliding",
+    "plot_stages",
+    "plot_work_precision",
+]
+
+# Pictures of one run, by the name that the command line gives them.
+FIGURES: dict[str, Callable[[Result, str | Path | None], Figure]] = {
+    "overview": plot_result,
+    "loops": plot_loops,
+    "orbit": plot_orbit,
+    "sliding": plot_sliding,
+    "stages": plot_stages,
+    "force-path": plot_force_path,
+    "energy": plot_energy,
+    "section": plot_section,
+}

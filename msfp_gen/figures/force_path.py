@@ -1,0 +1,70 @@
+"""The way of the force through the stack: its line at one instant, and where it crosses every face over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.figures.section import draw_circles, draw_section, peak_time
+from msfp_gen.figures.style import INK, MILLI, THIN, colour, headline, label_of, page, strips, subscript
+from msfp_gen.history import Array
+from msfp_gen.outline import slider_radius
+from msfp_gen.resample import at_times
+from msfp_gen.section import sections
+from msfp_gen.shape import friction_circles, poses
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+    from msfp_gen.result import Result
+
+
+def plot_force_path(result: Result, path: str | Path | None = None, *, time: float | None = None) -> Figure:
+    """The line of force with the friction circles at `time` [s] (None: at the largest displacement), and beside it how
+    far from the axis of its slider every contact lies [mm].
+
+    Beyond the edge of the face a slider would tip, which the model does not follow (docs/model.md, choice 11). Raises
+    InputError for a time outside the run or a path that cannot be written.
+    """
+    then = at_times(result, peak_time(result) if time is None else time)
+    (section,) = sections(then)
+    with page(12.5, max(6.0, 1.3 * result.history.surfaces + 1), path) as figure:
+        headline(figure, label_of(result))
+        ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.7))
+        axes = left.subplots()
+        draw_section(axes, then, section)
+        draw_circles(axes, section, friction_circles(result.scene.bearing))
+        _draw_offsets(right, result)
+    return figure
+
+
+def eccentricity(result: Result) -> Array:
+    """Distance of every contact from the axis of its slider, ndarray, shape (T, n-1), [m]."""
+    where, bearing = poses(result), result.scene.bearing
+    sliders = [bearing.slider(surface) for surface in range(bearing.layout.surfaces)]
+    axes = where.basis[:, sliders, 2]
+    arm = where.contact - where.centre
+    off: Array = np.linalg.norm(arm - np.sum(arm * axes, axis=-1, keepdims=True) * axes, axis=-1)
+    return off
+
+
+def _draw_offsets(figure: SubFigure, result: Result) -> None:
+    """A strip a surface, top surface uppermost, with the edge of the face above it."""
+    bearing, off = result.scene.bearing, eccentricity(result) * MILLI
+    column = strips(figure, bearing.layout.surfaces)
+    for index, axes in enumerate(column[::-1]):
+        edge = slider_radius(bearing, index) * MILLI
+        known = bool(bearing.slider_rim_radius(index))
+        axes.plot(result.history.time, off[:, index], color=colour(index + 1))
+        axes.set_ylabel(f"e{subscript(index + 1)} [mm]")
+        axes.set_ylim(0, 1.3 * max(edge if known else 0.0, off[:, index].max()) or 1.0)
+        axes.locator_params(axis="y", nbins=3)
+        if known:
+            axes.axhline(edge, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
+            axes.annotate(f"edge of the slider {edge:.3g} mm", (1, edge), xycoords=("axes fraction", "data"),
+                          xytext=(0, 3), textcoords="offset points", ha="right", va="bottom", fontsize=7.5,
+                          color=INK)  # fmt: skip
+    column[0].set_title("Distance of the contact from the axis of its slider")
+    figure.align_ylabels(column)

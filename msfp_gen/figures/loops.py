@@ -1,0 +1,132 @@
+"""Hysteresis loops of the bearing, and its orbit in plan."""
+
+from __future__ import annotations
+
+from functools import partial
+from operator import mul
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    MILLI,
+    SMALL,
+    THIN,
+    engineering,
+    first_contacts,
+    headline,
+    label_of,
+    mark,
+    page,
+    subscript,
+)  # fmt: skip
+from msfp_gen.summary import axial_load
+from msfp_gen.transitions import SYMBOLS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.result import Result
+
+SIDE = 0.02  # a horizontal axis whose displacement stays below this share of the largest is not drawn
+
+
+def plot_loops(result: Result, path: str | Path | None = None) -> Figure:
+    """Loops of the top force [kN] over the displacement across the bearing [mm], along each horizontal axis that moves.
+
+    Force over axial load stands to the right; the first contact of every rim is marked. Raises InputError for `path`.
+    """
+    axes = moving_axes(result)
+    with page(6.2 * len(axes), 4.8, path) as figure:
+        headline(figure, label_of(result))
+        for axis, place in zip(axes, figure.subplots(1, len(axes), squeeze=False)[0], strict=True):
+            draw_loop(place, result, axis)
+    return figure
+
+
+def plot_orbit(result: Result, path: str | Path | None = None) -> Figure:
+    """Orbits in plan: of the displacement across the bearing [mm], and of the force on the top support [kN].
+
+    Raises InputError for a path that cannot be written.
+    """
+    with page(10.4, 5.2, path) as figure:
+        headline(figure, label_of(result))
+        left, right = figure.subplots(1, 2)
+        draw_orbit(left, result, "Orbit of the displacement")
+        force = result.history.top_force[:, :2]
+        scale = engineering(force, "N")
+        right.plot(*(force * scale.factor).T, color=COLOURS[1])
+        right.plot(*(force[0] * scale.factor), marker="o", markersize=5, color=INK, linestyle="none")
+        right.set(title="Orbit of the force", xlabel=f"F₁ [{scale.unit}]", ylabel=f"F₂ [{scale.unit}]")
+        right.set_aspect("equal", adjustable="datalim")
+        right.margins(0.06)
+        left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, handletextpad=0.1, borderpad=0.0)
+    return figure
+
+
+def moving_axes(result: Result) -> tuple[int, ...]:
+    """Horizontal axes (0 for E1, 1 for E2) along which the bearing moves; E1 where it does not move at all."""
+    peaks = np.abs(result.history.displacement[:, :2]).max(axis=0)
+    return tuple(np.flatnonzero(peaks > SIDE * peaks.max()).tolist()) or (0,)
+
+
+def draw_loop(axes: Axes, result: Result, axis: int) -> None:
+    """Top force against displacement along `axis`; rims met are marked; force over load to the right."""
+    history, name = result.history, subscript(axis + 1)
+    scale = engineering(history.top_force[:, :2], "N")
+    axes.plot(history.displacement[:, axis] * MILLI, history.top_force[:, axis] * scale.factor, color=COLOURS[0])
+    for event in first_contacts(result):
+        label = f"rim {event.surface} first met"
+        axes.plot(event.displacement[axis] * MILLI, event.top_force[axis] * scale.factor, **mark(event), label=label)
+    axes.set(
+        title=f"Force and displacement along E{name}",
+        xlabel=f"displacement across the bearing u{name} [mm]",
+        ylabel=f"force on the top support F{name} [{scale.unit}]",
+    )
+    axes.margins(0.06)
+    if len(moving_axes(result)) == 1 and "transitions" in result.summary:
+        _draw_transitions(axes, result, axis)
+    elif first_contacts(result):
+        axes.legend(loc="upper left", handletextpad=0.1)
+    load = axial_load(result)
+    if load:
+        factor = scale.factor * load
+        ratio = axes.secondary_yaxis("right", functions=(partial(mul, 1 / factor), partial(mul, factor)))
+        ratio.set_ylabel(f"F{name} / N  (N = {load / 1e3:.4g} kN)")
+        ratio.spines["right"].set_visible(True)
+
+
+def draw_orbit(axes: Axes, result: Result, title: str = "Orbit") -> None:
+    """Displacement across the bearing in plan, with its start and the first contact of every rim."""
+    u = result.history.displacement * MILLI
+    axes.plot(u[:, 0], u[:, 1], color=COLOURS[0])
+    for event in first_contacts(result):
+        axes.plot(event.displacement[0] * MILLI, event.displacement[1] * MILLI, **mark(event),
+                  label=f"rim {event.surface} first met")  # fmt: skip
+    axes.plot(*u[0, :2], marker="o", markersize=5, color=INK, linestyle="none", label="start")
+    axes.set(title=title, xlabel="u₁ [mm]", ylabel="u₂ [mm]")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+
+
+def _draw_transitions(axes: Axes, result: Result, axis: int) -> None:
+    """Dotted lines where the stages of a monotonic run change, each with its symbol and value."""
+    history = result.history
+    sign = np.sign(history.displacement[int(history.horizontal.argmax()), axis])
+    for key, value in result.summary["transitions"].items():
+        if not key.startswith("u_") or value is None:
+            continue
+        x = sign * value * MILLI
+        axes.axvline(x, color=FAINT, linewidth=THIN, linestyle=":")
+        # The curve rises: above it there is room on its first half, below it on its second.
+        above = value < history.horizontal.max() / 2
+        axes.annotate(
+            f"{SYMBOLS.get(key, key)} = {value * MILLI:.1f} mm", (x, float(above)),
+            xycoords=("data", "axes fraction"), xytext=(2, -4 if above else 4), textcoords="offset points",
+            va="top" if above else "bottom", rotation=90, fontsize=SMALL, color=INK,
+        )  # fmt: skip

@@ -1,0 +1,140 @@
+"""Pictures of ground motions: what baseline correction did, and response spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from operator import mul
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.errors import InputError
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    LINE,
+    SMALL,
+    THIN,
+    Scale,
+    engineering,
+    headline,
+    page,
+    subscript,
+)  # fmt: skip
+from msfp_gen.history import Array
+from msfp_gen.records.record import G
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.records import Corrected, Record
+
+ROOM = 1.25  # height of a panel over the corrected motion; what the raw one does beyond is written, not drawn
+BLANK = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}  # behind a note
+# Attribute, symbol, unit, and whether it takes a prefix: accelerations are compared in m/s^2.
+ROWS = (("acceleration", "a", "m/s²", False), ("velocity", "v", "m/s", True), ("displacement", "d", "m", True))
+
+
+def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
+    """What baseline correction did: acceleration, velocity and displacement before (grey) and after, per component.
+
+    Before means the raw acceleration, mean and all, integrated from rest over the window that was kept. Panels are
+    scaled to the corrected motion; where the raw one ends is written in, since it may leave them. Raises InputError for
+    `path`.
+    """
+    raw = _integrated(record_before, float(record_after.metadata.get("window_start", 0.0)), len(record_after.time))
+    moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
+    with page(3.7 * len(moving) + 0.6, 6.8, path) as figure:
+        headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and corrected")
+        grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
+        for column, axis in zip(grid.T, moving, strict=True):
+            for axes, (name, symbol, unit, prefixed) in zip(column, ROWS, strict=True):
+                before, after = raw[name][:, axis], getattr(record_after, name)[:, axis]
+                scale = engineering(after, unit) if prefixed else Scale(1.0, unit)
+                _compare(axes, record_after.time, before * scale.factor, after * scale.factor)
+                if prefixed:
+                    _note_end(axes, before, unit)
+                axes.set_ylabel(f"{symbol}{subscript(axis + 1)} [{scale.unit}]")
+            channel = record_before.channels[axis]
+            column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({channel})" if channel else ""))
+            column[-1].set_xlabel("time t [s]")
+    return figure
+
+
+def plot_response_spectrum(
+    periods: ArrayLike,
+    spectra: Mapping[str, ArrayLike],
+    path: str | Path | None = None,
+    *,
+    target: tuple[ArrayLike, ArrayLike] | None = None,
+    damping: float = 0.05,
+    title: str = "Response spectrum",
+) -> Figure:
+    """Pseudo-acceleration [m/s^2], with g to the right, over the period [s] on a logarithmic axis.
+
+    Args:
+        periods: ndarray, shape (k,), [s], above zero.
+        spectra: by label, each ndarray, shape (k,), [m/s^2].
+        path: where to write it: .png, .svg or .pdf.
+        target: periods [s] and accelerations [m/s^2] of a spectrum to hold against them.
+        damping: share of critical, for the label.
+        title: of the figure.
+
+    Raises:
+        InputError: a period that is not above zero, a spectrum of another length, or a path.
+    """
+    x = np.asarray(periods, dtype=float)
+    if x.ndim != 1 or not len(x) or not np.all(x > 0):
+        raise InputError("periods: give at least one, all above zero [s]")
+    curves = {label: np.asarray(values, dtype=float) for label, values in spectra.items()}
+    for label, values in curves.items():
+        if values.shape != x.shape:
+            raise InputError(f"spectra[{label!r}] has shape {values.shape}: give one value a period, {x.shape}")
+    with page(7.6, 4.8, path) as figure:
+        headline(figure, title)
+        axes = figure.subplots()
+        for index, (label, values) in enumerate(curves.items()):
+            axes.plot(x, values, color=COLOURS[index % len(COLOURS)], label=label)
+        if target is not None:
+            axes.plot(*(np.asarray(v, dtype=float) for v in target), color=INK, linestyle=(0, (5, 3)), label="target")
+        axes.set(xscale="log", xlabel="period T [s]", ylabel="pseudo-acceleration Sₐ [m/s²]",
+                 title=f"{100 * damping:.3g} % of critical damping")  # fmt: skip
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(bottom=0)
+        right = axes.secondary_yaxis("right", functions=(partial(mul, 1 / G), partial(mul, G)))
+        right.set_ylabel("Sₐ [g]")
+        right.spines["right"].set_visible(True)
+        axes.legend(loc="upper right")
+    return figure
+
+
+def _integrated(record: Record, start: float, points: int) -> dict[str, Array]:
+    """A window of the raw record and its integrals from rest by the trapezoidal rule, each shape (points, 3)."""
+    first = round(start / record.time_step)
+    acceleration = record.acceleration[first : first + points]
+    velocity = _integral(acceleration, record.time_step)
+    return {"acceleration": acceleration, "velocity": velocity, "displacement": _integral(velocity, record.time_step)}
+
+
+def _integral(values: Array, step: float) -> Array:
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum((values[1:] + values[:-1]) * step / 2, axis=0)])
+
+
+def _compare(axes: Axes, time: Array, raw: Array, values: Array) -> None:
+    axes.plot(time[: len(raw)], raw, color=FAINT, linewidth=LINE)
+    axes.plot(time, values, color=COLOURS[0], linewidth=THIN)
+    height = ROOM * float(np.abs(values).max()) or 1.0
+    axes.set_ylim(-height, height)
+    axes.margins(x=0.01)
+
+
+def _note_end(axes: Axes, raw: Array, unit: str) -> None:
+    """Where the raw velocity or displacement ends: what is not zero there is drift."""
+    end = engineering(raw[-1:], unit)
+    axes.annotate(f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}", (0.98, 0.97), ha="right", va="top",
+                  xycoords="axes fraction", fontsize=SMALL, color=INK, bbox=BLANK)  # fmt: skip

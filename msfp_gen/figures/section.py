@@ -1,0 +1,150 @@
+"""The stack in its true deformed shape, cut by a vertical plane, with the line of the force that passes through it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.figures.style import (
+    BOLD,
+    FAINT,
+    HAIR,
+    INK,
+    LINE,
+    MILLI,
+    SMALL,
+    THIN,
+    colour,
+    headline,
+    label_of,
+    page,
+    subscript,
+)  # fmt: skip
+from msfp_gen.history import Array
+from msfp_gen.resample import at_times
+from msfp_gen.section import Section, sections
+from msfp_gen.shape import friction_circles as circle_radii
+from msfp_gen.stages import rims_touched, sliding_now
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.result import Result
+
+STEEL = ("#AEB6C0", "#DCE1E7")  # plates, and what slides between them
+WIDTH = 7.4  # of a section on the page [inch]
+OVERHANG = 0.12  # length of the force line beyond the stack, over the height of the stack
+WORDS = {(False, False): "sticks", (True, False): "slides", (False, True): "sticks, on its rim",
+         (True, True): "slides, on its rim"}  # fmt: skip
+
+
+def plot_section(
+    result: Result,
+    path: str | Path | None = None,
+    *,
+    time: float | None = None,
+    azimuth: float | None = None,
+    friction_circles: bool = False,
+) -> Figure:
+    """The stack at `time` [s] (None: at its largest displacement), cut along `azimuth` [rad] from E1.
+
+    Without an azimuth the plane runs along the displacement of that instant. Drawn to scale: bodies with their
+    spherical faces, in colour where they slide (thick while they do), contact points, and the line of force; on request
+    the sphere centres with their friction circles, which that line touches wherever a surface slides (docs/model.md).
+    Raises InputError for a time outside the run or a path that cannot be written.
+    """
+    then = at_times(result, peak_time(result) if time is None else time)
+    (section,) = sections(then, azimuth)
+    tall = 7.6 if friction_circles else 1.9 + WIDTH * _aspect(section)
+    with page(5.6 if friction_circles else WIDTH + 1.2, tall, path) as figure:
+        headline(figure, label_of(result))
+        axes = figure.subplots()
+        draw_section(axes, then, section)
+        if friction_circles:
+            draw_circles(axes, section, circle_radii(result.scene.bearing))
+        figure.legend(loc="outside lower center", ncols=2 if friction_circles else 3)
+    return figure
+
+
+def peak_time(result: Result) -> float:
+    """Time of the largest horizontal displacement [s]."""
+    return float(result.history.time[int(result.history.horizontal.argmax())])
+
+
+def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> None:
+    """Bodies, sliding faces, contact points and line of force of one row of `then`, [mm]."""
+    history, last = then.history, len(section.bodies) - 1
+    for body, polygon in enumerate(section.bodies):
+        axes.fill(*(polygon * MILLI).T, facecolor=STEEL[0 < body < last], edgecolor=INK, linewidth=HAIR)
+    slides, pushes = sliding_now(history)[row], rims_touched(history)[row]
+    for index in reversed(range(history.surfaces)):
+        state = bool(slides[index]), bool(pushes[index])
+        axes.plot(*(section.faces[index] * MILLI).T, color=colour(index + 1), linewidth=BOLD if state[0] else LINE,
+                  label=f"surface {index + 1} {WORDS[state]}", solid_capstyle="butt", zorder=3)  # fmt: skip
+    draw_force_line(axes, section)
+    for index, point in enumerate(section.contacts * MILLI):
+        axes.plot(*point, marker="o", markersize=5, color="white", markeredgecolor=colour(index + 1),
+                  markeredgewidth=LINE, linestyle="none", zorder=5)  # fmt: skip
+    u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
+    axes.set(
+        title=f"t = {history.time[row]:.3f} s, u = {u * MILLI:.1f} mm",
+        xlabel=f"{_direction(section.azimuth)}, from the middle of the base [mm]", ylabel="height [mm]",
+    )  # fmt: skip
+    axes.set_aspect("equal", adjustable="box")
+    axes.grid(visible=False)
+
+
+def draw_force_line(axes: Axes, section: Section) -> None:
+    """The line of force: each surface draws it between its neighbours, and it runs on beyond base and top."""
+    heights = np.concatenate([polygon[:, 1] for polygon in section.bodies])
+    low, high = float(heights.min()), float(heights.max())
+    beyond = OVERHANG * (high - low)
+    levels = section.contacts[:, 1]
+    edges = np.concatenate([[low - beyond], (levels[1:] + levels[:-1]) / 2, [high + beyond]])
+    ends = []
+    for (x, z), (along, up), below, above in zip(section.points, section.forces, edges, edges[1:], strict=False):
+        if up > 0:
+            ends += [(x + (level - z) * along / up, level) for level in (below, above)]
+    if ends:
+        axes.plot(*(np.array(ends) * MILLI).T, color=INK, linewidth=LINE, linestyle=(0, (6, 2)), zorder=4,
+                  label="line of force")  # fmt: skip
+
+
+def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
+    """Sphere centres with their friction circles, and the line of force on its way to them."""
+    from matplotlib.patches import Circle
+
+    for index, (centre, radius) in enumerate(zip(section.centres, radii, strict=True)):
+        (x, z), (along, up) = section.points[index], section.forces[index]
+        axes.add_patch(Circle(tuple(centre * MILLI), radius * MILLI, fill=False, edgecolor=colour(index + 1),
+                              linewidth=LINE))  # fmt: skip
+        axes.plot(*(centre * MILLI), marker="+", color=colour(index + 1), markersize=6, linestyle="none")
+        if up > 0:
+            ends = np.array([(x + (level - z) * along / up, level) for level in (0.0, 1.15 * (centre[1] or z))])
+            axes.plot(*(ends * MILLI).T, color=FAINT, linewidth=THIN, linestyle=(0, (6, 2)), zorder=1)
+        axes.annotate(f"c{subscript(index + 1)}", np.add(centre, (radius, 0.0)) * MILLI, xytext=(6, 0), va="center",
+                      textcoords="offset points", fontsize=SMALL, color=colour(index + 1))  # fmt: skip
+
+
+def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Horizontal and vertical limits [mm] that hold the stack, and its line of force, in all of these sections."""
+    points = np.concatenate([polygon for section in found for polygon in section.bodies]) * MILLI
+    (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
+    room = OVERHANG * (high - low)
+    return (left - room, right + room), (low - 1.2 * room, high + 1.2 * room)
+
+
+def _aspect(section: Section) -> float:
+    """Height over width of what a section shows."""
+    (left, right), (low, high) = limits([section])
+    return (high - low) / (right - left)
+
+
+def _direction(azimuth: float) -> str:
+    """What a horizontal axis along `azimuth` is called."""
+    named = {0.0: "along E₁", 90.0: "along E₂"}
+    degrees = round(float(np.degrees(azimuth)), 1)
+    return named.get(degrees, f"along {degrees:g}° from E₁")

@@ -1,0 +1,139 @@
+"""One style for every picture: colours, line widths, units, the page; and the file, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.history import Event
+from msfp_gen.output import FIGURE_SUFFIXES, check_output, replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.result import Result
+
+# Okabe and Ito's colours: told apart in print and by colour-blind readers.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+INK, FAINT, PALE = "#222222", "#999999", "#E4E4E4"
+LINE, THIN, HAIR, BOLD = 1.3, 0.9, 0.7, 2.6  # widths [pt]: curves, references, grids, what the eye shall find first
+SMALL = 8.0  # size of notes in a picture [pt]
+STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelcolor": INK,
+    "axes.edgecolor": FAINT,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": PALE,
+    "grid.linewidth": HAIR,
+    "lines.linewidth": LINE,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 130,
+    "savefig.dpi": 160,
+    "svg.hashsalt": "msfp-gen",  # the same run gives the same file
+}
+MILLI = 1e3  # lengths are drawn in mm, as on every drawing of a bearing
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+class Scale(NamedTuple):
+    """`factor` turns SI values into numbers of `unit`, such as 1e-3 and "kN"."""
+
+    factor: float
+    unit: str
+
+
+def engineering(values: ArrayLike, unit: str) -> Scale:
+    """The prefix of `unit` that brings the largest of `values` (SI) between 1 and 1000."""
+    peak = float(np.nanmax(np.abs(values), initial=0.0))
+    if not peak:
+        return Scale(1.0, unit)
+    size, prefix = next(((size, prefix) for size, prefix in PREFIXES if peak >= size), PREFIXES[-1])
+    return Scale(1 / size, prefix + unit)
+
+
+@contextmanager
+def page(width: float, height: float, path: str | Path | None = None, name: str = "plot") -> Iterator[Figure]:
+    """A figure in the project's style, [inch]; written to `path`, if given, when the block ends without error.
+
+    Raises InputError, which begins with `name`, for a path that cannot be written; before anything is drawn.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    target = None if path is None else check_output(path, FIGURE_SUFFIXES, name)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure
+        if target is not None:
+            with replacing(target) as temporary:
+                figure.savefig(temporary, metadata={"Date": None} if target.suffix.lower() == ".svg" else None)
+
+
+def headline(figure: Figure, text: str) -> None:
+    """The title of a whole figure."""
+    figure.suptitle(text, fontsize=12, fontweight="bold", color=INK, x=0.01, ha="left")
+
+
+def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
+    """One row of axes with titles."""
+    row: list[Axes] = list(figure.subplots(1, len(titles), squeeze=False, **options)[0])
+    for axes, title in zip(row, titles, strict=True):
+        axes.set_title(title)
+    return row
+
+
+def strips(figure: Any, count: int, **options: Any) -> list[Axes]:
+    """Axes under each other on one time axis, the last with its label."""
+    column: list[Axes] = list(figure.subplots(count, 1, sharex=True, squeeze=False, **options)[:, 0])
+    column[-1].set_xlabel("time t [s]")
+    column[-1].margins(x=0.01)
+    return column
+
+
+def subscript(number: int) -> str:
+    """`number` in small figures below the line."""
+    return str(number).translate(SUBSCRIPTS)
+
+
+def colour(surface: int) -> str:
+    """The colour of a surface (1..n-1) in every picture."""
+    return COLOURS[(surface - 1) % len(COLOURS)]
+
+
+def label_of(result: Result) -> str:
+    """The name of a run for a headline; of one that failed, how far it came."""
+    name = result.scene.name or "unnamed scene"
+    if result.succeeded:
+        return name
+    return f"{name}, run failed ({result.status}) at t = {result.history.time[-1]:.4g} s"
+
+
+def contacts(result: Result) -> list[Event]:
+    """Every meeting of a slider with its rim."""
+    return [event for event in result.events if event.kind == "rim_contact"]
+
+
+def first_contacts(result: Result) -> list[Event]:
+    """The first contact of every rim that was met; a rim met every cycle would bury the loop in marks."""
+    return list({event.surface: event for event in reversed(contacts(result))}.values())[::-1]
+
+
+def mark(event: Event) -> dict[str, Any]:
+    """How a rim met is drawn."""
+    return {"marker": "v", "markersize": 5.5, "linestyle": "none", "zorder": 4, "markeredgecolor": "white",
+            "markeredgewidth": 0.6, "color": colour(event.surface)}  # fmt: skip

@@ -1,0 +1,93 @@
+"""PEER .AT2, .VT2 and .DT2: one component of acceleration, velocity or displacement a file."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+from msfp_gen.errors import InputError
+from msfp_gen.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, assembled, si_factor
+from msfp_gen.records.record import Record, stem
+from msfp_gen.records.text import Lines, column, read_lines
+
+FORM = "PEER AT2, VT2, DT2"
+_HEADER_LINES = 10
+_NUMBER = r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
+# The line of counts "has changed multiple times": NPTS= 4000, DT= .0100 SEC and 4000 .0100 NPTS, DT are both common.
+_COUNTS = (
+    re.compile(rf"NPTS\s*[=:]?\s*(\d{{1,9}})(?!\d)\s*,?\s*DT\s*[=:]?\s*{_NUMBER}(?![\w.])", re.I),
+    re.compile(rf"^\s*(\d{{1,9}})(?!\d)\s*,?\s+{_NUMBER}\s*,?\s*NPTS\s*,\s*DT", re.I),
+)
+# "ACCELERATION TIME HISTORY IN UNITS OF G"; of the variant with seven header lines "ACCELERATION TIME HISTORY (G'S)".
+_QUANTITY = re.compile(r"\b(ACCELERATION|VELOCITY|DISPLACEMENT)\b.*?(?:UNITS?\s+OF\s+([^\s,]+)|\(([^)]+)\))", re.I)
+_STUCK = re.compile(r"(?<=[\d.])(?=[+-])")  # between the numbers of 1.2-3.4, not inside 1.2E-3
+_AZIMUTH = re.compile(r"(\d{1,3})(?!\d)")
+_LETTERS = {"N": 0, "E": 90, "S": 180, "W": 270}
+# Words for the vertical, at the end of a title or of a file's name; channel codes of networks end in Z.
+_VERTICAL = re.compile(r"(?:^|[-_. ])(?:(UP|VER|VERT|VERTICAL|V|Z|[BH][HNL]Z\d*)|(DWN|DN|DOWN))$", re.I)
+
+
+def understands(lines: Lines) -> bool:
+    """Whether one of the first lines gives NPTS."""
+    return any("NPTS" in line.upper() for line in lines.lines[:_HEADER_LINES])
+
+
+def read_peer(
+    h1: str | PathLike[str], h2: str | PathLike[str] | None = None, up: str | PathLike[str] | None = None
+) -> Record:
+    """A record from up to three PEER files, for E1, E2 and E3 as given; a missing component is zero and noted.
+
+    `read_record(h1, h2, up)` finds the order from the azimuths in the files instead. Raises InputError naming file,
+    line and reason; also if the files' time steps differ.
+    """
+    flat = [replace(read(read_lines(Path(p)))[0], direction=d) for p, d in ((h1, 90), (h2, 0)) if p is not None]
+    vertical = [] if up is None else [_upright(read(read_lines(Path(up)))[0])]
+    quantities = {c.quantity for c in (*flat, *vertical)}
+    if len(quantities) > 1:
+        raise InputError(f"{flat[0].path.name}: {' and '.join(sorted(quantities))}; give files of one quantity")
+    return assembled([*flat, *vertical], FORM)
+
+
+def _upright(channel: Channel) -> Channel:
+    return channel if channel.direction == DOWN else replace(channel, direction=UP)
+
+
+def read(lines: Lines) -> list[Channel]:
+    """The one channel of a file."""
+    head = next((i for i in range(min(_HEADER_LINES, len(lines))) if "NPTS" in lines[i].upper()), None)
+    if head is None:
+        lines.fail(0, f"no NPTS and DT in the first {_HEADER_LINES} lines; not a PEER file")
+    counts = next((m for pattern in _COUNTS if (m := pattern.search(lines[head]))), None)
+    if counts is None:
+        lines.fail(head, f"{lines[head].strip()[:40]!r} does not give NPTS and DT")
+    where = next((i for i in range(head) if _QUANTITY.search(lines[i])), None)
+    found = _QUANTITY.search(lines[where]) if where is not None else None
+    if where is None or found is None:
+        lines.fail(head, "no line before this one says ACCELERATION (VELOCITY, DISPLACEMENT) ... IN UNITS OF ...")
+    quantity = next(q for q in QUANTITIES if q == found[1].lower())
+    unit = (found[2] or found[3]).strip()
+    factor = si_factor(lines, where, unit, quantity)
+    points, step = int(counts[1]), lines.positive(head, "DT", counts[2])
+    values: list[float] = []
+    for index in range(head + 1, len(lines)):
+        values += lines.numbers(index, _STUCK.sub(" ", lines[index]).split())
+    if len(values) != points:
+        lines.fail(head, f"NPTS promises {points} values, the file holds {len(values)}; fetch it again")
+    title = lines[where - 1].strip() if where else ""
+    direction, station = _direction(title, stem(lines.path))
+    si, label = column(values) * factor, title or lines.path.name
+    return [Channel(lines.path, where, quantity, direction, step, si, label, unit, station=station)]
+
+
+def _direction(title: str, name: str) -> tuple[int | str, str]:
+    """Direction and station from a title such as "..., EL CENTRO ARRAY #9, 180", or direction from the file's name."""
+    station, comma, last = (part.strip() for part in title.rpartition(","))
+    for text, found_station in ((last if comma else "", station), (name, "")):
+        if found := _VERTICAL.search(text):
+            return (DOWN if found[2] else UP), found_station
+    if comma and last.upper() in _LETTERS:
+        return _LETTERS[last.upper()], station
+    found = _AZIMUTH.match(last) if comma else None
+    return (int(found[1]) % 360, station) if found and int(found[1]) <= 360 else (UNKNOWN, "")

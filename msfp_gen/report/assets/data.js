@@ -1,0 +1,43 @@
+// The data of the run. Arrays come as base64 of little-endian float32; at(name, frame, ...indices) reads one number or row.
+"use strict";
+
+const report = JSON.parse(document.getElementById("report-data").textContent);
+
+function unpack({ shape, data }) {
+  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+  return { shape, values: new Float32Array(bytes.buffer) };
+}
+
+const frames = Object.fromEntries(Object.entries(report.frames).map(([name, packed]) => [name, unpack(packed)]));
+const frameCount = frames.time.shape[0];
+
+// at("centre", 7, 2) is the vector of surface 3 in frame 7; at("sliding", 7, 2) a number.
+function at(name, ...indices) {
+  const { shape, values } = frames[name];
+  let offset = 0;
+  let size = values.length;
+  indices.forEach((index, depth) => {
+    size /= shape[depth];
+    offset += index * size;
+  });
+  return size === 1 ? values[offset] : values.subarray(offset, offset + size);
+}
+
+const column = (read) => Array.from({ length: frameCount }, (_, frame) => read(frame));
+const surfaceNumbers = report.surfaces.map((_, index) => index);
+const horizontal = [Math.cos(report.azimuth), Math.sin(report.azimuth)];
+const radial = ([x, y]) => Math.hypot(x, y);
+
+function fixed(value, digits) {
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+}
+
+function element(parent, name, attributes = {}, text = "") {
+  const svg = parent.namespaceURI === "http://www.w3.org/2000/svg" || name === "svg";
+  const made = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  if (text) made.textContent = text;
+  parent.append(made);
+  return made;
+}

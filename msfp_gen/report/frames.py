@@ -1,0 +1,149 @@
+"""What the interactive view shows: some rows of a run, thinned with care, as arrays that a browser reads at once."""
+
+from __future__ import annotations
+
+import base64
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.characterise.surfaces import friction_coefficient
+from msfp_gen.figures import COLOURS
+from msfp_gen.history import Array, History
+from msfp_gen.outline import POINTS, outline
+from msfp_gen.resample import at_times
+from msfp_gen.shape import Poses, poses
+from msfp_gen.stages import sliding_now
+
+if TYPE_CHECKING:
+    from msfp_gen.bearing import Bearing
+    from msfp_gen.result import Result
+
+FRAMES = 1500  # 0.5 kB each for a triple pendulum, and more than a screen has columns
+FEWEST = 600  # a bearing that moves in jumps is hard to follow
+ARC = 20  # points on a face that is turned about its axis
+STATES = ("sticks", "slides", "at its rim", "apart")
+Rows = NDArray[np.intp]
+
+
+def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
+    """Everything that the scripts of the page draw, JSON-able: lengths [m], forces [N], angles [rad], in E1, E2, E3.
+
+    Bodies are turned about their axis; positions are those of `shape.Poses`, which hold the base still.
+    """
+    shown = at_times(result, instants(result, count))
+    history, bearing, where = shown.history, shown.scene.bearing, poses(shown)
+    frames = {
+        "time": history.time,
+        "bottom": where.bottom,
+        "turn": quaternions(where),
+        "centre": where.centre,
+        "contact": where.contact,
+        "line": where.line,
+        "force": where.force,
+        "base": history.base_displacement,
+        "displacement": history.displacement,
+        "top_force": history.top_force,
+        "sliding": history.sliding,
+        "normal": history.normal_force,
+        "mobilised": np.linalg.norm(history.friction_state, axis=-1),
+        "state": states(history),
+        "circle": circles(shown),
+    }
+    return {
+        "azimuth": main_direction(history.displacement[:, :2]),
+        "states": STATES,
+        "surfaces": _surfaces(bearing, frames["circle"]),
+        "bodies": [pieces(bearing, body) for body in range(bearing.layout.n)],
+        "events": [
+            {"time": event.time, "surface": event.surface, "kind": event.kind.replace("_", " ")}
+            for event in result.events
+        ],
+        "frames": {name: packed(values) for name, values in frames.items()},
+    }
+
+
+def instants(result: Result, count: int = FRAMES) -> Array:
+    """Times to show, rising, ndarray, shape (K,), [s]: rows of the run, and some between them where they are few."""
+    time = result.history.time[chosen(result, count)]
+    return np.union1d(time, np.linspace(time[0], time[-1], FEWEST)) if len(time) < FEWEST else time
+
+
+def chosen(result: Result, count: int = FRAMES) -> Rows:
+    """Rows to show, rising: evenly in time, with the ends, every peak of the summary and every rim first met."""
+    history = result.history
+    time = history.time
+    if len(time) <= count:
+        return np.arange(len(time))
+    wanted = np.linspace(time[0], time[-1], count)
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    nearest = np.where(wanted - time[after - 1] < time[after] - wanted, after - 1, after)
+    forces = np.abs(history.top_force)
+    radial = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    peaks = [np.abs(history.displacement).argmax(axis=0), history.horizontal.argmax(), forces.argmax(axis=0),
+             radial.argmax(), history.sliding.argmax(axis=0)]  # fmt: skip
+    first = {(event.surface, event.kind): event.time for event in reversed(result.events)}
+    events = np.searchsorted(time, list(first.values())).clip(max=len(time) - 1)
+    return np.unique(np.concatenate([nearest, *map(np.atleast_1d, peaks), events]).astype(np.intp))
+
+
+def main_direction(path: Array) -> float:
+    """Azimuth of the direction along which a horizontal path, shape (T, 2), is longest [rad], in (-pi/2, pi/2]."""
+    (xx, xy), (_, yy) = np.cov((path - path[0]).T, ddof=0) if len(path) > 1 else np.zeros((2, 2))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    return 0.0 if abs(angle) < 1e-6 else float(angle)
+
+
+def quaternions(where: Poses) -> Array:
+    """Turn of every body, ndarray, shape (T, n, 4): x, y, z, w; the spin is about the body's own axis (2.27)."""
+    from scipy.spatial.transform import Rotation
+
+    axes = np.swapaxes(where.basis, -1, -2).reshape(-1, 3, 3)  # t_1, t_2, t_3 as columns
+    turns = Rotation.from_matrix(axes) * Rotation.from_euler("z", where.spin.reshape(-1, 1))
+    return np.asarray(turns.as_quat()).reshape(*where.spin.shape, 4)
+
+
+def states(history: History) -> Array:
+    """Index into `STATES` of every surface, ndarray, shape (T, n-1)."""
+    found = np.where(sliding_now(history), 1.0, 0.0)
+    found[history.gap <= 0] = 2.0
+    found[history.normal_force <= 0] = 3.0
+    return found
+
+
+def pieces(bearing: Bearing, body: int) -> list[dict[str, Any]]:
+    """The outline of a body (index from 0) from crease to crease; the faces that slide name their surface."""
+    points, last = outline(bearing, body), bearing.layout.surfaces
+    ends = [POINTS if 0 <= surface < last else 1 for surface in (body - 1, body)]
+    arc = np.linspace(0, POINTS - 1, ARC).round().astype(int)
+    side = points[ends[0] - 1 : len(points) - ends[1] + 1]
+    parts = [(0, np.array(pair)) for pair in pairwise(side)]
+    if ends[0] > 1:
+        parts.insert(0, (body, points[arc]))
+    if ends[1] > 1:
+        parts.append((body + 1, points[len(points) - POINTS + arc]))
+    return [
+        {"surface": surface, "points": line.round(7).tolist()} for surface, line in parts if np.ptp(line, axis=0).any()
+    ]
+
+
+def packed(values: Array) -> dict[str, Any]:
+    """An array as little-endian float32 in base64, with its shape."""
+    data = base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+    return {"shape": list(values.shape), "data": data}
+
+
+def circles(result: Result) -> Array:
+    """Radius mu R / sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (T, n-1), [m]."""
+    friction = friction_coefficient(result)
+    return friction * result.scene.bearing.arrays()["radius"] / np.hypot(1.0, friction)
+
+
+def _surfaces(bearing: Bearing, radii: Array) -> list[dict[str, Any]]:
+    """circle: the largest radius of the friction circle."""
+    return [
+        {"capacity": surface.capacity, "circle": float(circle), "colour": COLOURS[index % len(COLOURS)]}
+        for index, (surface, circle) in enumerate(zip(bearing.surfaces, radii.max(axis=0), strict=True))
+    ]

@@ -1,0 +1,86 @@
+/* seat.c: the one-sided seat of a slider, where bodies may part (docs/uplift.md). */
+#include <math.h>
+#include <string.h>
+#include "stack.h"
+
+#if MSFP_UPLIFT
+static const int signs[NB] = MSFP_SIGNS;
+
+/* The body that carries the footprint of surface j. */
+static int slider_of(int j) { return signs[j] > 0 ? j + 1 : j; }
+
+/* Compression along the slider's axis and across it. */
+static void compression(const msfp_work *w, int j, double *along, double *across)
+{
+    double d[3], axis[3], square = 0.0;
+    msfp_coordinates_d_get(w->x[j + 1], d);
+    msfp_body_t3_get(w->body[slider_of(j)], axis);
+    *along = -(d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]);
+    for (int i = 0; i < 3; ++i)
+        square += (d[i] + *along * axis[i]) * (d[i] + *along * axis[i]);
+    *across = sqrt(square);
+}
+
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    compression(w, j, &along, &across);
+    if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA])
+        return sqrt(along * along + across * across);
+    return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
+}
+
+/* Force of the seat of surface j, into force[j]; zero where it is open or its damping would pull. */
+void msfp_seat(const msfp_parameters *p, msfp_work *w, int j, int tangent)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    const int k = slider_of(j);
+    double *seat = w->seat[j], *dseat = w->dseat[j];
+    compression(w, j, &along, &across);
+    if (msfp_compression(p, w, j) > 0.0) {
+        if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA]) {
+            if (tangent)
+                msfp_seat_inside_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+            else
+                msfp_seat_inside(par, w->body[k], w->x[j + 1], seat);
+        } else if (tangent)
+            msfp_seat_edge_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+        else
+            msfp_seat_edge(par, w->body[k], w->x[j + 1], seat);
+    } else
+        seat[MSFP_SEAT_GRIP] = seat[MSFP_SEAT_STORED] = seat[MSFP_SEAT_POWER] = 0.0;
+    if (seat[MSFP_SEAT_GRIP] <= 0.0) {
+        memset(seat, 0, (VECTOR + MOMENT) * sizeof *seat);
+        if (tangent)
+            memset(dseat, 0, sizeof w->dseat[j]);
+    }
+    memcpy(w->force[j], seat, sizeof w->force[j]);
+    if (tangent)
+        memcpy(w->dforce[j], dseat, sizeof w->dforce[j]);
+}
+
+/* The wrench of a surface is (F, M) about the centre of its concave side; on its slider's side the seat adds its moment. */
+void msfp_split_moment(msfp_work *w, int j, int tangent)
+{
+    const double *turning = w->seat[j] + VECTOR, *dturning = w->dseat[j] + VECTOR * DOF;
+    const int above = signs[j] > 0;
+    memcpy(w->below[j], w->moment[j], sizeof w->below[j]);
+    double *on = above ? w->moment[j] : w->below[j], *don = above ? w->dmoment[j] : w->dbelow[j];
+    if (tangent)
+        memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
+    for (int i = 0; i < MOMENT; ++i) /* moment_below is what the body below receives, reversed */
+        on[i] += above ? turning[i] : -turning[i];
+    for (int i = 0; i < MOMENT * DOF && tangent; ++i)
+        don[i] += above ? dturning[i] : -dturning[i];
+}
+#else
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    (void)p;
+    (void)w;
+    (void)j;
+    return 1.0;
+}
+#endif

@@ -1,0 +1,85 @@
+"""Help: every command has an example that is itself a command, shells complete, long runs say how long they take."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+import typer.main
+
+from msfp_gen import load_scene
+from msfp_gen.cli import app, main
+from msfp_gen.cli.console import Progress, scenes
+
+ROOT = typer.main.get_command(app)
+COMMANDS = sorted(ROOT.commands)
+
+
+def examples(name):
+    epilog = ROOT.commands[name].epilog or ""
+    return [line.partition("#")[0].strip() for line in epilog.splitlines() if line.strip().startswith("msfp-gen ")]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_with_examples(name, capsys):
+    assert main([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"Usage: msfp-gen {name}" in out and "Example" in out
+    assert ROOT.commands[name].help and examples(name)
+    assert any(f"msfp-gen {name}" in example for example in examples(name))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_examples_are_understood(name):
+    """Names and options of every example exist: parsing stops short of running."""
+    for example in examples(name):
+        words = shlex.split(re.split(r" [|>]", example)[0])[2:]
+        ROOT.commands[name].make_context(name, words)
+
+
+def completed(words, count, shell="bash"):
+    variables = {"_MSFP_GEN_COMPLETE": f"complete_{shell}", "COMP_WORDS": words, "COMP_CWORD": str(count)}
+    run = subprocess.run(
+        [sys.executable, "-m", "msfp_gen"], env={**os.environ, **variables}, capture_output=True, text=True, check=False
+    )
+    assert run.stderr == ""
+    return run.stdout.split()
+
+
+def test_a_shell_completes_commands_and_scenes():
+    assert "explain" in completed("msfp-gen exp", 1)
+    assert completed("msfp-gen run fenz-test", 2) == [f"fenz-test{number}" for number in range(1, 6)]
+    assert "--rtol" in completed("msfp-gen run --rt", 2)
+
+
+def test_completion_can_be_shown(capsys):
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert "--install-completion" in out and "--show-completion" in out
+
+
+def test_scene_files_and_folders_are_offered(tmp_path, monkeypatch):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "a.toml").write_text("", encoding="utf-8")
+    (tmp_path / "mine" / "a.txt").write_text("", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert scenes("mi") == [("mine/", "folder")]
+    assert scenes("mine/") == [("mine/a.toml", "scene file")]
+    assert scenes(f"{tmp_path}/mine/a") == [(f"{tmp_path}/mine/a.toml", "scene file")]
+    assert [name for name, _ in scenes("quint")] == ["quintuple-push"]
+    assert load_scene(scenes("quint")[0][0]).name == "quintuple-push"
+
+
+def test_progress_says_how_long_it_still_takes(capsys, monkeypatch):
+    clock = iter([0.0, 0.5, 4.0])
+    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: next(clock))
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with Progress("long") as update:
+        update(1.0, 10.0)
+        update(2.5, 10.0)
+    err = capsys.readouterr().err
+    assert "long: 10 %\r" in err and "long: 25 %, 12 s left" in err

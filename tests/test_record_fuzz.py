@@ -1,0 +1,188 @@
+"""Damaged records: whatever is done to a file of any known format, it is a record of finite numbers or one clear line.
+
+The readers come from the registry of `msfp_gen.records`: a format that is added there needs a sample here.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import record_writers as w
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from msfp_gen import records
+from msfp_gen.errors import InputError
+from msfp_gen.records import table, text
+from msfp_gen.records.record import Record
+
+T = np.arange(40) * 0.01
+WAVES = [np.sin(9 * T) * np.exp(-T), 0.7 * np.cos(7 * T), 0.2 * np.sin(21 * T)]
+LABELS = ("90 Deg", "360 Deg", "Up")
+SERIES = dict.fromkeys(("acceleration", "velocity", "displacement"), 0.1 * WAVES[0])
+CSV = "# made\ntime [s], a1 [g], a2 [m/s^2], a3 [cm/s^2]\n" + "".join(f"{t:.2f}, {t * t}, {t}, {9 * t}\n" for t in T)
+SAMPLES: dict[str, tuple[str, ...]] = {
+    "CSMIP V1, V2": (
+        w.csmip_v1(list(zip(LABELS, WAVES, strict=True))),
+        w.csmip_v2([(label, SERIES) for label in LABELS]),
+    ),
+    "COSMOS V1, V2": ("".join(w.cosmos("acceleration", *each, 0.05) for each in zip(LABELS, WAVES, strict=True)),),
+    "K-NET": (w.knet("E-W", WAVES[0]),),
+    "PEER AT2, VT2, DT2": tuple(w.peer(WAVES[0], quantity=q) for q in SERIES),
+    "CSV": (CSV, "time [s],u1 [mm]\n0,1\n1,2\n2,3\n3,1\n"),
+}
+ALL = [(form, number) for form, samples in SAMPLES.items() for number in range(len(samples))]
+HOSTILE = [
+    "nan", "inf", "-inf", "1e999", "-1e999", "1e-400", "0", "-1", "99999999", "999999999999999999999", "1e308", "0x10",
+    "1_000", "\u0661\u0662", "\x00", "\x1b[2J", "\ufeff", "%s%n", "../../etc/passwd", "__import__('os')", "=cmd()", ",",
+    "1,5", "(0f0.0)", "(999f999.9)", "9" * 400, "-", "+", ".", "e", "1e", "", " ", "\t", "\r", "\u2028", "\x0c", "\x1a",
+]  # fmt: skip
+
+
+def cut(content: bytes, dice: random.Random) -> bytes:
+    return content[: dice.randrange(len(content))]
+
+
+def flip(content: bytes, dice: random.Random) -> bytes:
+    at = dice.randrange(len(content))
+    return content[:at] + bytes([content[at] ^ (1 << dice.randrange(8))]) + content[at + 1 :]
+
+
+def remove(content: bytes, dice: random.Random) -> bytes:
+    at = dice.randrange(len(content))
+    return content[:at] + content[at + dice.randrange(1, 40) :]
+
+
+def insert(content: bytes, dice: random.Random) -> bytes:
+    at = dice.randrange(len(content))
+    return content[:at] + dice.choice(HOSTILE).encode() + content[at:]
+
+
+def replace_number(content: bytes, dice: random.Random) -> bytes:
+    """A whole word of the file, most often a number of its header, becomes something that is none."""
+    lines = content.split(b"\n")
+    top = min(len(lines), 60) if dice.random() < 0.7 else len(lines)
+    where = dice.randrange(top)
+    parts = lines[where].split(b" ")
+    parts[dice.randrange(len(parts))] = dice.choice(HOSTILE).encode()
+    lines[where] = b" ".join(parts)
+    return b"\n".join(lines)
+
+
+def shuffle_lines(content: bytes, dice: random.Random) -> bytes:
+    lines = content.split(b"\n")
+    one, two = dice.randrange(len(lines)), dice.randrange(len(lines))
+    change: Callable[[], object] = dice.choice([
+        lambda: lines.pop(one), lambda: lines.insert(two, lines[one]),
+        lambda: lines.__setitem__(slice(None), lines[one:] + lines[:one]), lambda: lines.extend(lines[one:]),
+    ])  # fmt: skip
+    change()
+    return b"\n".join(lines)
+
+
+def digits(content: bytes, dice: random.Random) -> bytes:
+    """Every appearance of one digit becomes another: counts, steps and data all lie at once."""
+    old, new = (str(dice.randrange(10)).encode() for _ in range(2))
+    return content.replace(old, new, dice.randrange(1, 50))
+
+
+def zipped(content: bytes, dice: random.Random) -> bytes:
+    return dice.choice([cut, flip, lambda c, _: c])(gzip.compress(content, mtime=0), dice)
+
+
+MUTATIONS = [cut, flip, remove, insert, replace_number, replace_number, shuffle_lines, digits, zipped]
+
+
+def outcome(path: Path, content: bytes) -> Record | str:
+    """The record, checked, or the line; anything else fails the test."""
+    path.write_bytes(content)
+    begin = time.perf_counter()
+    try:
+        record = records.read_record(path)
+    except InputError as error:
+        message = str(error)
+        assert message and message.isprintable() and len(message) <= 500, message
+        assert path.name in message or message.startswith(("acceleration", "time_step")), message
+        return message
+    finally:
+        assert time.perf_counter() - begin < 5.0
+    assert np.isfinite(record.acceleration).all() and record.acceleration.shape[1:] == (3,)
+    assert 0 < record.time_step < np.inf and len(record.acceleration) >= 4
+    return record
+
+
+def test_every_reader_has_a_sample_that_is_fine(tmp_path: Path) -> None:
+    assert {form.name for form in records._FORMS} | {"CSV"} == set(SAMPLES)
+    for form, samples in SAMPLES.items():
+        path = tmp_path / "record.txt"
+        assert isinstance(outcome(path, samples[0].encode()), Record), (form, outcome(path, samples[0].encode()))
+        for sample in samples:
+            path.write_text(sample)
+            lines = text.read_lines(path)
+            owners = [each.name for each in records._FORMS if each.understands(lines)]
+            assert owners + ["CSV"] * table.understands(lines) == [form], "one reader knows it, the others do not"
+
+
+@pytest.mark.parametrize(("form", "number"), ALL)
+def test_mutations(form: str, number: int, tmp_path: Path) -> None:
+    """Seeded, so that a failure comes again: one to three changes to a good file, many times."""
+    sample, path = SAMPLES[form][number].encode(), tmp_path / "record.txt"
+    dice = random.Random(f"{form} {number}")
+    refused = 0
+    for _ in range(250):
+        content = sample
+        for _ in range(dice.randrange(1, 4)):
+            content = dice.choice(MUTATIONS)(content, dice) or b"\n"
+        refused += isinstance(outcome(path, content), str)
+    assert refused > 60, "most damage is seen"
+
+
+@pytest.mark.parametrize(("form", "number"), ALL)
+def test_every_word_of_a_header_in_turn(form: str, number: int, tmp_path: Path) -> None:
+    """Counts, steps, units, formats: each word of the header replaced by what it cannot be."""
+    path = tmp_path / "record.txt"
+    lines = SAMPLES[form][number].split("\n")
+    for where in range(min(len(lines), 20)):
+        for word in dict.fromkeys(lines[where].replace("=", " ").replace(",", " ").split()):
+            for hostile in ("nan", "-1", "0", "99999999999", "1e999", ""):
+                changed = lines[where].replace(word, hostile, 1)
+                outcome(path, "\n".join([*lines[:where], changed, *lines[where + 1 :]]).encode())
+
+
+@given(content=st.binary(max_size=300), form=st.sampled_from(ALL), keep=st.integers(0, 25))
+@settings(max_examples=200, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
+def test_anything_after_a_good_beginning(content: bytes, form: tuple[str, int], keep: int, tmp_path: Path) -> None:
+    head = "\n".join(SAMPLES[form[0]][form[1]].split("\n")[:keep]).encode()
+    outcome(tmp_path / "record.txt", head + content)
+
+
+# --- files that are no files
+
+
+def test_a_bomb_of_gzip_is_refused_before_it_fills_the_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text, "_MOST", 1 << 20)
+    path = tmp_path / "bomb.gz"
+    path.write_bytes(gzip.compress(b"0" * (8 << 20)))
+    with pytest.raises(InputError, match=r"bomb\.gz: more than 1 MiB of text"):
+        records.read_record(path)
+    path.write_bytes(b"0" * (2 << 20))
+    with pytest.raises(InputError, match="more than 1 MiB of text"):
+        records.read_record(path)
+
+
+def test_pipes_devices_and_folders_are_not_opened(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero"), tmp_path):
+        with pytest.raises(InputError, match="no file but a folder, pipe or device"):
+            records.read_record(path)
+    for name in ("gone.at2", "a" * 300, "nul\0byte"):
+        with pytest.raises(InputError, match="cannot be read"):
+            records.read_record(tmp_path / name)
