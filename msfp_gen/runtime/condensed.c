@@ -56,7 +56,7 @@ static void forces(const msfp_parameters *p, msfp_work *w, double *residual, dou
     }
 }
 
-int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                    double f[MSFP_NB][2], double *residual, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];

@@ -181,7 +181,7 @@ static double rounding(const stages *s)
  * while old factors contract the residual the tangent has theirs. */
 static int solve_stage(msfp_run *run, stages *s)
 {
-    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
+    const double goal = fmin(1e-3, fmax(rounding(s), 1e-1 * run->options.rtol));
     double residual[DOF];
     int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = size_of(run, s, residual);
@@ -312,7 +312,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     s.seed.cv = 1.0;
     s.seed.ca = 1.0 / s.beta;
     s.seed.beta = s.beta;
-    s.seed.accuracy = 1e-5 * run->options.rtol;
+    s.seed.accuracy = 1e-3 * run->options.rtol;
     memset(&s.at, 0, sizeof s.at);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);

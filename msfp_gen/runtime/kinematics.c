@@ -97,7 +97,7 @@ void msfp_ground(const msfp_point *at, double *body)
     msfp_body_A_put(body, at->base[2]);
 }
 
-void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
     double below[MSFP_BODY_SIZE];
     msfp_ground(at, below);
@@ -109,7 +109,7 @@ void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *
     }
 }
 
-void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w)
+MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w)
 {
     for (int k = 1; k <= NB; ++k)
         msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
@@ -127,7 +127,7 @@ static void split_wrench(const double *wrench, double *force, double *moment)
     memcpy(moment, wrench + VECTOR, MOMENT * sizeof *moment);
 }
 
-void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
     double force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE];
     load_top(at, force, moment);
@@ -136,7 +136,7 @@ void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
-void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */)
+MSFP_WIDE void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */)
 {
     static const double zero[6 * DOF];
     double force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];

@@ -2,7 +2,7 @@
 #include <math.h>
 #include "msfp_model.h"
 
-int msfp_lu(double *matrix, int n, int *pivots)
+MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
 {
     int sign = 1;
     for (int k = 0; k < n; ++k) {
@@ -35,7 +35,7 @@ int msfp_lu(double *matrix, int n, int *pivots)
     return sign;
 }
 
-void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
+MSFP_WIDE void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
 {
     for (int k = 0; k < n; ++k) {
         const double swap = rhs[pivots[k]];

@@ -9,6 +9,19 @@
 extern "C" {
 #endif
 
+/* Functions that run on columns and surfaces are compiled for wider vectors as well, and the processor picks one of the
+ * versions when the model is loaded. No version contracts a product and a sum: all give the same numbers. */
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__)
+#define MSFP_WIDE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define MSFP_WIDE
+#endif
+#if defined(__GNUC__)
+#define MSFP_INLINE static inline __attribute__((always_inline))
+#else
+#define MSFP_INLINE static inline
+#endif
+
 /* ---- values: a bearing and its top ------------------------------------------------------- */
 
 #ifndef MSFP_LAW /* the friction coefficient is constant */

@@ -216,7 +216,7 @@ static double rim_share(const msfp_work *w, int j)
 }
 
 /* Force, slip, friction and moment of surface j. */
-int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
+MSFP_WIDE int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent)
 {
     double drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL] = { 0 }, condensed[ACTIONS * MSFP_LOCAL_SIZE], moment[MOMENT];
     double drf[VECTOR * DOF], dmoment[MOMENT * DOF], dlocal[MSFP_LOCAL_SIZE * DOF];
