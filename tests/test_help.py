@@ -94,7 +94,8 @@ def test_progress_of_a_build_says_what_is_done_and_how_long_it_takes(capsys, mon
         tell("compiling (0 of 2 files)", 0.25)
         tell("compiling (1 of 2 files)", 0.5)
     err = capsys.readouterr().err.replace("\r\x1b[K", "\n").splitlines()
-    assert err[1:4] == ["deriving 7_3_3: 0 %", "compiling (0 of 2 files): 25 %", "compiling (1 of 2 files): 50 %, 4 s left"]
+    stages = ["deriving 7_3_3: 0 %", "compiling (0 of 2 files): 25 %", "compiling (1 of 2 files): 50 %, 4 s left"]
+    assert err[1:4] == stages
     assert err[-1] == "built in 5.1 s; from now on it comes from the cache"
 
 
