@@ -146,9 +146,8 @@ def _held(run: Result) -> Result:
     """The same run with its last row held for as long again."""
     rows = run.history
     columns: dict[str, Any] = {
-        field.name: np.concatenate([getattr(rows, field.name), np.repeat(getattr(rows, field.name)[-1:], 300, axis=0)])
-        for field in dataclasses.fields(rows) if field.name not in ("time", "energy")
-    }  # fmt: skip
+        name: np.concatenate([values, np.repeat(values[-1:], 300, axis=0)]) for name, values in rows.arrays().items()
+    }
     columns["time"] = np.append(rows.time, rows.time[-1] + np.linspace(0.01, 2, 300))
     columns["energy"] = {name: np.append(e, np.repeat(e[-1], 300)) for name, e in rows.energy.items()}
     return dataclasses.replace(run, history=dataclasses.replace(rows, **columns))

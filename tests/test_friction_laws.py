@@ -286,7 +286,7 @@ def test_results_and_scenes_come_back(tmp_path: Any) -> None:
     assert again.scene.effects == run.scene.effects
     assert (again.history.temperature == run.history.temperature).all()
     assert (again.history.friction_coefficient == run.history.friction_coefficient).all()
-    assert run.dataset["temperature"].attrs["units"] == "degC" and "friction" in run.dataset
+    assert run.dataset["temperature"].attrs["units"] == "degC" and "friction_coefficient" in run.dataset
     cold = simulate(scene_of("fenz-test2", duration=1.0))
     assert "temperature" not in cold.dataset and cold.to_netcdf(tmp_path / "cold.nc")
     assert read_result(tmp_path / "cold.nc").history.temperature is None
