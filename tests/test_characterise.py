@@ -110,6 +110,9 @@ def test_velocity_heat_and_capacity_by_hand() -> None:
 
 def test_uplift_is_read_where_the_run_has_it() -> None:
     run = bilinear()
+    assert characterise(run).maximum_uplift is None
+    effects = dataclasses.replace(run.scene.effects, uplift=True)
+    run = dataclasses.replace(run, scene=dataclasses.replace(run.scene, effects=effects))
     lift = np.zeros((len(run.history.time), 1))
     lift[7] = 0.004
     object.__setattr__(run.history, "lift", lift)
