@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
     from msfp_gen.layout import Effects, Layout
     from msfp_gen.motion import Motion
-    from msfp_gen.scene import Scene
+    from msfp_gen.scene import Scene, Stop
     from msfp_gen.scenefile import load_scene
     from msfp_gen.simulation import simulate
     from msfp_gen.solver import Solver
@@ -36,6 +36,7 @@ _HOMES = {
     "RunError": "errors",
     "Scene": "scene",
     "Solver": "solver",
+    "Stop": "scene",
     "Surface": "bearing",
     "Top": "top",
     "build_model": "build",
@@ -56,6 +57,7 @@ __all__ = [
     "RunError",
     "Scene",
     "Solver",
+    "Stop",
     "Surface",
     "Top",
     "__version__",
