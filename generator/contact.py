@@ -155,6 +155,7 @@ def contact(b: Blocks, law: Law) -> Program:
         tangents=("M", "dY", "dZ", "N") if law.coefficient is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_LOCAL",
     )
+    p.lanes = True
     return p
 
 

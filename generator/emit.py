@@ -12,7 +12,7 @@ from msfp_gen.version import __version__
 
 from .derive import Equations
 from .heat import HEAT_KERNEL
-from .lower import Kernel
+from .lower import Kernel, column, own_inputs
 from .printer import to_c
 from .program import Block, Use
 
@@ -45,6 +45,22 @@ class Function:
     stores: tuple[tuple[int, str, str], ...]
     """Index in the output, its text, and the field's name."""
     tangent_stores: tuple[tuple[int, str], ...]
+    lanes: bool
+    jacobian: tuple[tuple[str, ...], tuple[tuple[int, str], ...]]
+    """Of a program that runs in lanes: statements, and (row * inputs + input, text)."""
+
+
+def jacobian(kernel: Kernel) -> tuple[tuple[str, ...], tuple[tuple[int, str], ...]]:
+    """Text of the derivatives of a program's results with respect to its own inputs, row by row of what is wanted."""
+    sources = own_inputs(kernel.program)
+    rows = [name for name in kernel.program.results if name in kernel.program.tangents]
+    lines: list[str] = []
+    stores: list[tuple[int, str]] = []
+    for i, source in enumerate(sources):
+        statements, results = column(kernel, source)
+        lines += [f"{s.target} = {to_c(s.expression)}" for s in statements]
+        stores += [(row * len(sources) + i, to_c(sp.sympify(results[name]))) for row, name in enumerate(rows)]
+    return tuple(lines), tuple(stores)
 
 
 def arguments(kernel: Kernel) -> Iterator[Argument]:
@@ -106,6 +122,8 @@ def function(kernel: Kernel) -> Function:
         tangent_stores=tuple(
             (index[n], linear(program.results[n], moving)) for n in program.results if n in program.tangents
         ),
+        lanes=program.lanes,
+        jacobian=jacobian(kernel) if program.lanes else ((), ()),
     )
 
 
@@ -143,6 +161,11 @@ def scalar_quantities(block: Block) -> list[tuple[str, int | None, str]]:
     ]
 
 
+def lanes(surfaces: int) -> int:
+    """Surfaces side by side in C: rounded up so that vectors of two or four are full."""
+    return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
+
+
 def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
     """Render all generated files: {file name: text}."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -168,6 +191,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "blocks": blocks,
         "functions": [function(k) for k in kernels],
         "nb": spec.layout.surfaces,
+        "lanes": lanes(spec.layout.surfaces),
         "nq": 6 if spec.effects.uplift else 3,
         "effects_dict": repr({f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)}),
         "unknowns": equations.unknowns,

@@ -53,6 +53,49 @@ def active_inputs(program: Program) -> set[sp.Symbol]:
     return {sp.Symbol(f"{use.alias}_{name}", real=True) for use in program.inputs for name in use.active}
 
 
+def own_inputs(program: Program) -> list[sp.Symbol]:
+    """Input symbols that carry a tangent, in the order of the blocks."""
+    return [
+        sp.Symbol(f"{use.alias}_{f.name}", real=True)
+        for use in program.inputs
+        for f in use.block.fields
+        if f.name in use.active
+    ]
+
+
+def column(kernel: Kernel, source: sp.Symbol) -> tuple[tuple[Statement, ...], dict[str, sp.Expr]]:
+    """Derivatives of the results with respect to one input: statements, and what each result takes.
+
+    Only what depends on that input appears: the Jacobian of a program in its own inputs is sparse.
+    """
+    rates: dict[sp.Symbol, sp.Expr] = {source: sp.Integer(1)}
+    statements: list[Statement] = []
+    for tangent in kernel.tangents:
+        terms = [partial * rates[s] for partial, s in tangent.terms if s in rates]
+        if not terms:
+            continue
+        total = sp.Add(*terms)
+        if not (total.is_Number or total.is_Symbol or (-total).is_Symbol):
+            name = sp.Symbol(f"j_{tangent.target.name}_{source.name}", real=True)
+            statements.append(Statement(name, total))
+            total = name
+        if total != 0:
+            rates[tangent.target] = total
+    results: dict[str, sp.Expr] = {}
+    for name in kernel.program.results:
+        value = kernel.program.results[name]
+        if name in kernel.program.tangents:
+            sign = 1 if value.is_Symbol else -1
+            results[name] = sign * rates.get(sign * value, sp.Integer(0))
+    needed = {s for e in results.values() for s in e.free_symbols}
+    kept = []
+    for statement in reversed(statements):
+        if statement.target in needed:
+            kept.append(statement)
+            needed |= statement.expression.free_symbols
+    return tuple(reversed(kept)), results
+
+
 def lower(program: Program) -> Kernel:
     """Prune what no output needs and differentiate statement by statement."""
     values = live(program, {s for e in program.results.values() for s in e.free_symbols})

@@ -117,6 +117,8 @@ class Program:
     """Stored output fields whose tangent is wanted (none: a program without a tangent form)."""
     columns: str = ""
     """C constant: the number of tangent columns."""
+    lanes: bool = False
+    """Whether C runs it for all surfaces side by side, and takes its tangent with respect to its own inputs."""
     rates: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _definitions: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _count: int = 0

@@ -33,6 +33,7 @@ PLATFORM_COMPILERS = ("cc", "gcc", "clang")
 FLAGS: dict[str, tuple[str, ...]] = {
     "c": (
         "-std=c99", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-O2", "-fno-math-errno", "-fno-trapping-math",
+        "-ffp-contract=off",
         *shlex.split(os.environ.get("MSFP_GEN_CFLAGS", "")),
     ),
     # Cython's own output is not ours to keep free of warnings, and it is not where the time goes.

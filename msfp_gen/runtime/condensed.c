@@ -71,11 +71,9 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
 #if MSFP_LAW
     msfp_surroundings(at, w);
 #endif
-    for (int j = 0; j < NB; ++j) {
-        const int status = msfp_surface(p, w, seed, f[j], j, tangent != NULL);
-        if (status)
-            return status;
-    }
+    const int status = msfp_surfaces(p, w, seed, f, tangent != NULL);
+    if (status)
+        return status;
     for (int k = 1; k <= NB; ++k) {
         const double *above = w->moment[k], *dabove = w->dmoment[k];
 #if MSFP_UPLIFT

@@ -51,6 +51,9 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
             out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
         p->rim_cosine[j] = cos(s[1] / s[0]);
     }
+    for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)
+        for (int lane = 0; lane < MSFP_LANES; ++lane)
+            p->lanes[i][lane] = p->surface[lane < NB ? lane : NB - 1][i];
     double *t = p->top;
     t[MSFP_TOP_PARAMETERS_K] = top[0];
     t[MSFP_TOP_PARAMETERS_C] = top[1];

@@ -40,6 +40,7 @@ typedef struct {
     double dimensions[MSFP_NB + 1][MSFP_DIMENSIONS_SIZE];
     double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE];
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
+    double lanes[MSFP_SURFACE_PARAMETERS_SIZE][MSFP_LANES]; /* the same, surfaces side by side */
     double top[MSFP_TOP_PARAMETERS_SIZE];
     double rim_cosine[MSFP_NB]; /* cos(s_c/R) */
     double weight;              /* of the moving bodies and the supported mass */

@@ -50,7 +50,12 @@ void msfp_split_moment(msfp_work *w, int j, int tangent);
 /* surface.c */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
-int msfp_surface(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double *f, int j, int tangent);
+/* Force, slip, friction and moment of all surfaces. */
+int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], int tangent);
+
+/* contact.c */
+/* Y, Z and the contact of all surfaces; condensed (or NULL): Jacobian of moment and N in what a surface is given, in lanes. */
+int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], double *condensed);
 #if MSFP_LAW
 /* Temperature of the surfaces, and a sound value for Newton to start from. */
 void msfp_surroundings(const msfp_point *at, msfp_work *w);

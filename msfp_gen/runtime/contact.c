@@ -1,0 +1,204 @@
+/* contact.c: friction and contact of all surfaces side by side, so that vectors hold a surface in every lane.
+ *
+ * Y, Z follow their stage formula f = fp + beta df/dt and mu its law, surface by surface: a nested Newton of size two or
+ * three, whose consistent tangent is condensed into that of the moment and N.
+ */
+#include <math.h>
+#include <string.h>
+#include "stack.h"
+
+#define LANES MSFP_LANES
+#define OWN (FRICTION + MSFP_LAW) /* local unknowns: Y, Z, and mu where it follows a law */
+#define ROWS (MOMENT + OWN + 1)   /* rows of the contact's Jacobian: M, dY, dZ, mu, N */
+#define INPUTS MSFP_LOCAL_SIZE    /* force and slip rotation */
+#if MSFP_HEAT
+#define SLOPE(out, s) (out)[MSFP_CONTACT_LAW_MU * LANES + s] /* d mu/d mu by its law: friction heats */
+#else
+#define SLOPE(out, s) 0.0
+#endif
+
+/* All surfaces, a field a row; spare lanes repeat the last surface. */
+typedef struct {
+    double local[INPUTS * LANES], f[FRICTION * LANES], before[FRICTION * LANES], out[MSFP_CONTACT_SIZE * LANES];
+#if MSFP_LAW
+    double x[MSFP_COEFFICIENT_SIZE * LANES];
+#endif
+} surfaces;
+
+#if MSFP_LAW
+void msfp_surroundings(const msfp_point *at, msfp_work *w)
+{
+    for (int j = 0; j < NB; ++j) {
+        double *x = w->coefficient[j];
+#if MSFP_HEAT
+        x[MSFP_COEFFICIENT_RISE] = at->rise[j];
+        x[MSFP_COEFFICIENT_WARMING] = at->warming;
+#else
+        (void)at;
+#endif
+        if (!(fabs(x[MSFP_COEFFICIENT_MU]) < 1e3)) /* left by a failed step */
+            x[MSFP_COEFFICIENT_MU] = 0.0;
+    }
+}
+#endif
+
+MSFP_INLINE void gather(const msfp_work *w, const msfp_seed *seed, double f[NB][2], surfaces *all)
+{
+    for (int s = 0; s < LANES; ++s) {
+        const int j = s < NB ? s : NB - 1;
+        for (int k = 0; k < INPUTS; ++k)
+            all->local[k * LANES + s] = w->local[j][k];
+        for (int k = 0; k < FRICTION; ++k) {
+            all->f[k * LANES + s] = f[j][k];
+            all->before[k * LANES + s] = seed->fp[j][k];
+        }
+#if MSFP_LAW
+        for (int k = 0; k < MSFP_COEFFICIENT_SIZE; ++k)
+            all->x[k * LANES + s] = w->coefficient[j][k];
+#endif
+    }
+}
+
+MSFP_INLINE void scatter(const surfaces *all, msfp_work *w, double f[NB][2])
+{
+    for (int j = 0; j < NB; ++j) {
+        for (int k = 0; k < MSFP_CONTACT_SIZE; ++k)
+            w->contact[j][k] = all->out[k * LANES + j];
+        for (int k = 0; k < FRICTION; ++k)
+            f[j][k] = all->f[k * LANES + j];
+#if MSFP_LAW
+        w->coefficient[j][MSFP_COEFFICIENT_MU] = all->x[MSFP_COEFFICIENT_MU * LANES + j];
+#endif
+    }
+}
+
+/* x of the 1x1 or 2x2 system a x = b of every lane, in place of b. */
+MSFP_INLINE void solve_small(const double *a, double *b)
+{
+    for (int s = 0; s < LANES; ++s) {
+#if MSFP_PLANAR
+        b[s] /= a[s];
+#else
+        const double inverse = 1.0 / (a[s] * a[3 * LANES + s] - a[LANES + s] * a[2 * LANES + s]);
+        const double x = (b[s] * a[3 * LANES + s] - a[LANES + s] * b[LANES + s]) * inverse;
+        b[LANES + s] = (a[s] * b[LANES + s] - a[2 * LANES + s] * b[s]) * inverse;
+        b[s] = x;
+#endif
+    }
+}
+
+/* One Newton step on Y, Z (and mu) of every surface that is not there yet, with the derivative at constant slip velocity
+ * and N (the contact point hardly moves with them); past a switch, half the step back. Returns how many are not there;
+ * -1: not finite. */
+MSFP_INLINE int improve(surfaces *all, double beta, double accuracy, double *step, double *best)
+{
+    double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
+    const double *out = all->out;
+    int open = 0, broken = 0;
+    for (int s = 0; s < LANES; ++s)
+        size[s] = sum[s] = 0.0;
+    for (int r = 0; r < FRICTION; ++r)
+        for (int s = 0; s < LANES; ++s) {
+            const double g = all->f[r * LANES + s] - all->before[r * LANES + s] - beta * out[(MSFP_CONTACT_DY + r) * LANES + s];
+            newton[r * LANES + s] = g;
+            size[s] = fabs(g) > size[s] ? fabs(g) : size[s];
+            sum[s] += fabs(g);
+        }
+#if MSFP_LAW
+    double excess[LANES];
+    for (int s = 0; s < LANES; ++s) {
+        excess[s] = all->x[MSFP_COEFFICIENT_MU * LANES + s] - out[MSFP_CONTACT_MU * LANES + s];
+        size[s] = fabs(excess[s]) > size[s] ? fabs(excess[s]) : size[s];
+        sum[s] += fabs(excess[s]);
+    }
+#endif
+    for (int s = 0; s < LANES; ++s) {
+        broken += !(sum[s] < INFINITY);
+        open += size[s] > accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+    }
+    if (broken || !open)
+        return broken ? -1 : 0;
+    for (int i = 0; i < FRICTION * FRICTION; ++i)
+        for (int s = 0; s < LANES; ++s)
+            a[i * LANES + s] = (i % (FRICTION + 1) == 0) - beta * out[(MSFP_CONTACT_YY + i) * LANES + s];
+    solve_small(a, newton);
+    for (int s = 0; s < LANES; ++s) {
+        const int there = size[s] <= accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+        const int overshot = size[s] > best[s];
+        const double sign = there ? 0.0 : overshot ? 1.0 : -1.0;
+#if MSFP_LAW
+        double along = excess[s];
+        for (int c = 0; c < FRICTION; ++c)
+            along += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * newton[c * LANES + s];
+        along = overshot ? 0.5 * step[FRICTION * LANES + s] : along / (1.0 - SLOPE(out, s));
+        step[FRICTION * LANES + s] = along;
+        all->x[MSFP_COEFFICIENT_MU * LANES + s] += sign * along;
+#endif
+        for (int r = 0; r < FRICTION; ++r) {
+            step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
+            all->f[r * LANES + s] += sign * step[r * LANES + s];
+        }
+        best[s] = overshot ? best[s] : size[s];
+    }
+    return open;
+}
+
+MSFP_INLINE int friction_stage(const double *par, surfaces *all, double beta, double accuracy)
+{
+    double step[OWN * LANES] = { 0 }, best[LANES];
+    for (int s = 0; s < LANES; ++s)
+        best[s] = INFINITY;
+    for (int i = 0; i < 60; ++i) {
+        msfp_contact_lanes(par, all->local, all->f LAW(all->x), all->out);
+        const int open = improve(all, beta, accuracy, step, best);
+        if (open <= 0)
+            return open == 0 ? MSFP_OK : i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
+    }
+    return MSFP_E_NEWTON;
+}
+
+/* Jacobian of the moment and of N with Y, Z following their stage formula and mu its law: [MOMENT + 1][INPUTS], in lanes.
+ * The matrix of the local unknowns is near the identity plus what friction dissipates: no pivots. */
+MSFP_INLINE void condense(const double *par, surfaces *all, double beta, double *condensed)
+{
+    double jacobian[ROWS * MSFP_LOCAL * LANES], a[OWN][OWN + INPUTS][LANES];
+    msfp_contact_jacobian(par, all->local, all->f LAW(all->x), all->out, jacobian);
+    for (int r = 0; r < OWN; ++r)
+        for (int c = 0; c < OWN + INPUTS; ++c) {
+            const double *from = jacobian + ((MOMENT + r) * MSFP_LOCAL + (c < OWN ? INPUTS + c : c - OWN)) * LANES;
+            const double factor = r < FRICTION ? beta : 1.0;
+            for (int s = 0; s < LANES; ++s)
+                a[r][c][s] = c < OWN ? (r == c) - factor * from[s] : factor * from[s];
+        }
+    for (int k = 0; k < OWN; ++k) /* Gauss and Jordan */
+        for (int r = 0; r < OWN; ++r) {
+            double factor[LANES];
+            for (int s = 0; s < LANES; ++s)
+                factor[s] = r == k ? 1.0 - 1.0 / a[k][k][s] : a[r][k][s] / a[k][k][s];
+            for (int c = k + 1; c < OWN + INPUTS && r != k; ++c)
+                for (int s = 0; s < LANES; ++s)
+                    a[r][c][s] -= factor[s] * a[k][c][s];
+        }
+    for (int r = 0; r <= MOMENT; ++r) {
+        const double *row = jacobian + (r < MOMENT ? r : MOMENT + OWN) * MSFP_LOCAL * LANES;
+        for (int k = 0; k < INPUTS; ++k) {
+            double *sum = condensed + (r * INPUTS + k) * LANES;
+            for (int s = 0; s < LANES; ++s)
+                sum[s] = row[k * LANES + s];
+            for (int c = 0; c < OWN; ++c)
+                for (int s = 0; s < LANES; ++s)
+                    sum[s] += row[(INPUTS + c) * LANES + s] * a[c][OWN + k][s] / a[c][c][s];
+        }
+    }
+}
+
+MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], double *condensed)
+{
+    surfaces all;
+    gather(w, seed, f, &all);
+    const int status = friction_stage(&p->lanes[0][0], &all, seed->beta, fmax(seed->accuracy, 1e-12));
+    if (status == MSFP_OK && condensed)
+        condense(&p->lanes[0][0], &all, seed->beta, condensed);
+    scatter(&all, w, f);
+    return status;
+}
