@@ -60,6 +60,8 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
                    double f[MSFP_NB][2], double *residual, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    if (!seed->same_base)
+        msfp_base(p, at, w);
     msfp_kinematics(p, at, w);
     if (tangent) {
         seed_columns(w, seed);
@@ -133,7 +135,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], scale[DOF], f[NB][2];
     int pivots[DOF];
-    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } } };
+    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } }, 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     double last = INFINITY;
     out->determinant = 1;
@@ -152,6 +154,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         if (out->residual <= 1e-13 || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
             return MSFP_OK;
         last = out->residual;
+        seed.same_base = 1;
         out->determinant = msfp_lu(tangent, DOF, pivots);
         if (out->determinant == 0)
             return MSFP_E_IRREGULAR;

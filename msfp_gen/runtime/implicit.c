@@ -80,20 +80,21 @@ static void place(stages *s)
 static void over_normal(const msfp_work *w, double *residual);
 
 /* Residual over N at the present rates, and its largest entry relative to its natural size; infinite where it cannot be formed. */
-static double size_of(msfp_run *run, stages *s, double *residual)
+static double size_of(msfp_run *run, stages *s, msfp_work *w, double *residual)
 {
     double scale[DOF], size = 0.0;
     place(s);
     ++run->counts[MSFP_COUNT_EVALUATIONS];
-    if (msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, NULL))
+    if (msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, NULL))
         return INFINITY;
-    msfp_residual_scale(&run->parameters, &run->work, scale);
+    s->seed.same_base = 1;
+    msfp_residual_scale(&run->parameters, w, scale);
     for (int i = 0; i < DOF; ++i)
         if (!(fabs(residual[i]) / scale[i] <= size)) {
             size = fabs(residual[i]) / scale[i];
             run->worst_surface = i / ND + 1;
         }
-    over_normal(&run->work, residual);
+    over_normal(w, residual);
     return size < INFINITY ? size : INFINITY;
 }
 
@@ -153,15 +154,15 @@ static double take_step(msfp_run *run, stages *s, double *residual, double size,
     memcpy(step, residual, sizeof step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
     move(s, step, 1.0);
-    double next = size_of(run, s, residual);
+    double next = size_of(run, s, &run->work, residual);
     while (fresh && next > size && factor > 0.05) {
         move(s, step, -0.5 * factor);
         factor *= 0.5;
-        next = size_of(run, s, residual);
+        next = size_of(run, s, &run->work, residual);
     }
     if (!fresh && !(next < size)) { /* old factors mislead: back to where they were */
         move(s, step, -1.0);
-        next = size_of(run, s, residual);
+        next = size_of(run, s, &run->work, residual);
     }
     return next;
 }
@@ -184,7 +185,7 @@ static int solve_stage(msfp_run *run, stages *s)
     const double goal = fmin(1e-3, fmax(rounding(s), 1e-1 * run->options.rtol));
     double residual[DOF];
     int fresh = 0, good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
-    double size = size_of(run, s, residual);
+    double size = size_of(run, s, &run->work, residual);
     for (int i = 0; size > goal; ++i) {
         if (i == 30 || !(size < INFINITY)) {
             run->status_surface = run->worst_surface;
@@ -216,23 +217,25 @@ static int solve_stage(msfp_run *run, stages *s)
     return MSFP_E_IRREGULAR;
 }
 
+/* Rates to start a stage from: those of the last step, or by accelerations that go on as they have changed, which is
+ * what a base acceleration linear in time asks for. */
 static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
 {
     memcpy(s->at.v, run->now.v, sizeof s->at.v);
     memcpy(s->f, i > 1 ? s->f : run->now.f, sizeof s->f);
-    if (extrapolate)
-        for (int k = 0; k < NB; ++k)
-            for (int d = 0; d < ND; ++d) {
-                const int j = unknown[d];
-                const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / method.c[1] : h * run->now.a[k][j];
-                s->at.v[k][j] += method.c[i] * slope;
-            }
+    for (int k = 0; k < NB && extrapolate; ++k)
+        for (int d = 0; d < ND; ++d) {
+            const int j = unknown[d];
+            const double change = i > 1 ? (s->a[1][k][j] - s->a[0][k][j]) / method.c[1] : h * run->slope[k][j];
+            s->at.v[k][j] = s->V[k][j] + s->beta * (s->a[0][k][j] + method.c[i] * change);
+        }
 }
 
 static int stage(msfp_run *run, stages *s, int i, double h)
 {
     prepare(run, s, i, h);
     msfp_point_at(run, run->now.t + method.c[i] * h, &s->at);
+    s->seed.same_base = 0;
     msfp_heat_prepare(run, method.a[i], i, h, s->beta, &s->at);
     int status = MSFP_E_NEWTON;
     for (int attempt = 0; attempt < 2 && status == MSFP_E_NEWTON; ++attempt) {
@@ -276,7 +279,12 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 static void filter(msfp_run *run, stages *s, double dq[NB][NQ], double dv[NB][NQ], double df[NB][2])
 {
     stages moved = *s;
+    msfp_work w; /* of its own: that of the run stays as the step ended */
     double residual[DOF];
+    moved.seed.same_base = 0;
+#if MSFP_LAW
+    memcpy(w.coefficient, run->work.coefficient, sizeof w.coefficient);
+#endif
     if (run->factored_beta != s->beta)
         return;
     for (int k = 0; k < NB; ++k) {
@@ -287,11 +295,11 @@ static void filter(msfp_run *run, stages *s, double dq[NB][NQ], double dv[NB][NQ
         for (int d = 0; d < 2; ++d)
             moved.seed.fp[k][d] += df[k][d];
     }
-    if (!(size_of(run, &moved, residual) < INFINITY))
+    if (!(size_of(run, &moved, &w, residual) < INFINITY))
         return;
     msfp_lu_solve(run->factors, DOF, run->pivots, residual);
     move(&moved, residual, 1.0);
-    if (!(size_of(run, &moved, residual) < INFINITY))
+    if (!(size_of(run, &moved, &w, residual) < INFINITY))
         return;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
@@ -334,6 +342,9 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->f, s.f, sizeof next->f);
     memcpy(next->df, s.df[STAGES - 1], sizeof next->df);
     memcpy(next->power, s.power[STAGES - 1], sizeof next->power);
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < NQ; ++d)
+            run->slope[k][d] = (next->a[k][d] - now->a[k][d]) / h;
     for (int e = 0; e < MSFP_WORKS; ++e) {
         next->work[e] = now->work[e] + h * method.gamma * s.power[STAGES - 1][e];
         for (int i = 0; i < STAGES - 1; ++i)
@@ -351,9 +362,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     disc = fmax(disc, msfp_heat_error(run, method.e, STAGES, h, s.beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
     if (*error > 1.0) {
-        const msfp_work converged = run->work;
         filter(run, &s, dq, dv, df);
-        run->work = converged;
         *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
     }
     return MSFP_OK;

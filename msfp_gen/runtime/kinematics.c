@@ -100,12 +100,16 @@ void msfp_ground(const msfp_point *at, double *body)
     msfp_body_A_put(body, at->base[2]);
 }
 
-MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
     double below[MSFP_BODY_SIZE];
     msfp_ground(at, below);
     load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     msfp_forward(p->body[0], below, w->x[0], w->body[0]);
+}
+
+MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
     for (int k = 1; k <= NB; ++k) {
         load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
         msfp_forward(p->body[k], w->body[k - 1], w->x[k], w->body[k]);
@@ -173,6 +177,7 @@ void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *
 {
     msfp_work w;
     double below[MSFP_BODY_SIZE], block[MSFP_POINTS_SIZE];
+    msfp_base(p, at, &w);
     msfp_kinematics(p, at, &w);
     msfp_ground(at, below);
     for (int k = 0; k <= NB; ++k) {

@@ -69,6 +69,7 @@ typedef struct {
     double cq, cv, ca, beta;
     double accuracy; /* of Y, Z; 0: all there is */
     double fp[MSFP_NB][2];
+    int same_base; /* the base is where the last evaluation in this work area had it */
 } msfp_seed;
 
 /* Everything one evaluation leaves behind, with tangents [field][column]. */
@@ -263,6 +264,7 @@ typedef struct {
     double events_now[MSFP_EVENTS]; /* event functions at the present state */
     double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
     int pivots[MSFP_DOF];
+    double slope[MSFP_NB][MSFP_NQ]; /* of the accelerations over the last step, where it goes on */
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
     long counts[MSFP_COUNTS];

@@ -135,6 +135,7 @@ void msfp_report(const msfp_parameters *p, const msfp_point *given, const double
     columns s;
     double rows[ROWS_BODY], drows[ROWS_BODY * DOF], below[MSFP_BODY_SIZE];
     spread(unknowns, &at, s.contact);
+    msfp_base(p, &at, w);
     msfp_kinematics(p, &at, w);
     msfp_top(p, &at, w);
 #if MSFP_LAW

@@ -167,7 +167,7 @@ static int settle(msfp_run *run)
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } } };
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
     msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
@@ -186,6 +186,7 @@ static int settle(msfp_run *run)
     msfp_friction_rates(&run->work, run->now.df);
     msfp_heat_settle(run);
     msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
+    memset(run->slope, 0, sizeof run->slope);
     run->have_unknowns = 0;
     run->restart = 1;
     return msfp_check_state(run, &run->work, &run->now);
@@ -224,6 +225,12 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
 
 /* Times closer than this are one time: what rounding leaves of a step that was to land there [s]. */
 static double same_time(double t) { return 1e-12 * fmax(1.0, t); }
+
+static int at_knot(const msfp_run *run)
+{
+    const msfp_history *m = &run->motion;
+    return fabs(run->now.t - m->knots[m->last]) <= same_time(run->now.t) || fabs(run->now.t - m->knots[m->last + 1]) <= same_time(run->now.t);
+}
 
 static double target(const msfp_run *run)
 {
@@ -284,6 +291,8 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     if (run->status)
         return 0;
     run->now = run->next;
+    if (run->options.stop_at_knots && at_knot(run)) /* a kink */
+        memset(run->slope, 0, sizeof run->slope);
     memcpy(run->events_now, after, sizeof run->events_now);
     if (stop) {
         if (run->options.output_step > 0.0)

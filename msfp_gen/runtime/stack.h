@@ -38,6 +38,7 @@ static inline int field(int order, int i)
 
 /* kinematics.c */
 void msfp_ground(const msfp_point *at, double *body);
+void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w); /* body 0, for the others to start from */
 void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w);
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
