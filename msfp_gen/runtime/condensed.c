@@ -62,13 +62,14 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
     if (!seed->same_base)
         msfp_base(p, at, w);
-    msfp_kinematics(p, at, w);
     if (tangent) {
         seed_columns(w, seed);
-        msfp_kinematics_tangent(p, w);
+        msfp_kinematics_tangent(p, at, w);
         msfp_top_columns(p, at, w, NULL);
-    } else
+    } else {
+        msfp_kinematics(p, at, w);
         msfp_top(p, at, w);
+    }
     forces(p, w, residual, tangent);
 #if MSFP_LAW
     msfp_surroundings(at, w);
@@ -131,33 +132,48 @@ void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
     }
 }
 
+/* Largest residual relative to its natural size. */
+static double size_of(const msfp_parameters *p, const msfp_work *w, const double *residual)
+{
+    double scale[DOF], size = 0.0;
+    msfp_residual_scale(p, w, scale);
+    for (int i = 0; i < DOF; ++i) {
+        const double one = fabs(residual[i]) / scale[i];
+        size = one <= size ? size : one;
+    }
+    return size;
+}
+
+/* Nearly linear in the accelerations: the factors of the first guess serve while they reduce the residual a hundredfold. */
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
 {
-    double residual[DOF], tangent[DOF * DOF], scale[DOF], f[NB][2];
-    int pivots[DOF];
+    double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
+    int pivots[DOF], good = 0;
     msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } }, 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
-    double last = INFINITY;
+    memcpy(f, at->f, sizeof f);
     out->determinant = 1;
     for (out->iterations = 0; out->iterations < 50; ++out->iterations) {
-        memcpy(f, at->f, sizeof f);
-        const int status = msfp_condensed(p, at, &seed, w, f, residual, tangent);
+        const int first = out->iterations == 0;
+        int status = msfp_condensed(p, at, &seed, w, f, residual, first ? tangent : NULL);
         if (status)
             return status;
-        msfp_residual_scale(p, w, scale);
-        out->residual = 0.0;
-        for (int i = 0; i < DOF; ++i)
-            out->residual = fmax(out->residual, fabs(residual[i]) / scale[i]);
+        seed.same_base = 1;
+        out->residual = size_of(p, w, residual);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
         /* Converged, or at the floor that rounding leaves. */
         if (out->residual <= 1e-13 || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
             return MSFP_OK;
+        good = out->residual < 1e-2 * last;
         last = out->residual;
-        seed.same_base = 1;
-        out->determinant = msfp_lu(tangent, DOF, pivots);
-        if (out->determinant == 0)
-            return MSFP_E_IRREGULAR;
+        if (!first && !good && (status = msfp_condensed(p, at, &seed, w, f, residual, tangent)))
+            return status;
+        if (first || !good) {
+            out->determinant = msfp_lu(tangent, DOF, pivots);
+            if (out->determinant == 0)
+                return MSFP_E_IRREGULAR;
+        }
         msfp_lu_solve(tangent, DOF, pivots, residual);
         for (int k = 0; k < NB; ++k)
             for (int i = 0; i < ND; ++i)

@@ -50,6 +50,7 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* a law's numbers come last in both */
             out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
         p->rim_cosine[j] = cos(s[1] / s[0]);
+        p->rim_slope[j] = s[0] / sin(s[1] / s[0]);
     }
     for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)
         for (int lane = 0; lane < MSFP_LANES; ++lane)
@@ -116,10 +117,13 @@ MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, m
     }
 }
 
-MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w)
+/* The same with the columns of its tangent. */
+MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
-    for (int k = 1; k <= NB; ++k)
+    for (int k = 1; k <= NB; ++k) {
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
         msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
+    }
 }
 
 static void load_top(const msfp_point *at, double *force, double *moment)

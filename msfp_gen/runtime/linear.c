@@ -2,7 +2,7 @@
 #include <math.h>
 #include "msfp_model.h"
 
-MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
+MSFP_INLINE int factors(double *matrix, int n, int *pivots)
 {
     int sign = 1;
     for (int k = 0; k < n; ++k) {
@@ -23,7 +23,7 @@ MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
         }
         if (matrix[k * n + k] < 0.0)
             sign = -sign;
-        const double inverse = 1.0 / matrix[k * n + k];
+        const double inverse = matrix[k * n + k] = 1.0 / matrix[k * n + k];
         for (int i = k + 1; i < n; ++i) {
             const double factor = matrix[i * n + k] * inverse;
             matrix[i * n + k] = factor;
@@ -35,7 +35,7 @@ MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
     return sign;
 }
 
-MSFP_WIDE void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
+MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double *rhs)
 {
     for (int k = 0; k < n; ++k) {
         const double swap = rhs[pivots[k]];
@@ -48,6 +48,20 @@ MSFP_WIDE void msfp_lu_solve(const double *matrix, int n, const int *pivots, dou
     for (int i = n - 1; i >= 0; --i) {
         for (int j = i + 1; j < n; ++j)
             rhs[i] -= matrix[i * n + j] * rhs[j];
-        rhs[i] /= matrix[i * n + i];
+        rhs[i] *= matrix[i * n + i];
     }
+}
+
+/* The size of a step is known when this is compiled: its loops are unrolled. */
+MSFP_WIDE int msfp_lu(double *matrix, int n, int *pivots)
+{
+    return n == MSFP_DOF ? factors(matrix, MSFP_DOF, pivots) : factors(matrix, n, pivots);
+}
+
+MSFP_WIDE void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs)
+{
+    if (n == MSFP_DOF)
+        solution(matrix, MSFP_DOF, pivots, rhs);
+    else
+        solution(matrix, n, pivots, rhs);
 }

@@ -43,6 +43,7 @@ typedef struct {
     double lanes[MSFP_SURFACE_PARAMETERS_SIZE][MSFP_LANES]; /* the same, surfaces side by side */
     double top[MSFP_TOP_PARAMETERS_SIZE];
     double rim_cosine[MSFP_NB]; /* cos(s_c/R) */
+    double rim_slope[MSFP_NB];  /* d gap/d cosine there [m] */
     double weight;              /* of the moving bodies and the supported mass */
 } msfp_parameters;
 
@@ -156,7 +157,7 @@ void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
  * [body][omega, omega', their rates][3]; [body][t_1, t_2, t_3][3]. */
 void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *points, double *rotations, double *bases);
 
-/* Dense LU with partial pivoting, in place. Returns the sign of the determinant, 0 if singular. */
+/* Dense LU with partial pivoting, in place, the diagonal inverted. Returns the sign of the determinant, 0 if singular. */
 int msfp_lu(double *matrix, int n, int *pivots);
 void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs);
 

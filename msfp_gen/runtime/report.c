@@ -158,7 +158,7 @@ void msfp_report(const msfp_parameters *p, const msfp_point *given, const double
             seed_variable(w, &s, variables + first + c, c);
         msfp_ground(&at, below);
         msfp_forward_tangent(p->body[0], below, w->x[0], w->body[0], s.dground, w->dx[0], w->dbody[0]);
-        msfp_kinematics_tangent(p, w);
+        msfp_kinematics_tangent(p, &at, w);
         msfp_top_columns(p, &at, w, s.dload);
         for (int j = 0; j < NB; ++j)
             report_surface(p, &at, w, &s, j, 1);

@@ -80,14 +80,13 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
 #define EVENTS MSFP_EVENTS
 #define FIRST_SEAT (NB + 1)
 
-/* Event functions of a state: the gaps, what is left to the stop displacement, compressions. */
+/* Event functions of a state: the gaps to first order where they close, what is left to the stop displacement, compressions. */
 static void event_values(msfp_run *run, const msfp_state *s, double *g)
 {
-    double sliding[NB][MSFP_GAP_SIZE], u[3];
+    double u[3];
     msfp_row row;
-    msfp_gaps(&run->parameters, s->q, sliding);
     for (int j = 0; j < NB; ++j)
-        g[j] = sliding[j][MSFP_GAP_G];
+        g[j] = (cos(s->q[j][0]) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
     g[NB] = 1.0;
     if (run->options.stop_displacement > 0.0) {
         msfp_observe_state(run, s, &row);

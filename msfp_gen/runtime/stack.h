@@ -40,7 +40,7 @@ static inline int field(int order, int i)
 void msfp_ground(const msfp_point *at, double *body);
 void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w); /* body 0, for the others to start from */
 void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-void msfp_kinematics_tangent(const msfp_parameters *p, msfp_work *w);
+void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */);
 
