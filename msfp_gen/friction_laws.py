@@ -166,3 +166,16 @@ def _check_values(law: Law, path: str, index: int, surface: Surface, values: Map
             f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives mu = {mu[where]:.4g} "
             f"at {at}; give numbers with which it is finite and positive"
         )
+
+
+def heating_of(bearing: Bearing) -> list[float]:
+    """sqrt(D/pi)/k over the area of contact of every surface [K s^1/2/J], with the defaults of `HEAT`; 0 where no area
+    is known.
+    """
+    out = []
+    for index, surface in enumerate(bearing.surfaces):
+        radius = surface.patch_radius or bearing.slider_rim_radius(index)
+        given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
+        numbers = _derived({**given, "patch_radius": radius or None})
+        out.append(numbers["heating"] / numbers["area"] if radius else 0.0)
+    return out

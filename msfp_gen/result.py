@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.characterise import Characterisation
+    from msfp_gen.notes import Note
     from msfp_gen.scene import Scene
 
 __all__ = ["Counters", "Event", "History", "Result"]
@@ -23,7 +24,8 @@ class Result:
     """What `simulate` gives, and what a RunError carries of a run that failed.
 
     status: "ok", "stopped" (the scene's stop was met) or the name of a failure; message: one line in words.
-    provenance: versions and keys that say how the numbers came about.
+    provenance: versions and keys that say how the numbers came about. notes: where something that a model left out
+    began to matter, and what followed (docs/effects.md).
     """
 
     scene: Scene
@@ -33,6 +35,7 @@ class Result:
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
 
     @property
     def succeeded(self) -> bool:

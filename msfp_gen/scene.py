@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import cos, isclose, sin
-from typing import Annotated, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
 from msfp_gen.friction_laws import HEAT_TIMES, check_bearing
-from msfp_gen.layout import Effects, ModelSpec
+from msfp_gen.layout import Auto, Effects, ModelSpec
 from msfp_gen.motion import Motion
+from msfp_gen.prescribed import Load, Rotation
 from msfp_gen.solver import Solver
-from msfp_gen.top import PrescribedTop, Top
+from msfp_gen.top import Top
+
+if TYPE_CHECKING:
+    from msfp_gen.choice import Choice
 
 _TIME = Quantity("s", above=0.0)
 MOST_ROWS = 1e8  # of output: some 100 GB
@@ -65,18 +69,22 @@ class Scene:
 
     duration [s]; None: as long as the motion. initial_state; None: centred and at rest. output_step [s]; None: the
     solver's own steps. stop: what ends the run early. motion_table: the motion as a scene file writes it, kept so that
-    the scene can be written back. Raises InputError: a part of the wrong kind, or parts that do not fit together.
+    the scene can be written back. load: on the top plate, beside what the top applies. top_rotation: how what the top's
+    rotational stiffness is fixed to turns. effects: what is modelled, or `Auto`: chosen from the scene. Raises
+    InputError: a part of the wrong kind, or parts that do not fit together.
     """
 
     bearing: Bearing
     motion: Motion
     top: Top
-    effects: Effects = field(default_factory=Effects)
+    effects: Effects | Auto = field(default_factory=Auto)
     solver: Solver = field(default_factory=Solver)
     duration: Annotated[float | None, _TIME] = None
     initial_state: InitialState | None = None
     output_step: Annotated[float | None, _TIME] = None
     stop: Stop | None = None
+    load: Load | None = None
+    top_rotation: Rotation | None = None
     name: str = ""
     motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
@@ -89,15 +97,28 @@ class Scene:
         check_bearing(self.effects.law, self.effects.friction, self.bearing)
         if self.effects.rims:
             self._check_rims()
-        elif self.stop is not None and self.stop.all_rims:
+        elif self.effects.rims is False and self.stop is not None and self.stop.all_rims:
             raise InputError("stop.all_rims = True: effects.rims = False models no rims; give rims = true")
+        self._check_rotation()
         if self.effects.dimension == "planar":
             self._check_plane()
 
     @property
     def spec(self) -> ModelSpec:
-        """Which model the run needs."""
-        return ModelSpec(self.bearing.layout, self.effects)
+        """Which model the run needs, or begins with."""
+        return ModelSpec(self.bearing.layout, self.modelled)
+
+    @property
+    def modelled(self) -> Effects:
+        """The effects a run begins with: the given ones, or those chosen from the scene."""
+        return self.choice.effects
+
+    @cached_property
+    def choice(self) -> Choice:
+        """The effects a run begins with and the reason for each."""
+        from msfp_gen.choice import choose
+
+        return choose(self)
 
     @property
     def end(self) -> float:
@@ -147,20 +168,26 @@ class Scene:
                     "give a stiffness [N/m], or effects.rims = false"
                 )
 
-    def _check_plane(self) -> None:
-        plane = self.motion.plane()
-        remedy = "give effects.dimension = 'spatial'"
-        if plane is None:
-            raise InputError(f"effects.dimension = 'planar': the motion lies in no vertical plane; {remedy}")
-        if not isinstance(self.top, PrescribedTop):
-            return
-        (f1, f2, _), (m1, m2, m3) = self.top.force, self.top.moment
-        out_of_plane = (f2 * cos(plane) - f1 * sin(plane), m1 * cos(plane) + m2 * sin(plane), m3)
-        scales = (abs(f1) + abs(f2), abs(m1) + abs(m2), 0.0)
-        if not all(isclose(part, 0.0, abs_tol=1e-12 * scale) for part, scale in zip(out_of_plane, scales, strict=True)):
+    def _check_rotation(self) -> None:
+        stiff = getattr(self.top, "rotational_stiffness", 0.0) or getattr(self.top, "rotational_damping", 0.0)
+        if self.top_rotation is not None and not stiff:
             raise InputError(
-                f"top.force = {self.top.force}, top.moment = {self.top.moment}: they leave the vertical plane of the "
-                f"motion, at azimuth {plane:.6g} rad; {remedy}"
+                f"top_rotation: a {self.top.kind} top without rotational_stiffness passes no rotation on; give it one "
+                "[N m/rad]"
+            )
+        if isinstance(self.effects, Effects) and self.effects.top_rotation != (self.top_rotation is not None):
+            remedy = "give top_rotation, or leave the effect out" if self.effects.top_rotation else "set it to True"
+            raise InputError(f"effects.top_rotation = {self.effects.top_rotation}: not what the scene holds; {remedy}")
+
+    def _check_plane(self) -> None:
+        from msfp_gen.drive import plane_of
+
+        plane, until, what = plane_of(self)
+        if until < self.end:
+            where = "lies in no vertical plane" if until == 0 else f"leaves its vertical plane after {until:.6g} s"
+            azimuth = f", at azimuth {plane:.6g} rad" if what != "motion" else ""
+            raise InputError(
+                f"effects.dimension = 'planar': the {what} {where}{azimuth}; give effects.dimension = 'spatial'"
             )
 
 
@@ -168,8 +195,10 @@ _KINDS: dict[str, type | tuple[type, ...]] = {
     "bearing": Bearing,
     "motion": Motion,
     "top": Top,
-    "effects": Effects,
+    "effects": (Effects, Auto),
     "solver": Solver,
     "initial_state": (InitialState, type(None)),
     "stop": (Stop, type(None)),
+    "load": (Load, type(None)),
+    "top_rotation": (Rotation, type(None)),
 }

@@ -144,7 +144,7 @@ def _run(opened: Result | Scene) -> tuple[Result, RunError | None]:
 
     if isinstance(opened, Result):
         return opened, None
-    build_model(opened.bearing.layout, opened.effects, progress=note)
+    build_model(opened.bearing.layout, opened.modelled, progress=note)
     with Progress(opened.name or "run") as progress:
         try:
             return simulate(opened, progress=progress), None

@@ -60,7 +60,7 @@ def _result(source: str) -> Result:
     from msfp_gen.simulation import simulate
 
     scene = load_scene(source)
-    build_model(scene.bearing.layout, scene.effects, progress=note)
+    build_model(scene.bearing.layout, scene.modelled, progress=note)
     with Progress(scene.name or "run") as progress:
         return simulate(scene, progress=progress)
 
@@ -91,7 +91,7 @@ def bound(
     bounded_scenes(chosen, table)  # a table that does not fit is refused before anything is made
     if output is not None:
         make_folder(output, "--output")
-    build_model(chosen.bearing.layout, chosen.effects, progress=note)
+    build_model(chosen.bearing.layout, chosen.modelled, progress=note)
     with ExitStack() as stack:
         found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
     if as_json:

@@ -63,7 +63,7 @@ def _result(source: str) -> tuple[Result | None, RunError | None]:
     from msfp_gen.simulation import simulate
 
     scene = load_scene(source)
-    build_model(scene.bearing.layout, scene.effects, progress=note)
+    build_model(scene.bearing.layout, scene.modelled, progress=note)
     with Progress(scene.name or "run") as progress:
         try:
             return simulate(scene, progress=progress), None

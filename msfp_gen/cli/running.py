@@ -46,6 +46,9 @@ def run(
     duration: Annotated[
         float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this time.")
     ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Stop where what the model leaves out would matter.")
+    ] = False,
     checkpoint: CheckpointFile = None,
     every: Every = None,
     resume: ResumeFile = None,
@@ -61,7 +64,7 @@ def run(
     from msfp_gen.scenefile import load_scene
 
     chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json, keep):
+    for path in _run(chosen, output, plot, as_json, keep, strict):
         note(f"wrote {path}")
 
 
@@ -90,10 +93,15 @@ def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
 
 
 def _run(
-    scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False, keep: Keep = NOT_KEPT
+    scene: Scene,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool = False,
+    keep: Keep = NOT_KEPT,
+    strict: bool = False,
 ) -> list[Path]:
     """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
-    result, failure = _simulate(scene, keep)
+    result, failure = _simulate(scene, keep, strict)
     saved: list[Path] = []
     if result is not None:
         _report(result, as_json)
@@ -106,16 +114,16 @@ def _run(
     return saved
 
 
-def _simulate(scene: Scene, keep: Keep) -> tuple[Result | None, RunError | None]:
+def _simulate(scene: Scene, keep: Keep, strict: bool) -> tuple[Result | None, RunError | None]:
     """The result, and why the run failed if it did: what was computed until then is worth keeping."""
     from msfp_gen.build import build_model
     from msfp_gen.result import Result
     from msfp_gen.simulation import simulate
 
-    build_model(scene.bearing.layout, scene.effects, progress=note)
+    build_model(scene.bearing.layout, scene.modelled, progress=note)
     with Progress(scene.name or "run") as progress:
         try:
-            return simulate(scene, progress=progress, **keep.arguments), None
+            return simulate(scene, progress=progress, strict=strict, **keep.arguments), None
         except RunError as error:
             return error.result if isinstance(error.result, Result) else None, error
 
@@ -127,6 +135,8 @@ def _report(result: Result, as_json: bool) -> None:
     from msfp_gen.tables import summary_tables
 
     show(summary_tables(result))
+    for line in (entry.line for entry in result.notes):
+        note(line)
 
 
 def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:

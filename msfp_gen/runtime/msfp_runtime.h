@@ -42,6 +42,9 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 typedef struct {
     double base[3][6]; /* u_g1..3, psi_1, theta_1, phi_1; first and second derivatives */
     double load[6];    /* force and moment that the outside applies to the top plate at r_nn */
+#if MSFP_TURNED
+    double support[2][6]; /* psi, theta of what holds the top plate, then their rates; the rest is unused */
+#endif
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];
     double f[MSFP_NB][2];
 #if MSFP_HEAT
@@ -91,7 +94,8 @@ enum {
     MSFP_E_ANGLE,         /* theta near +-pi/2: the Euler angles are singular */
     MSFP_E_STEPS,         /* the allowed number of steps is used up */
     MSFP_E_FINITE,        /* a value is not finite */
-    MSFP_E_MEMORY
+    MSFP_E_MEMORY,
+    MSFP_E_GUARD          /* what the model leaves out would matter from here on: see run->guard */
 };
 
 /* The condensed equations: angular balances with interface forces summed from the top and contact in
@@ -135,6 +139,11 @@ int msfp_pulling(const msfp_work *w);
 /* How far the seat of surface j is compressed; negative: how far it is open. 1 where bodies cannot part. */
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 
+#if MSFP_TURNED
+/* The direction that the top plate is held to, and its angular velocity: block upright. */
+void msfp_held(const msfp_point *at, double *upright);
+#endif
+
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
 
 /* Named points (3.1)-(3.11) of bodies 0..NB: [body][bottom, centre of mass, top, sphere centre][r, v, a][3];
@@ -170,10 +179,25 @@ typedef struct {
     double stop_displacement;     /* 0: none */
     int stop_all_rims;
     int stop_at_knots;            /* the acceleration of the base has a kink at every knot: land on each */
+    double start_time;            /* a run that goes on from another, with its origin and its heat */
+    const double *origin;         /* [3] r_01 - r_nn at the start of the whole; NULL: where this one starts */
+    const double *heat;           /* [NB][MSFP_HEAT]; NULL: none */
+    int guards, guard_stop;       /* which watches look, and at which a run stops: bits of MSFP_GUARD_.. */
+    double guard_normal;          /* least normal force [N] */
+    double guard_inertia, guard_time; /* most inertial over normal force; time over which a velocity may change [s] */
+    double guard_rise;            /* most rise in temperature [K] */
+    double guard_heating[MSFP_NB]; /* sqrt(D/pi)/k over the area of contact [K s^1/2/J] */
 } msfp_options;
 
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
        MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
+
+/* Watches over what a model leaves out: guard.c. */
+enum { MSFP_GUARD_RIMS, MSFP_GUARD_UPLIFT, MSFP_GUARD_INERTIA, MSFP_GUARD_HEAT, MSFP_GUARDS };
+typedef struct {
+    double time, value; /* [s]; beyond the capacity [m], N [N], m a/N, rise [K] */
+    int surface;        /* 1-based; 0: not tripped */
+} msfp_trip;
 
 /* Integrals over the run, in order: work put in, recoverable friction, dissipated friction, rims, top dampers, seats. */
 enum { MSFP_WORK_INPUT, MSFP_WORK_FRICTION_STORED, MSFP_WORK_FRICTION, MSFP_WORK_RIM, MSFP_WORK_TOP, MSFP_WORK_SEAT, MSFP_WORKS };
@@ -231,6 +255,9 @@ typedef struct {
 typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
+#if MSFP_TURNED
+    msfp_history support;
+#endif
     const double *jumps;
     int jump_count;
     msfp_options options;
@@ -249,6 +276,10 @@ typedef struct {
     double events_now[MSFP_EVENTS]; /* event functions at the present state */
     double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
     int pivots[MSFP_DOF];
+    struct {
+        double velocity[MSFP_NB][3], energy[MSFP_NB], peak[MSFP_NB]; /* [m/s]; of the flux: [K s^1/2], [K/s^1/2] */
+        msfp_trip trips[MSFP_GUARDS];
+    } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
     long counts[MSFP_COUNTS];
@@ -264,6 +295,9 @@ typedef struct {
 
 /* Start a run: histories and jumps must outlive it. */
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+#if MSFP_TURNED
+                   const msfp_history *support,
+#endif
                    const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f);
 /* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
@@ -275,7 +309,11 @@ int msfp_run_restore(msfp_run *run, const char *state, const msfp_row *rows, siz
 void msfp_run_free(msfp_run *run);
 const char *msfp_status_name(int status);
 
+const char *msfp_guard_name(int guard);
+
 /* Between the files of the runtime. */
+/* Friction of one surface: mu N f . slip, added to what Y, Z store and what is lost (3.16)-(3.18). */
+void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);

@@ -12,7 +12,7 @@ static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
-    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory" };
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard" };
     return names[status];
 }
 
@@ -23,6 +23,9 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
         t = nextafter(run->jumps[run->next_jump], -INFINITY);
     msfp_history_at(&run->motion, t, 3, at->base);
     msfp_history_at(&run->load, t, 1, (double(*)[6])at->load);
+#if MSFP_TURNED
+    msfp_history_at(&run->support, t, 2, at->support);
+#endif
 }
 
 /* Absolute tolerance of a coordinate: the solver's for angles; a separation's that of the force it stands for, as for Y, Z. */
@@ -192,6 +195,9 @@ static int settle(msfp_run *run)
 }
 
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+#if MSFP_TURNED
+                   const msfp_history *support,
+#endif
                    const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f)
 {
@@ -199,13 +205,21 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     run->parameters = *p;
     run->motion = *motion;
     run->load = *load;
+#if MSFP_TURNED
+    run->support = *support;
+#endif
     run->jumps = jumps;
     run->jump_count = jump_count;
     run->options = *options;
     memcpy(run->now.q, q, sizeof run->now.q);
     memcpy(run->now.v, v, sizeof run->now.v);
     memcpy(run->now.f, f, sizeof run->now.f);
-    while (run->next_jump < jump_count && jumps[run->next_jump] <= 0.0)
+    run->now.t = options->start_time;
+#if MSFP_HEAT
+    if (options->heat)
+        memcpy(run->now.heat, options->heat, sizeof run->now.heat);
+#endif
+    while (run->next_jump < jump_count && jumps[run->next_jump] <= run->now.t)
         ++run->next_jump;
     run->status = settle(run);
     if (run->status)
@@ -213,12 +227,14 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     msfp_row row;
     msfp_observe_state(run, &run->now, &row);
     for (int i = 0; i < 3; ++i)
-        run->start[i] = row.base[i] - row.top[i];
-    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * options->duration);
+        run->start[i] = options->origin ? options->origin[i] : row.base[i] - row.top[i];
+    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * (options->duration - run->now.t));
     run->previous_error = 1.0;
     event_values(run, &run->now, run->events_now);
+    msfp_guard_begin(run);
     run->status = msfp_write_row(run, &run->now);
-    run->output_time = options->output_step;
+    if (options->output_step > 0.0)
+        run->output_time = options->output_step * (floor(run->now.t / options->output_step + 1e-9) + 1.0);
     return run->status;
 }
 
@@ -327,6 +343,10 @@ static int one_step(msfp_run *run)
     }
     if (fabs(run->next.t - target(run)) <= same_time(run->next.t)) /* land on the target exactly */
         run->next.t = target(run);
+    if (msfp_guarded(run, after)) {
+        run->status = MSFP_E_GUARD;
+        return 0;
+    }
     return accept(run, before, after, error, h);
 }
 
