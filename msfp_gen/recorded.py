@@ -81,22 +81,28 @@ def events_of(model: Model, run: Any, azimuth: float) -> tuple[Event, ...]:
     )
 
 
-def joined(parts: Sequence[History]) -> History:
+def joined(parts: Sequence[History], output_step: float | None = None) -> History:
     """Histories that follow each other, each starting where the one before ended, as one.
 
     The first row of a later part repeats the last of the one before, seen by another model: it is left out. Energies go
-    on from where they stood.
+    on from where they stood. output_step: of even rows [s], between which parts may meet; None: of every step.
     """
     if len(parts) == 1:
         return parts[0]
+    times = np.concatenate([parts[0].time, *(part.time[1:] for part in parts[1:])])
+    kept = np.ones(len(times), dtype=bool)
+    if output_step is not None:
+        meetings = np.cumsum([len(part.time) - (index > 0) for index, part in enumerate(parts[:-1])]) - 1
+        shares = times[meetings] / output_step
+        kept[meetings[np.abs(shares - np.round(shares)) > 1e-6]] = False
     rows: dict[str, Any] = {}
     for name in quantities():
         columns = [getattr(part, name) for part in parts]
         if columns[0] is not None:  # the law of friction is the same in all parts
-            rows[name] = np.concatenate([columns[0], *(column[1:] for column in columns[1:])])
+            rows[name] = np.concatenate([columns[0], *(column[1:] for column in columns[1:])])[kept]
     across = rows["base_displacement"] - rows["top_displacement"]
     rows["displacement"] = across - across[0]
-    return History(**rows, energy={name: _carried(parts, name) for name in parts[0].energy})
+    return History(**rows, energy={name: _carried(parts, name)[kept] for name in parts[0].energy})
 
 
 def _carried(parts: Sequence[History], name: str) -> Array:

@@ -53,7 +53,8 @@ class Begin:
 
     @classmethod
     def of(cls, model: Model, run: Any, azimuth: float) -> Begin:
-        """Where `run` stands now."""
+        """Where `run` stands now, which is recorded."""
+        run.record_now()
         state = run.state
         force = model.unpack(run.rows[-1:])["force"][0]
         return cls(run.time, azimuth, model.planar, force=force, **state)

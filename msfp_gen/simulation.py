@@ -106,7 +106,8 @@ def simulate(
         segment = _segment(scene, effects, segments, progress, (keep, every, again), strict)
         segments.append(segment)
         effects = None if strict else widened(scene, effects, segment)
-        notes += notes_of(scene, segment, effects)
+        said = {note.kind for note in notes if not note.action}
+        notes += [note for note in notes_of(scene, segment, effects) if note.action or note.kind not in said]
     last = segments[-1]
     if not len(last.run.rows):
         raise RunError(_message(scene, last), status=last.status)
@@ -214,7 +215,7 @@ def _result(scene: Scene, segments: list[Segment], notes: tuple[Note, ...]) -> R
     }
     return Result(
         scene=scene,
-        history=joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments]),
+        history=joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step),
         events=tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth)),
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,

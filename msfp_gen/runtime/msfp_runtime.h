@@ -306,6 +306,8 @@ int msfp_run_advance(msfp_run *run, long steps);
  * Returns 0, MSFP_E_MEMORY, or MSFP_E_FINITE for bytes that no run of this model leaves. */
 int msfp_run_restore(msfp_run *run, const char *state, const msfp_row *rows, size_t row_count,
                      const msfp_event *events, size_t event_count);
+/* Record the present state, if it is not: 0 or MSFP_E_MEMORY. */
+int msfp_write_now(msfp_run *run);
 void msfp_run_free(msfp_run *run);
 const char *msfp_status_name(int status);
 

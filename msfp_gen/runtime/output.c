@@ -121,6 +121,19 @@ static void measure(const msfp_run *run, msfp_row *row)
     }
 }
 
+double msfp_next_output(const msfp_run *run)
+{
+    const double step = run->options.output_step;
+    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->row_count);
+}
+
+int msfp_write_now(msfp_run *run)
+{
+    if (run->row_count && run->rows[run->row_count - 1].time >= run->now.t)
+        return MSFP_OK;
+    return msfp_write_row(run, &run->now);
+}
+
 static int write_between(msfp_run *run, double last)
 {
     msfp_row start, middle, end, *row;
@@ -132,7 +145,7 @@ static int write_between(msfp_run *run, double last)
         msfp_observe_state(run, &s, &middle);
         msfp_observe_state(run, &run->next, &end);
     }
-    for (; run->output_time <= last; run->output_time = run->options.output_step * (double)run->row_count) {
+    for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
         const double share = fmin(1.0, (run->output_time - run->now.t) / h);
         if (!(row = new_row(run)))
             return MSFP_E_MEMORY;

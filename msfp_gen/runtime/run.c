@@ -234,7 +234,7 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     msfp_guard_begin(run);
     run->status = msfp_write_row(run, &run->now);
     if (options->output_step > 0.0)
-        run->output_time = options->output_step * (floor(run->now.t / options->output_step + 1e-9) + 1.0);
+        run->output_time = msfp_next_output(run);
     return run->status;
 }
 

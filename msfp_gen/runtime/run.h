@@ -16,6 +16,8 @@ int msfp_guarded(msfp_run *run, const double *gaps);
 void msfp_guard_begin(msfp_run *run);
 /* 0 or MSFP_E_MEMORY. */
 int msfp_write_row(msfp_run *run, const msfp_state *s);
+/* Time of the next row where rows are wanted at even times. */
+double msfp_next_output(const msfp_run *run);
 int msfp_write_step(msfp_run *run);
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 
