@@ -1,13 +1,16 @@
-"""Draw the pictures of docs/figures.md: `python docs/make_figures.py`. Takes the folder to write into."""
+"""Draw the pictures of docs/figures.md and docs/tutorial.md: `python docs/make_figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import run_tutorial
 
 from msfp_gen import figures, load_scene, simulate
 from msfp_gen.records import baseline_corrected, bundled, response_spectrum
@@ -38,6 +41,15 @@ def draw_runs(folder: Path) -> None:
     figures.plot_section(test, folder / "gallery-circles.png", time=65.0, friction_circles=True)
     figures.plot_force_path(test, folder / "gallery-force-path.png", time=65.0)
     figures.animate(test, folder / "gallery-movie.gif", seconds=3.0, frames_per_second=6, start=173.6, end=243.0)
+
+
+def draw_tutorial(folder: Path) -> None:
+    """The pictures of the tutorial, by its own commands."""
+    with TemporaryDirectory() as name:
+        for _ in run_tutorial.follow(Path(name)):
+            pass
+        for picture in run_tutorial.PICTURES:
+            shutil.copy(Path(name) / picture, folder)
 
 
 def draw_record(folder: Path) -> None:
@@ -75,6 +87,7 @@ def draw_cost(folder: Path) -> None:
 def main(folder: Path = FOLDER) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     draw_runs(folder)
+    draw_tutorial(folder)
     draw_record(folder)
     draw_cost(folder)
     print(f"figures in {folder}")

@@ -15,6 +15,9 @@ SHORTEST, LONGEST = HEAT_TIMES
 """Times between which the sum is a fit [s]; after the last of them heat is forgotten."""
 HEAT_ERROR = 1.8e-3
 """Bound of the relative error between them."""
+HEAT_ONSET = 6e-3
+"""Bound of half the integral of |error| over [0, SHORTEST] [s^1/2]: what a flux that changes within that time adds, per
+unit of change (docs/friction.md)."""
 
 HEAT_KERNEL: tuple[tuple[float, float], ...] = (
     (6.0000000000e+03, 1.2078817073e+02),

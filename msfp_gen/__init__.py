@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from msfp_gen.layout import Auto, Effects, Layout
     from msfp_gen.motion import Motion
     from msfp_gen.prescribed import Load, Rotation
-    from msfp_gen.scene import Scene
+    from msfp_gen.scene import Scene, Stop
     from msfp_gen.scenefile import load_scene
     from msfp_gen.simulation import simulate
     from msfp_gen.solver import Solver
@@ -40,6 +40,7 @@ _HOMES = {
     "RunError": "errors",
     "Scene": "scene",
     "Solver": "solver",
+    "Stop": "scene",
     "Surface": "bearing",
     "Top": "top",
     "build_model": "build",
@@ -63,6 +64,7 @@ __all__ = [
     "RunError",
     "Scene",
     "Solver",
+    "Stop",
     "Surface",
     "Top",
     "__version__",

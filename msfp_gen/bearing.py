@@ -104,7 +104,8 @@ class Body:
 
 
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
-_CONSTANT = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping")
+_CONSTANT = ("radius", "capacity", "friction", "yield_displacement", "rim_stiffness", "rim_damping",
+             "seat_stiffness", "seat_damping")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -207,9 +208,9 @@ class Bearing:
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All numbers as float64 arrays.
 
-        Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping. Per body,
-        shape (n,), base first with mass and inertia 0: height, centroid, mass, inertia_transverse, inertia_axial,
-        rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
+        Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
+        seat_stiffness, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height, centroid, mass,
+        inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
         """
         base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
         base = (self.base_height, base_centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)

@@ -26,7 +26,8 @@ from msfp_gen.errors import CompileError, InputError
 from msfp_gen.layout import Effects, Layout, ModelSpec
 from msfp_gen.model import Model
 
-Progress = Callable[[str], None]
+Progress = Callable[[str, float], None]
+GENERATED = 0.13  # share of a build that deriving, lowering and emitting takes; the rest is the compiler
 
 _models: dict[ModelSpec, Model] = {}
 _models_lock = threading.Lock()
@@ -62,7 +63,7 @@ def build_model(layout: Layout, effects: Effects | None = None, *, progress: Pro
     layout, effects
         What determines the equations; `effects=None` means `Effects()`.
     progress
-        Called with a line of text before each long stage.
+        Called with what is being done and how much of the build is done, 0 to 1; None: silent.
 
     Raises
     ------
@@ -149,12 +150,14 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
     """Derive, lower, emit and compile into `folder`, and sign it with a manifest."""
     from msfp_gen.generator import generate
 
-    say(f"deriving and emitting {entry.spec.key}")
+    say(f"deriving and emitting {entry.spec.key}", 0.0)
     generated = generate(entry.spec, entry.module)
     sources = {**runtime_sources(), **generated.files}
-    say(f"compiling {entry.module} ({len(sources)} files)")
     begin = perf_counter()
-    extension = compile_extension(sources, entry.module, folder)
+    extension = compile_extension(
+        sources, entry.module, folder, lambda done, count: say(f"compiling {entry.module} ({done} of {count} files)",
+                                                               GENERATED + (1 - GENERATED) * done / count),
+    )  # fmt: skip
     manifest = cache.Manifest(
         module=entry.module, spec=entry.spec.key, key=entry.key, inputs=entry.inputs, extension=extension.name,
         files={path.name: cache.digest(path) for path in sorted(folder.iterdir())},
@@ -196,5 +199,5 @@ def _replace(source: Path, target: Path) -> None:
     part.replace(target)
 
 
-def _silent(_: str) -> None:
+def _silent(_: str, __: float) -> None:
     """Progress that nobody asked for."""

@@ -141,8 +141,8 @@ class Entry:
         return manifest if sound else None
 
     @contextmanager
-    def building(self, progress: Callable[[str], None]) -> Iterator[Path]:
-        """Hold the lock and offer an empty folder to build in, for `publish`.
+    def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
+        """Hold the lock and offer an empty folder to build in, for `publish`; `progress` as of `build_model`.
 
         After an error the folder stays, with its sources and log, until the next build of the entry.
         """
@@ -155,7 +155,7 @@ class Entry:
             try:
                 lock.acquire(timeout=0)
             except Timeout:
-                progress(f"waiting for another process that builds {self.module}")
+                progress(f"waiting for another process that builds {self.module}", 0.0)
                 lock.acquire()
         try:
             with writing(self.folder.parent):

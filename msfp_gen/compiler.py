@@ -14,8 +14,8 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
@@ -95,7 +95,9 @@ def check_headers() -> Path:
     return include
 
 
-def compile_extension(sources: dict[str, str], module: str, folder: Path) -> Path:
+def compile_extension(
+    sources: dict[str, str], module: str, folder: Path, progress: Callable[[int, int], None] | None = None
+) -> Path:
     """Write `sources` into `folder` and build the extension `module` there.
 
     Parameters
@@ -106,6 +108,8 @@ def compile_extension(sources: dict[str, str], module: str, folder: Path) -> Pat
         Name under which the extension is imported.
     folder
         A folder of the caller's; sources, `build.log` and the extension stay there, also after a failure.
+    progress
+        Called with how many C files are compiled, and how many there are.
 
     Returns
     -------
@@ -124,7 +128,10 @@ def compile_extension(sources: dict[str, str], module: str, folder: Path) -> Pat
         (folder / name).write_text(text, encoding="utf-8")
     log = Log(folder)
     units = sorted(name for name in sources if name.endswith(".c"))
-    _at_once([_wrapper(module, compiler, include), *([_unit(name, compiler)] for name in units)], log.run)
+    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler)] for name in units)]
+    for done in _at_once(chains, log.run):
+        if progress is not None:
+            progress(done, len(chains))
     objects = [_object(name) for name in [*units, f"{module}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_linker(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
@@ -166,8 +173,8 @@ def first_error(output: str, code: int) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
 
 
-def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> None:
-    """Run every chain, `JOBS` of them at a time; after a failure no further chain is started."""
+def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
+    """Run every chain, `JOBS` of them at a time, and count them as they end; after a failure none is started."""
 
     def follow(chain: Sequence[Step]) -> None:
         for step in chain:
@@ -176,8 +183,10 @@ def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> N
     with ThreadPoolExecutor(JOBS) as pool:
         tasks = [pool.submit(follow, chain) for chain in chains]
         try:
-            for task in tasks:
+            yield 0
+            for count, task in enumerate(as_completed(tasks), start=1):
                 task.result()
+                yield count
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

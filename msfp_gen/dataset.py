@@ -101,10 +101,11 @@ def read_result(path: str | Path) -> Result:
 
 
 def _rows(history: History) -> Variables:
-    for field, rows in quantities().items():
-        if field == "time" or getattr(history, field) is None:
+    for field, values in history.arrays().items():
+        if field == "time":
             continue
-        values, dims, names = getattr(history, field), ("time", *rows.dims), rows.names or (field,)
+        rows = quantities()[field]
+        dims, names = ("time", *rows.dims), rows.names or (field,)
         split = len(names) > 1  # one variable a component
         for column, name in enumerate(names):
             about = {"units": rows.unit, "long_name": rows.meaning.format(name)}

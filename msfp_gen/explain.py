@@ -10,7 +10,7 @@ import numpy as np
 
 from msfp_gen.bearing import Surface
 from msfp_gen.fields import Quantity, ruled_fields
-from msfp_gen.friction_laws import numbers
+from msfp_gen.law_numbers import numbers
 from msfp_gen.tables import Table, vector, yes
 
 if TYPE_CHECKING:

@@ -91,7 +91,7 @@ class History:
     energy: dict[str, Array]
     # Of models whose friction follows a law, and of those in which it heats; else None.
     friction_coefficient: Annotated[
-        Array | None, Rows(("surface",), "1", "friction coefficient mu", ("friction",))
+        Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")
     ] = None
     temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
 
@@ -99,9 +99,8 @@ class History:
         if not len(self.time):
             raise InputError("history.time has no rows: give at least the start of the run")
         surfaces = self.normal_force.shape[-1]
-        for name, rows in quantities().items():
-            if (values := getattr(self, name)) is not None:
-                self._check(name, values, self._shape(rows.dims, surfaces))
+        for name, values in self.arrays().items():
+            self._check(name, values, self._shape(quantities()[name].dims, surfaces))
         if set(self.energy) != set(ENERGY):
             raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(ENERGY)}")
         for name, values in self.energy.items():
@@ -116,6 +115,11 @@ class History:
     def horizontal(self) -> Array:
         """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
         return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
+
+    def arrays(self) -> dict[str, Array]:
+        """The arrays of this run by field; what its model does not have is not among them."""
+        found = {name: getattr(self, name) for name in quantities()}
+        return {name: values for name, values in found.items() if values is not None}
 
     def _shape(self, dims: tuple[str, ...], surfaces: int) -> tuple[int, ...]:
         return (len(self.time), *(surfaces if dim in STACK else len(LABELS[dim]) for dim in dims))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.friction_laws import check_bearing, numbers
+from msfp_gen.law_numbers import check_bearing, numbers
 from msfp_gen.layout import ModelSpec
 from msfp_gen.packing import Array, bodies_and_surfaces, top_values, vector
 from msfp_gen.plane import State, into_plane, out_of_plane

@@ -8,6 +8,7 @@ import numpy as np
 
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.packing import Array, load_values
+from msfp_gen.piecewise import derivatives
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
@@ -50,23 +51,39 @@ class Ode:
         return np.ascontiguousarray(q, float), np.ascontiguousarray(v, float), np.ascontiguousarray(h, float)
 
     def _base(self, t: float) -> Array:
-        return np.ascontiguousarray([self.motion.evaluate(t, order) for order in range(3)], dtype=float)
+        """Displacement, velocity and acceleration of the base; `fun` is called tens of thousands of times."""
+        knots, coefficients = self.motion.knots, self.motion.coefficients
+        if not 0 <= t <= knots[-1]:
+            self.motion.evaluate(t)  # says what is wrong
+        piece = min(int(np.searchsorted(knots, t, side="right")) - 1, len(knots) - 2)
+        return np.ascontiguousarray(derivatives(float(t - knots[piece])) @ coefficients[piece].T)
+
+    def _accelerations(self, t: float, y: Array) -> tuple[Array, Array, Array, int]:
+        """Accelerations, the recorded row, friction rates and Newton iterations. RunError where there are none."""
+        q, v, h = self._split(np.asarray(y))
+        status, a, row, rates, _, iterations, *_ = self.stack.accelerations(q, v, h, self._base(t), self.load)
+        if status != "ok":
+            raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
+        return a, row, rates, iterations
 
     def fun(self, t: float, y: Array) -> Array:
         """State derivative, shape (8(n-1),). Raises RunError where no acceleration is found."""
-        q, v, h = self._split(np.asarray(y))
-        status, a, _, rates, *_ = self.stack.accelerations(q, v, h, self._base(t), self.load)
-        if status != "ok":
-            raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
-        return np.concatenate([v.ravel(), a.ravel(), rates.ravel()])
+        return self.rates(t, y)[0]
+
+    def rates(self, t: float, y: Array) -> tuple[Array, int]:
+        """`fun`, and the Newton iterations that it took."""
+        a, _, rates, iterations = self._accelerations(t, y)
+        return np.concatenate([self._split(np.asarray(y))[1].ravel(), a.ravel(), rates.ravel()]), iterations
+
+    def observe(self, t: float, y: Array) -> dict[str, Array]:
+        """Everything that a run records of this state, by the names of the runtime. Raises RunError as `fun` does."""
+        return self.model.unpack(self._accelerations(t, y)[1])
 
     def jac(self, t: float, y: Array) -> Array:
         """D fun / d y, shape (8(n-1), 8(n-1))."""
         q, v, h = self._split(np.asarray(y))
         base = self._base(t)
-        status, a, row, *_ = self.stack.accelerations(q, v, h, base, self.load)
-        if status != "ok":
-            raise RunError(f"as_ode: {status} at t = {t:.6g} s", status=status)
+        a, row, *_ = self._accelerations(t, y)
         # The solution of `fun` itself: Newton on the report's balances might end on another root.
         found, keep = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
         angles = found["angles"][:, 1:] if self.model.planar else found["angles"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from msfp_gen.errors import InputError
-from msfp_gen.friction_laws import numbers
+from msfp_gen.law_numbers import numbers
 from msfp_gen.top import MassTop, PrescribedTop, RigTop, Top
 
 if TYPE_CHECKING:

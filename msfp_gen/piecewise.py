@@ -31,6 +31,15 @@ class Pieces(NamedTuple):
 _FALLING = np.array([[factorial(j) / factorial(j - d) if j >= d else 0.0 for j in range(ORDER)] for d in range(ORDER)])
 
 
+def derivatives(local: float, orders: int = 3) -> Array:
+    """Rows that turn the coefficients of one piece into its value and derivatives at `local` time: (orders, 6)."""
+    powers = local ** np.arange(ORDER)
+    rows = np.zeros((orders, ORDER))
+    for order in range(orders):
+        rows[order, order:] = _FALLING[order, order:] * powers[: ORDER - order]
+    return rows
+
+
 def evaluate(knots: Array, coefficients: Array, time: Array, derivative: int = 0) -> Array:
     """Values or derivatives at `time`, shape (...): ndarray, shape (..., channels); at a knot, of the later piece."""
     last = len(knots) - 2

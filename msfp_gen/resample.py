@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.errors import InputError
-from msfp_gen.history import Array, History, quantities
+from msfp_gen.history import Array, History
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -22,7 +22,8 @@ def at_times(result: Result, times: ArrayLike) -> Result:
     """
     history = result.history
     when = _checked(history.time, times)
-    rows: dict[str, Any] = {name: _interpolated(history.time, getattr(history, name), when) for name in quantities()}
+    columns = history.arrays().items()
+    rows: dict[str, Any] = {name: _interpolated(history.time, values, when) for name, values in columns}
     energy = {name: _interpolated(history.time, values, when) for name, values in history.energy.items()}
     return replace(result, history=History(**rows | {"time": when}, energy=energy))
 

@@ -1,8 +1,9 @@
 """Where the bodies of a stack are at any instant of a run, and the line of the force that each surface carries.
 
-Everything follows from the recorded angles and the lengths of the bearing: sphere centres are joints, so the bodies fit
-at any angles (report (2.1)-(2.25), (3.4)-(3.11)). No compiled model is needed. The frame is that of E1, E2, E3 with its
-origin in the bottom middle of the base, which it follows.
+Everything follows from the recorded angles and the lengths of the bearing: sphere centres are joints, so the bodies
+fit at any angles (report (2.1)-(2.25), (3.4)-(3.11)); where bodies may part, the recorded separation of the two
+centres comes on top (docs/uplift.md). No compiled model is needed. The frame is that of E1, E2, E3 with its origin in
+the bottom middle of the base, which it follows.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.history import Array
-from msfp_gen.stages import Flags
+from msfp_gen.stages import Flags, parted
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
@@ -28,11 +29,11 @@ class Poses:
         basis: ndarray, shape (T, n, 3, 3): rows t_1, t_2, t_3 of every body, without its spin (2.1)-(2.6).
         spin: ndarray, shape (T, n), [rad]: phi of every body about its own t_3 (2.27).
         bottom, top: ndarray, shape (T, n, 3): middles of the lower and upper face of every body.
-        centre: ndarray, shape (T, n-1, 3): sphere centres r_gc.
+        centre: ndarray, shape (T, n-1, 3): sphere centres r_gc; where bodies may part, that of the slider.
         contact: ndarray, shape (T, n-1, 3): where the normal force acts (3.14).
         rim: ndarray, shape (T, n-1, 3): the point of the slider next to the rim (3.25); on its axis where centred.
         at_rim: ndarray of bool, shape (T, n-1): whether the rim pushes.
-        force: ndarray, shape (T, n-1, 3), [N]: what the surface exerts on the body above.
+        force: ndarray, shape (T, n-1, 3), [N]: what the surface exerts on the body above; 0 while it is open.
         line: ndarray, shape (T, n-1, 3): the point of that force's line of action next to the sphere centre.
     """
 
@@ -57,12 +58,13 @@ def poses(result: Result) -> Poses:
     base = motion.rotation(np.clip(history.time, 0.0, motion.duration))
     angles = np.concatenate([base[:, None], history.tilt_angles], axis=1)
     basis = turned(angles)
-    bottom, top, centre = stacked(bearing, basis)
+    bottom, top, centre = stacked(bearing, basis, history.separation)
     signs = np.array(bearing.layout.signs, float)[:, None]
     normal = _rotated(history.contact_angles, basis[:, :-1])[..., 2, :]  # t~_3 (3.13)
     contact = centre - signs * bearing.arrays()["radius"][:, None] * normal  # (3.14), concave down: + R
     rim, toward = _rims(bearing, basis, bottom, top)
-    force, pushed = history.interface_force, -history.rim_force[..., None] * toward  # (3.22) on the body above
+    force = np.where(parted(history)[..., None], 0.0, history.interface_force)
+    pushed = -history.rim_force[..., None] * toward  # (3.22) on the body above
     moment = np.cross(contact - centre, force - pushed) + np.cross(rim - centre, pushed)
     size = np.sum(force * force, axis=-1, keepdims=True)
     line = np.divide(np.cross(force, moment), size, out=contact - centre, where=size > 0) + centre
@@ -83,10 +85,11 @@ def turned(angles: Array) -> Array:
     return basis
 
 
-def stacked(bearing: Bearing, basis: Array) -> tuple[Array, Array, Array]:
+def stacked(bearing: Bearing, basis: Array, separation: Array) -> tuple[Array, Array, Array]:
     """Middles of the lower and upper faces, each shape (T, n, 3), and sphere centres, shape (T, n-1, 3), [m].
 
-    basis: ndarray, shape (T, n, 3, 3), as of `turned`.
+    basis: ndarray, shape (T, n, 3, 3), as of `turned`. separation: ndarray, shape (T, n-1, 3), [m], of the sphere
+    centre of the body above from that of the body below; zero where they are joined. Centres are those of the sliders.
     """
     lengths = bearing.arrays()
     axis = basis[:, :, 2]
@@ -94,8 +97,10 @@ def stacked(bearing: Bearing, basis: Array) -> tuple[Array, Array, Array]:
     for body, height in enumerate(lengths["height"]):
         if body:
             arm = bearing.layout.signs[body - 1] * lengths["radius"][body - 1]
-            centre[:, body - 1] = top[:, body - 1] + arm * axis[:, body - 1]
-            bottom[:, body] = centre[:, body - 1] - arm * axis[:, body]
+            below = top[:, body - 1] + arm * axis[:, body - 1]
+            above = below + separation[:, body - 1]
+            centre[:, body - 1] = above if bearing.slider(body - 1) == body else below
+            bottom[:, body] = above - arm * axis[:, body]
         top[:, body] = bottom[:, body] + height * axis[:, body]
     return bottom, top, centre
 

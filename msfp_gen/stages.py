@@ -1,4 +1,4 @@
-"""Which surfaces slide when, and which rest on their rims."""
+"""Which surfaces slide when, which rest on their rims, and which are open."""
 
 from __future__ import annotations
 
@@ -16,14 +16,20 @@ Flags = NDArray[np.bool_]
 def sliding_now(history: History) -> Flags:
     """Whether each surface slides in each row, ndarray of bool, shape (T, n-1).
 
-    It does where its friction is overcome, |(Y, Z)| >= `YIELDED` (2.94), acts against the slip, and the surface does at
-    least `SHARE` of all sliding of that instant.
+    It does where its friction is overcome, |(Y, Z)| >= `YIELDED` (2.94), acts against the slip, and the surface is
+    closed and does at least `SHARE` of all sliding of that instant.
     """
     state, slip = history.friction_state, history.slip_velocity
-    speed = np.linalg.norm(slip, axis=-1)
+    speed = np.where(parted(history), 0.0, np.linalg.norm(slip, axis=-1))
     overcome = np.linalg.norm(state, axis=-1) >= YIELDED
     against = np.sum(state * slip, axis=-1) > 0
-    flags: Flags = overcome & against & (speed >= SHARE * speed.sum(axis=1, keepdims=True))
+    flags: Flags = overcome & against & (speed >= SHARE * speed.sum(axis=1, keepdims=True)) & ~parted(history)
+    return flags
+
+
+def parted(history: History) -> Flags:
+    """Whether each surface is open in each row, ndarray of bool, shape (T, n-1); never without `effects.uplift`."""
+    flags: Flags = history.lift > 0
     return flags
 
 

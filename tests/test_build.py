@@ -80,12 +80,14 @@ def entry_of(models: Path) -> Path:
 
 
 def test_cold_build_keeps_sources_log_and_manifest() -> None:
-    said: list[str] = []
-    info = build.prepare(SPEC, said.append)
+    said: list[tuple[str, float]] = []
+    info = build.prepare(SPEC, lambda *told: said.append(told))
     assert not info.cached
     assert {key: info.stages[key] for key in fake_model.STAGES} == fake_model.STAGES
     assert 0 < info.stages["compile"] < info.seconds
-    assert [line.split()[0] for line in said] == ["deriving", "compiling"]
+    words, shares = [text.split()[0] for text, _ in said], [share for _, share in said]
+    assert words == ["deriving", *["compiling"] * 4] and said[-1][0].endswith("(3 of 3 files)")
+    assert shares[0] == 0 and shares == sorted(shares) and shares[-1] == 1
     log = (info.folder / "build.log").read_text()
     assert "-Wextra" in log and "-m cython" in log and "[exit 0]" in log
     manifest = cache.Manifest.read(info.folder)

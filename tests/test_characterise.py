@@ -110,6 +110,9 @@ def test_velocity_heat_and_capacity_by_hand() -> None:
 
 def test_uplift_is_read_where_the_run_has_it() -> None:
     run = bilinear()
+    assert characterise(run).maximum_uplift is None
+    effects = dataclasses.replace(run.scene.effects, uplift=True)
+    run = dataclasses.replace(run, scene=dataclasses.replace(run.scene, effects=effects))
     lift = np.zeros((len(run.history.time), 1))
     lift[7] = 0.004
     object.__setattr__(run.history, "lift", lift)
@@ -146,9 +149,8 @@ def _held(run: Result) -> Result:
     """The same run with its last row held for as long again."""
     rows = run.history
     columns: dict[str, Any] = {
-        field.name: np.concatenate([getattr(rows, field.name), np.repeat(getattr(rows, field.name)[-1:], 300, axis=0)])
-        for field in dataclasses.fields(rows) if field.name not in ("time", "energy")
-    }  # fmt: skip
+        name: np.concatenate([values, np.repeat(values[-1:], 300, axis=0)]) for name, values in rows.arrays().items()
+    }
     columns["time"] = np.append(rows.time, rows.time[-1] + np.linspace(0.01, 2, 300))
     columns["energy"] = {name: np.append(e, np.repeat(e[-1], 300)) for name, e in rows.energy.items()}
     return dataclasses.replace(run, history=dataclasses.replace(rows, **columns))

@@ -13,7 +13,7 @@ import typer.main
 
 from msfp_gen import load_scene
 from msfp_gen.cli import app, main
-from msfp_gen.cli.console import Progress, scenes
+from msfp_gen.cli.console import Progress, building, scenes
 
 ROOT = typer.main.get_command(app)
 COMMANDS = sorted(ROOT.commands)
@@ -83,3 +83,23 @@ def test_progress_says_how_long_it_still_takes(capsys, monkeypatch):
         update(2.5, 10.0)
     err = capsys.readouterr().err
     assert "long: 10 %\r" in err and "long: 25 %, 12 s left" in err
+
+
+def test_progress_of_a_build_says_what_is_done_and_how_long_it_takes(capsys, monkeypatch):
+    clock = iter([0.0, 0.0, 0.0, 1.0, 4.0, 5.1])
+    monkeypatch.setattr("msfp_gen.cli.console.monotonic", lambda: next(clock))
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with building() as tell:
+        tell("deriving 7_3_3", 0.0)
+        tell("compiling (0 of 2 files)", 0.25)
+        tell("compiling (1 of 2 files)", 0.5)
+    err = capsys.readouterr().err.replace("\r\x1b[K", "\n").splitlines()
+    stages = ["deriving 7_3_3: 0 %", "compiling (0 of 2 files): 25 %", "compiling (1 of 2 files): 50 %, 4 s left"]
+    assert err[1:4] == stages
+    assert err[-1] == "built in 5.1 s; from now on it comes from the cache"
+
+
+def test_nothing_is_said_of_a_model_that_is_there(capsys):
+    with building():
+        pass
+    assert capsys.readouterr().err == ""

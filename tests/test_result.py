@@ -27,7 +27,7 @@ def still(surfaces: int = 1, rows: int = 3) -> Result:
 def test_dataset_has_every_quantity_with_unit_and_meaning():
     result = loops()
     dataset = result.dataset
-    names = {name for field, rows in quantities().items() for name in rows.names or (field,)} - {"time"}
+    names = {name for field in result.history.arrays() for name in quantities()[field].names or (field,)} - {"time"}
     assert names | {f"energy_{name}" for name in ENERGY} <= set(dataset.data_vars)
     for name in ("displacement", "top_force", "sliding", "tilt", "normal_force", "gap", "Y", "Z"):
         assert dataset[name].attrs["units"] and dataset[name].attrs["long_name"]

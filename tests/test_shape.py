@@ -31,7 +31,7 @@ def test_stack_stands_where_the_reference_puts_it(layout):
     values, state, _, _ = random_case(layout, 1)
     at = reference_points(values, state, rotation(state)).r
     angles = np.vstack([state.base.angles, state.q])[None]
-    bottom, top, centre = (x[0] for x in stacked(bearing_of(values), turned(angles)))
+    bottom, top, centre = (x[0] for x in stacked(bearing_of(values), turned(angles), np.zeros((1, layout[0] - 1, 3))))
     for body in range(1, layout[0] + 1):
         before = "01" if body == 1 else f"{body - 1}{body}"
         assert bottom[body - 1] == pytest.approx(at[before] - at["01"], abs=1e-12)

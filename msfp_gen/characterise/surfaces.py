@@ -41,7 +41,6 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
     speed = np.linalg.norm(history.slip_velocity[rows], axis=2)
     power = friction_coefficient(result)[rows] * history.normal_force[rows] * speed
     heat = np.trapezoid(power, history.time[rows], axis=0)
-    lift: Array | None = getattr(history, "lift", None)
     found = []
     for i, surface in enumerate(bearing.surfaces):
         left, area = float(history.gap[rows, i].min()), _contact_area(result, i)
@@ -50,14 +49,14 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
             float(power[:, i].max()) / area if area else None,
             float(heat[i]) / area if area else None,
             area,
-            None if lift is None else float(lift[rows, i].max()),
+            float(history.lift[rows, i].max()) if result.scene.effects.uplift else None,
         ))  # fmt: skip
     return tuple(found)
 
 
 def _contact_area(result: Result, surface: int) -> float | None:
     bearing = result.scene.bearing
-    patch: float | None = getattr(bearing.surfaces[surface], "patch_radius", None)
+    patch = bearing.surfaces[surface].patch_radius
     radius = bearing.slider_rim_radius(surface) if patch is None else patch
     return pi * radius**2 if radius > 0 else None
 
@@ -65,8 +64,7 @@ def _contact_area(result: Result, surface: int) -> float | None:
 def friction_coefficient(result: Result) -> Array:
     """Coefficient mu of every surface, shape (T, n-1): recorded where the law varies, else the bearing's."""
     history = result.history
-    recorded: Array | None = getattr(history, "friction_coefficient", None)
-    if recorded is not None:
-        return recorded
+    if history.friction_coefficient is not None:
+        return history.friction_coefficient
     constant = np.array([surface.friction for surface in result.scene.bearing.surfaces])
     return np.broadcast_to(constant, history.normal_force.shape)

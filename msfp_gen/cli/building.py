@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli.console import SceneName, note, show, whole, words
+from msfp_gen.cli.console import SceneName, building, show, whole, words
 from msfp_gen.layout import Effects, Layout, ModelSpec
 
 app = typer.Typer()
@@ -40,7 +40,8 @@ def generate(
     from msfp_gen.build import generate_to, prepare
     from msfp_gen.tables import build_table
 
-    info = prepare(spec, note) if output is None else generate_to(spec, output, note)
+    with building() as progress:
+        info = prepare(spec, progress) if output is None else generate_to(spec, output, progress)
     show([build_table(info)])
 
 

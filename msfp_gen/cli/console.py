@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -87,24 +88,44 @@ def show(tables: Iterable[Table]) -> None:
 
 
 class Progress:
-    """How far a run is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
+    """How far long work is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
 
     def __init__(self, name: str) -> None:
-        self._name = printable(name)
-        self._shown = -1
+        self.name = printable(name)
+        self._shown = ("", -1)
         self._begin = monotonic()
 
     def __enter__(self) -> Callable[[float, float], None] | None:
         return self._update if sys.stderr.isatty() else None
 
     def __exit__(self, *_: object) -> None:
-        if self._shown >= 0:
+        if self._shown[1] >= 0:
             typer.echo("\r\x1b[K", nl=False, err=True)
 
     def _update(self, time: float, end: float) -> None:
         percent = int(100 * time / end)
-        if percent > self._shown:
-            self._shown = percent
+        if (self.name, percent) != self._shown:
+            self._shown = self.name, percent
             elapsed = monotonic() - self._begin
             left = f", {elapsed * (end / time - 1):.0f} s left" if elapsed > 1 and time > 0 else ""
-            typer.echo(f"\r\x1b[K{self._name}: {percent} %{left}", nl=False, err=True)
+            typer.echo(f"\r\x1b[K{self.name}: {percent} %{left}", nl=False, err=True)
+
+
+@contextmanager
+def building() -> Iterator[Callable[[str, float], None]]:
+    """Progress of a build: what is being done, and how far it is; a line as each stage begins without a terminal."""
+    stage, line, begin = "", Progress(""), monotonic()
+
+    def tell(doing: str, share: float) -> None:
+        nonlocal stage
+        if update is not None:
+            line.name = printable(doing)
+            update(share, 1.0)
+        elif doing.partition(" ")[0] != stage:
+            note(doing)
+        stage = doing.partition(" ")[0]
+
+    with line as update:
+        yield tell
+    if stage == "compiling":
+        note(f"built in {monotonic() - begin:.1f} s; from now on it comes from the cache")

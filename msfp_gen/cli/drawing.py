@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, note, number, whole
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.cli.opening import looked_at, opened
+from msfp_gen.errors import InputError
 from msfp_gen.output import FIGURE_SUFFIXES, check_output, make_folder
 
 if TYPE_CHECKING:
@@ -56,9 +57,9 @@ def plot(
     angle = None if azimuth is None else math.radians(azimuth)
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
-    opened = _opened(source)
+    given = _opened(source)
     make_folder(next(iter(targets.values())).parent, "--output")
-    result, failure = _run(opened)
+    result, failure = looked_at(given)
     from msfp_gen.figures import FIGURES, plot_force_path, plot_section
     from msfp_gen.resample import at_times
 
@@ -98,7 +99,7 @@ def animate(
     from msfp_gen.figures import check_movie
 
     check_movie(output, "--output")
-    result, failure = _run(_opened(source))
+    result, failure = looked_at(_opened(source))
     angle = None if azimuth is None else math.radians(azimuth)
     with Progress("frames") as progress:
         film(result, output, seconds=seconds, frames_per_second=rate, start=start, end=end, azimuth=angle,
@@ -129,29 +130,11 @@ def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], u
 
 
 def _opened(source: str) -> Result | Scene:
-    """A saved result, or a scene to run."""
+    """A saved result, or a scene to run for its figures."""
     from msfp_gen.result import Result
-    from msfp_gen.scenefile import load_scene
 
-    return Result.from_netcdf(source) if source.lower().endswith(".nc") else _drawable(load_scene(source))
-
-
-def _run(opened: Result | Scene) -> tuple[Result, RunError | None]:
-    """The result, and why its run failed if it did: what was computed until then is worth drawing."""
-    from msfp_gen.build import build_model
-    from msfp_gen.result import Result
-    from msfp_gen.simulation import simulate
-
-    if isinstance(opened, Result):
-        return opened, None
-    build_model(opened.bearing.layout, opened.modelled, progress=note)
-    with Progress(opened.name or "run") as progress:
-        try:
-            return simulate(opened, progress=progress), None
-        except RunError as error:
-            if not isinstance(error.result, Result):
-                raise
-            return error.result, error
+    given = opened(source)
+    return given if isinstance(given, Result) else _drawable(given)
 
 
 def _drawable(scene: Scene) -> Scene:

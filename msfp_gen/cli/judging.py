@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.opening import build, looked_at, opened
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
     from msfp_gen.bounding import Bounds
-    from msfp_gen.result import Result
 
 app = typer.Typer()
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
@@ -40,29 +40,16 @@ def characterise(
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")
-    found = judge(_result(source))
+    result, failure = looked_at(opened(source))
+    if failure is not None:
+        raise failure
+    found = judge(result)
     if as_json:
         say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
         show(characterisation_tables(found))
     if output is not None:
         note(f"wrote {write_csv(found, output)}")
-
-
-def _result(source: str) -> Result:
-    """A saved result, or the run of a scene."""
-    if source.lower().endswith(".nc"):
-        from msfp_gen.dataset import read_result
-
-        return read_result(source)
-    from msfp_gen.build import build_model
-    from msfp_gen.scenefile import load_scene
-    from msfp_gen.simulation import simulate
-
-    scene = load_scene(source)
-    build_model(scene.bearing.layout, scene.modelled, progress=note)
-    with Progress(scene.name or "run") as progress:
-        return simulate(scene, progress=progress)
 
 
 @app.command(
@@ -83,7 +70,6 @@ def bound(
     from msfp_gen.bounding import bound as run_bounds
     from msfp_gen.bounding import bounded_scenes, load_factors
     from msfp_gen.bounding.tables import bounding_tables
-    from msfp_gen.build import build_model
     from msfp_gen.output import make_folder
     from msfp_gen.scenefile import load_scene
 
@@ -91,7 +77,7 @@ def bound(
     bounded_scenes(chosen, table)  # a table that does not fit is refused before anything is made
     if output is not None:
         make_folder(output, "--output")
-    build_model(chosen.bearing.layout, chosen.modelled, progress=note)
+    build(chosen)
     with ExitStack() as stack:
         found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
     if as_json:

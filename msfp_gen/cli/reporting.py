@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, whole
+from msfp_gen.cli.console import note, whole
+from msfp_gen.cli.opening import looked_at, opened
 from msfp_gen.errors import InputError, RunError
 
-if TYPE_CHECKING:
-    from msfp_gen.result import Result
-
 app = typer.Typer()
+MOST = 5000  # instants; more would make a page of tens of megabytes
 
 
 @app.command(
@@ -39,33 +38,8 @@ def report(
     if not 2 <= count <= MOST:
         raise InputError(f"--frames = {count}: give 2 to {MOST}")
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
-    result, failure = _result(source)
-    if result is None:
-        assert failure is not None
-        raise failure
+    result, failure = looked_at(opened(source))
     write_report(result, path, count)
     note(f"wrote {path}")
     if failure is not None:
         raise RunError(f"{failure}; the report of what was computed until then is in {path}", status=failure.status)
-
-
-MOST = 5000  # instants; more would make a page of tens of megabytes
-
-
-def _result(source: str) -> tuple[Result | None, RunError | None]:
-    """A saved result, or the run of a scene; a run that failed is worth a report too."""
-    from msfp_gen.result import Result
-
-    if source.lower().endswith(".nc"):
-        return Result.from_netcdf(source), None
-    from msfp_gen.build import build_model
-    from msfp_gen.scenefile import load_scene
-    from msfp_gen.simulation import simulate
-
-    scene = load_scene(source)
-    build_model(scene.bearing.layout, scene.modelled, progress=note)
-    with Progress(scene.name or "run") as progress:
-        try:
-            return simulate(scene, progress=progress), None
-        except RunError as error:
-            return error.result if isinstance(error.result, Result) else None, error

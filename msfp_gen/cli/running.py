@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msfp_gen.cli.console import Output, Progress, SceneName, note, number, say, show, words
+from msfp_gen.cli.console import Output, SceneName, note, number, say, show, words
 from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
+from msfp_gen.cli.opening import simulated
 from msfp_gen.errors import RunError
 from msfp_gen.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.solver import Solver
@@ -101,7 +102,7 @@ def _run(
     strict: bool = False,
 ) -> list[Path]:
     """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
-    result, failure = _simulate(scene, keep, strict)
+    result, failure = simulated(scene, strict=strict, **keep.arguments)
     saved: list[Path] = []
     if result is not None:
         _report(result, as_json)
@@ -112,20 +113,6 @@ def _run(
         raise RunError(f"{failure}{kept}{keep.hint(failure)}", status=failure.status, result=result) from failure
     keep.done()
     return saved
-
-
-def _simulate(scene: Scene, keep: Keep, strict: bool) -> tuple[Result | None, RunError | None]:
-    """The result, and why the run failed if it did: what was computed until then is worth keeping."""
-    from msfp_gen.build import build_model
-    from msfp_gen.result import Result
-    from msfp_gen.simulation import simulate
-
-    build_model(scene.bearing.layout, scene.modelled, progress=note)
-    with Progress(scene.name or "run") as progress:
-        try:
-            return simulate(scene, progress=progress, strict=strict, **keep.arguments), None
-        except RunError as error:
-            return error.result if isinstance(error.result, Result) else None, error
 
 
 def _report(result: Result, as_json: bool) -> None:

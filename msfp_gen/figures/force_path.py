@@ -14,6 +14,7 @@ from msfp_gen.outline import slider_radius
 from msfp_gen.resample import at_times
 from msfp_gen.section import sections
 from msfp_gen.shape import friction_circles, poses
+from msfp_gen.stages import parted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -25,8 +26,9 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
     """The line of force with the friction circles at `time` [s] (None: at the largest displacement), and beside it how
     far from the axis of its slider every contact lies [mm].
 
-    Beyond the edge of the face a slider would tip, which the model does not follow (docs/model.md, choice 11). Raises
-    InputError for a time outside the run or a path that cannot be written.
+    Beyond the edge of the face a slider would tip, which the model follows with `effects.uplift` alone (docs/model.md,
+    choice 11; docs/uplift.md); nothing is drawn while a surface is open. Raises InputError for a time outside the run
+    or a path that cannot be written.
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then)
@@ -41,13 +43,13 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
 
 
 def eccentricity(result: Result) -> Array:
-    """Distance of every contact from the axis of its slider, ndarray, shape (T, n-1), [m]."""
+    """Distance of every contact from the axis of its slider, ndarray, shape (T, n-1), [m]; NaN while it is open."""
     where, bearing = poses(result), result.scene.bearing
     sliders = [bearing.slider(surface) for surface in range(bearing.layout.surfaces)]
     axes = where.basis[:, sliders, 2]
     arm = where.contact - where.centre
     off: Array = np.linalg.norm(arm - np.sum(arm * axes, axis=-1, keepdims=True) * axes, axis=-1)
-    return off
+    return np.where(parted(result.history), np.nan, off)
 
 
 def _draw_offsets(figure: SubFigure, result: Result) -> None:
@@ -59,7 +61,7 @@ def _draw_offsets(figure: SubFigure, result: Result) -> None:
         known = bool(bearing.slider_rim_radius(index))
         axes.plot(result.history.time, off[:, index], color=colour(index + 1))
         axes.set_ylabel(f"e{subscript(index + 1)} [mm]")
-        axes.set_ylim(0, 1.3 * max(edge if known else 0.0, off[:, index].max()) or 1.0)
+        axes.set_ylim(0, 1.3 * max(edge if known else 0.0, np.nan_to_num(off[:, index]).max()) or 1.0)
         axes.locator_params(axis="y", nbins=3)
         if known:
             axes.axhline(edge, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))

@@ -26,7 +26,7 @@ from msfp_gen.history import Array
 from msfp_gen.resample import at_times
 from msfp_gen.section import Section, sections
 from msfp_gen.shape import friction_circles as circle_radii
-from msfp_gen.stages import rims_touched, sliding_now
+from msfp_gen.stages import parted, rims_touched, sliding_now
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,13 +79,16 @@ def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> No
     history, last = then.history, len(section.bodies) - 1
     for body, polygon in enumerate(section.bodies):
         axes.fill(*(polygon * MILLI).T, facecolor=STEEL[0 < body < last], edgecolor=INK, linewidth=HAIR)
-    slides, pushes = sliding_now(history)[row], rims_touched(history)[row]
+    slides, pushes, open_ = sliding_now(history)[row], rims_touched(history)[row], parted(history)[row]
     for index in reversed(range(history.surfaces)):
         state = bool(slides[index]), bool(pushes[index])
+        words = f"open by {history.lift[row, index] * MILLI:.2f} mm" if open_[index] else WORDS[state]
         axes.plot(*(section.faces[index] * MILLI).T, color=colour(index + 1), linewidth=BOLD if state[0] else LINE,
-                  label=f"surface {index + 1} {WORDS[state]}", solid_capstyle="butt", zorder=3)  # fmt: skip
+                  label=f"surface {index + 1} {words}", solid_capstyle="butt", zorder=3)  # fmt: skip
     draw_force_line(axes, section)
     for index, point in enumerate(section.contacts * MILLI):
+        if open_[index]:
+            continue
         axes.plot(*point, marker="o", markersize=5, color="white", markeredgecolor=colour(index + 1),
                   markeredgewidth=LINE, linestyle="none", zorder=5)  # fmt: skip
     u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]

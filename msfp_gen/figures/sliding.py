@@ -19,7 +19,7 @@ from msfp_gen.figures.style import (
     strips,
     subscript,
 )  # fmt: skip
-from msfp_gen.stages import rims_touched, sliding_now, spans
+from msfp_gen.stages import parted, rims_touched, sliding_now, spans
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,14 +53,18 @@ def plot_stages(result: Result, path: str | Path | None = None) -> Figure:
 
 
 def draw_bars(axes: Axes, result: Result) -> None:
-    """One row a surface, top surface uppermost: a bar while it slides, a black edge while its rim pushes."""
+    """One row a surface, top surface uppermost: a bar while it slides, a black edge while its rim pushes, a frame while
+    it is open.
+    """
     history = result.history
-    slides, pushes = sliding_now(history), rims_touched(history)
+    slides, pushes, opened = sliding_now(history), rims_touched(history), parted(history)
     span = float(history.time[-1] - history.time[0])
     for surface in range(1, history.surfaces + 1):
         flags = slides[:, surface - 1]
         axes.broken_barh([(float(history.time[0]), span)], (surface - BAR / 2, BAR), facecolors=PALE)
         axes.broken_barh(spans(history.time, flags), (surface - BAR / 2, BAR), facecolors=colour(surface))
+        gaps = spans(history.time, opened[:, surface - 1])
+        axes.broken_barh(gaps, (surface - BAR / 2, BAR), facecolors="white", edgecolors=colour(surface))
         rims = spans(history.time, pushes[:, surface - 1])
         axes.broken_barh(rims, (surface + BAR / 2, EDGE), facecolors=INK)
         share = sum(length for _, length in spans(history.time, flags)) / span if span else 0.0
@@ -69,7 +73,8 @@ def draw_bars(axes: Axes, result: Result) -> None:
     axes.set_yticks(range(1, history.surfaces + 1), [f"surface {k}" for k in range(1, history.surfaces + 1)])
     axes.set_ylim(0.5, history.surfaces + 0.6)
     axes.grid(visible=False, axis="y")
-    axes.set_title("Which surfaces slide" + ("  (black: on the rim)" if pushes.any() else ""))
+    notes = [note for note, seen in (("black: on the rim", pushes), ("white: open", opened)) if seen.any()]
+    axes.set_title("Which surfaces slide" + (f"  ({', '.join(notes)})" if notes else ""))
 
 
 def draw_sliding(figure: Any, result: Result) -> None:

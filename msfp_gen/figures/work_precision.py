@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Table = Mapping[str, Mapping[str, ArrayLike]]
 COSTS = {"seconds": "seconds of wall time", "newton": "Newton iterations"}
-FLAGS = ("failed", "wrong")
+FLAGS = ("failed", "wrong", "cut")
 MARKERS = "osD^vP*X<>"
 ROOF = 0.965  # height at which runs without an error stand, as a share of the axes
 
@@ -37,8 +37,9 @@ def plot_work_precision(
     Args:
         table: for every method columns of one length k, a point each: `seconds` [s]; `newton`, left out where a method
             counts none; errors, relative, by name; and the flags `failed` (the run ended in an error: marked by a cross
-            at the top) and `wrong` (the run claimed success, and its error says otherwise: ringed), left out where no
-            point has them.
+            at the top), `cut` (it was cut off, and its costs are what the whole was expected to take: marked by an
+            arrow at the top) and `wrong` (the run claimed success, and its error says otherwise: ringed), left out
+            where no point has them.
         path: where to write it: .png, .svg or .pdf.
         errors: the columns that are errors, and what to call them; None: every column that is no cost and no flag.
         floors: lines below which an error means nothing, such as the disagreement of two references: for each line the
@@ -56,7 +57,8 @@ def plot_work_precision(
             raise InputError(
                 f"table has no {what}: give a column such as {'force_max' if what == 'error' else 'seconds'}"
             )
-    with page(5.6 * len(costs) + 1.6, 4.0 * len(named) + 0.6, path) as figure:
+    height = 4.0 if len(named) < 3 else 3.0
+    with page(5.6 * len(costs) + 1.6, height * len(named) + 0.6, path) as figure:
         headline(figure, title)
         grid = figure.subplots(len(named), len(costs), squeeze=False, sharex="col", sharey="row")
         for row, (error, label) in zip(grid, named.items(), strict=True):
@@ -100,14 +102,14 @@ def _draw_panel(
             continue
         look = _look(index)
         x, y = given[cost], given[error]
-        failed, wrong = (given.get(flag, np.zeros(len(x))) > 0 for flag in FLAGS)
-        good = ~failed & np.isfinite(y) & (y > 0)
+        failed, wrong, cut = (given.get(flag, np.zeros(len(x))) > 0 for flag in FLAGS)
+        good = ~failed & ~cut & np.isfinite(y) & (y > 0)
         axes.plot(x[good], y[good], **look, label=method)
         axes.plot(x[good & wrong], y[good & wrong], **RING)
-        lost = x[failed & (x > 0)]
-        axes.plot(
-            lost, np.full(len(lost), ROOF), **CROSS | {"color": look["color"]}, transform=axes.get_xaxis_transform()
-        )
+        for lost, mark in ((failed, CROSS), (cut, ARROW)):
+            at = x[lost & (x > 0)]
+            axes.plot(at, np.full(len(at), ROOF), **mark | {"color": look["color"]},
+                      transform=axes.get_xaxis_transform())  # fmt: skip
     for name, values in floors.items():
         if error in values:
             axes.axhline(values[error], color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
@@ -129,7 +131,11 @@ def _whole_decades(axes: Axes, costs: list[Array]) -> None:
 
 RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 13, "markerfacecolor": "none",
                         "markeredgecolor": INK, "markeredgewidth": LINE, "zorder": 5}  # fmt: skip
+ARROW: dict[str, Any] = {"linestyle": "none", "marker": 9, "markersize": 7, "fillstyle": "none"}
 CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 7, "markeredgewidth": LINE}
+
+MARKS = (("failed", CROSS | {"color": FAINT}, "failed"), ("wrong", RING, "wrong success"),
+         ("cut", ARROW | {"color": FAINT}, "cut off, cost expected"))  # fmt: skip
 
 
 def _look(index: int) -> dict[str, Any]:
@@ -143,7 +149,7 @@ def _legend(figure: Figure, axes: Axes, columns: Mapping[str, Mapping[str, Array
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], **_look(index), label=method) for index, method in enumerate(columns)]
-    for flag, look, text in (("failed", CROSS | {"color": FAINT}, "failed"), ("wrong", RING, "wrong success")):
+    for flag, look, text in MARKS:
         if any(np.any(given.get(flag, np.zeros(1)) > 0) for given in columns.values()):
             handles.append(Line2D([], [], **look, label=text))
     figure.legend(handles=handles, loc="outside right upper")

@@ -15,7 +15,7 @@ from msfp_gen.history import Array, History
 from msfp_gen.outline import POINTS, outline
 from msfp_gen.resample import at_times
 from msfp_gen.shape import Poses, poses
-from msfp_gen.stages import sliding_now
+from msfp_gen.stages import parted, sliding_now
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
@@ -109,7 +109,7 @@ def states(history: History) -> Array:
     """Index into `STATES` of every surface, ndarray, shape (T, n-1)."""
     found = np.where(sliding_now(history), 1.0, 0.0)
     found[history.gap <= 0] = 2.0
-    found[history.normal_force <= 0] = 3.0
+    found[parted(history) | (history.normal_force <= 0)] = 3.0
     return found
 
 

@@ -244,6 +244,7 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         return status;
     memcpy(s->v[i], s->at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->at.a, sizeof s->a[i]);
+    msfp_heat_stage(run, i, s->beta);
     if (i == 1) {
         run->middle.share = method.c[i];
         msfp_heat_middle(run);
@@ -252,7 +253,6 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         memcpy(run->middle.f, s->f, sizeof run->middle.f);
     }
     msfp_friction_rates(&run->work, s->df[i]);
-    msfp_heat_stage(run, i, s->beta);
     msfp_powers(&run->parameters, &s->at, s->f, &run->work, s->power[i]);
     return MSFP_OK;
 }

@@ -1,4 +1,4 @@
-"""What the hard cases share: plain stacks, slow pushes held against the quasi-static reference, pendulums, properties."""
+"""What the hard cases share: plain stacks, slow pushes held against the reference, pendulums, properties."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from reference.friction_circle import Push
 from reference.quasi_static import follow
 from support import Array
@@ -92,10 +92,11 @@ def off_the_reference(run: Result, rows: int = 60, stride: float = 1e-3) -> floa
 # ---- one frictionless pendulum ---------------------------------------------------------------------------------
 
 
-def a_pendulum(radius: float = 0.5, mass: float = 2.0, **values: Any) -> Bearing:
+def a_pendulum(radius: float = 0.5, mass: float = 2.0, height: float = 0.02, **values: Any) -> Bearing:
     """One slider in one bowl without friction; Y, Z hardly move, so that only the pendulum is integrated."""
-    usual = {"friction": 0.0, "yield_displacement": 1e6, "capacity": 1.4 * radius}
-    return a_stack((2, 1, 0), [radius], body={"mass": mass}, **{**usual, **values})
+    usual = {"friction": 0.0, "yield_displacement": 1e6, "capacity": 1.45 * radius}
+    body = {"mass": mass, "height": height, "rim_radius": 0.02 * radius}
+    return a_stack((2, 1, 0), [radius], body=body, **{**usual, **values})
 
 
 def swing(bearing: Bearing, angle: float, duration: float, rate: float = 0.0, **changes: Any) -> Scene:
@@ -125,15 +126,21 @@ def pendulum_angle(bearing: Bearing, start: float, time: Array) -> Array:
 # ---- properties ------------------------------------------------------------------------------------------------
 
 
-def holds(few: int, many: int, **strategies: Any) -> Callable[[Callable[..., None]], Callable[[int], None]]:
-    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`."""
+def holds(
+    few: int, many: int, known: str = "", **strategies: Any
+) -> Callable[[Callable[..., None]], Callable[[int], None]]:
+    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`.
+
+    known: what is known to break it among the many, with the chapter of docs/stability.md that says so.
+    """
+    slow = [pytest.mark.slow, *([pytest.mark.xfail(reason=known)] if known else [])]
 
     def wrap(check: Callable[..., None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize("examples", [few, pytest.param(many, marks=pytest.mark.slow)])
+        @pytest.mark.parametrize("examples", [few, pytest.param(many, marks=slow)])
         def test(examples: int) -> None:
             calm = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
             profile = settings(max_examples=examples, derandomize=True, deadline=None, database=None,
-                               suppress_health_check=calm, print_blob=False)  # fmt: skip
+                               suppress_health_check=calm, phases=[Phase.generate])  # fmt: skip
             profile(given(**strategies)(check))()
 
         test.__name__, test.__doc__ = check.__name__, check.__doc__

@@ -35,7 +35,9 @@ def test_sliding_of_a_tiny_tilt_is_exact(angle: float) -> None:
     q = np.zeros((4, 3))
     q[:, 0], q[:, 1] = 0.6 * angle, 0.8 * angle
     found = model_of(TFP).evaluate(bearing, q, 0 * q, q[:, :2] * 0, top_force=(0, 0, -LOAD))
-    relative = np.arctan2(np.hypot(np.sin(q[:, 0]) * np.cos(q[:, 1]), np.sin(q[:, 1])), np.cos(q[:, 0]) * np.cos(q[:, 1]))
+    relative = np.arctan2(
+        np.hypot(np.sin(q[:, 0]) * np.cos(q[:, 1]), np.sin(q[:, 1])), np.cos(q[:, 0]) * np.cos(q[:, 1])
+    )
     assert found.sliding == pytest.approx(np.array([1.0, 0.3, 0.3, 1.0]) * relative, rel=4e-16)
 
 

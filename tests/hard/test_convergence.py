@@ -50,7 +50,7 @@ def test_order_of_dense_output(method: str, order: int) -> None:
 
 
 def test_order_with_friction_where_it_is_smooth() -> None:
-    """Monotonic sliding under a soft yield: Y is a tanh, nothing switches. Against a run of steps eight times shorter."""
+    """Monotonic sliding under a soft yield: Y is a tanh, nothing switches. Against steps eight times shorter."""
     bearing = a_stack((3, 1, 1), [1.0, 1.0], yield_displacement=0.05, body={"mass": 1e-3})
     scene = Scene(bearing, slow_path([0.1], 0.05), a_rig(), effects=PLANAR)
 

@@ -1,4 +1,4 @@
-"""Friction: all stuck, turning back in every stage, from hardly any yield displacement to a soft one, from none to 0.5."""
+"""Friction: all stuck, turning back in every stage, from a hard yield displacement to a soft one, from none to 0.5."""
 
 from __future__ import annotations
 

@@ -42,8 +42,8 @@ def test_a_millihertz() -> None:
 
 
 def test_a_kilohertz() -> None:
-    """Ten micrometres at 1 kHz, among the stuck modes of the sliders: the explicit method and the default agree once the
-    tolerance is of the size of the motion; with the default tolerance that ringing is filtered, and not asked for."""
+    """Ten micrometres at 1 kHz, among the stuck modes of the sliders: the explicit method and the default agree once
+    the tolerance is of the size of the motion; with the default tolerance that ringing is filtered."""
     bearing, wave = a_stack((3, 1, 1), [1.0, 1.0], yield_displacement=1e-3), Motion.harmonic(1e-5, 1e3, cycles=5.0)
     explicit = shaken(bearing, wave, 1e-5, method="dopri5", rtol=1e-7, atol_angle=1e-12).history.top_force[:, 0]
     tight = shaken(bearing, wave, 1e-5, rtol=1e-8, atol_angle=1e-13).history.top_force[:, 0]
@@ -64,9 +64,11 @@ def test_six_hundred_seconds_of_cycles_do_not_drift() -> None:
 
 
 def test_six_hundred_seconds_of_a_frictionless_swing() -> None:
-    """Nothing damps it but the method: at rtol 1e-7 amplitude and phase after 400 periods, against elliptic functions."""
+    """Nothing damps it but the method: amplitude and phase after 400 periods, against elliptic functions."""
     bearing = a_pendulum()
-    run = simulate(replace(swing(bearing, 0.1, 600.0, solver=Solver(rtol=1e-7, atol_angle=1e-10)), output_step=0.5)).history
+    run = simulate(
+        replace(swing(bearing, 0.1, 600.0, solver=Solver(rtol=1e-7, atol_angle=1e-10)), output_step=0.5)
+    ).history
     energy = run.energy["kinetic"] + run.energy["potential"]
     stored = bearing.bodies[0].mass * 9.8 * 0.49 * (1 - np.cos(0.1))
     assert np.abs(energy).max() < 5e-3 * stored
@@ -97,7 +99,7 @@ def apart(one: Array, other: Array) -> float:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_record_with_spikes_is_seen_spike_by_spike(seed: int) -> None:
     """A step lands on every sample, so no spike is passed over. Five g within a sample make the sliders ring, which a
-    loose tolerance filters: what is compared is the mean square, with a tight tolerance and with the explicit method."""
+    loose tolerance filters: compared is the mean square, with a tight tolerance and with the explicit method."""
     motion = spiked(seed)
     loose, tight = (shaken(triple(), motion, 0.005, rtol=rtol).history.top_force[:, 0] for rtol in (1e-4, 1e-7))
     assert apart(loose, tight) < 1e-2
@@ -122,7 +124,9 @@ def test_one_spike_after_a_long_rest_is_not_missed() -> None:
     def rates(at: float, y: Array) -> list[float]:
         return [y[1], -9.8 / 10.0 * y[0] + np.interp(at, [29.995, 30.0, 30.005], [0.0, 2.0, 0.0]) / 10.0]
 
-    found = solve_ivp(rates, (29.995, 59.9), [0.0, 0.0], rtol=1e-9, atol=1e-14, max_step=0.001, t_eval=run.time[3005:5990])
+    found = solve_ivp(
+        rates, (29.995, 59.9), [0.0, 0.0], rtol=1e-9, atol=1e-14, max_step=0.001, t_eval=run.time[3005:5990]
+    )
     assert np.abs(found.y[0]).max() > 1e-4
     assert np.abs(np.abs(run.tilt_angles[3005:5990, 0, 1]) - np.abs(found.y[0])).max() < 0.02 * np.abs(found.y[0]).max()
 

@@ -42,8 +42,8 @@ def spun(seed: float, rtol: float = 1e-5, method: str = "implicit", duration: fl
 
 
 def test_free_spin_is_an_instability_of_the_equations() -> None:
-    """From the third second on the spin grows thirtyfold a second, along one curve, whether it started from 1e-7 or from
-    1e-5 rad/s, at either tolerance. The circle drives it; noise of an integrator would know of neither."""
+    """From the third second on the spin grows thirtyfold a second, along one curve, whether it started from 1e-7 or
+    from 1e-5 rad/s, at either tolerance. The circle drives it; noise of an integrator would know of neither."""
     curve = spun(1e-7)
     assert curve[-1] > 1.0 and curve[0] == 1e-7
     grown = slice(6, None)  # 3 s and later
@@ -123,7 +123,7 @@ def test_run_from_a_state_without_an_acceleration_is_named(moment: float, method
 
 @pytest.mark.parametrize("load", [1.0, 1e3, 1e5, 1e7])
 def test_any_load_follows_the_reference(load: float) -> None:
-    """From less than the weight of its own plates (20 N) to 1000 t. Light ones ring at a few hertz: push them slowly."""
+    """From less than the weight of its own plates (20 N) to 1000 t. Light ones ring at some hertz: push slowly."""
     speed = 5e-3 if load > 100 else 5e-4
     run = pushed(a_stack(TFP, RADII, **USUAL), PATH, load=load, tilt=max(10 * load, 100.0), speed=speed, rtol=1e-5)
     assert off_the_reference(run, rows=25) < 2e-3
@@ -131,11 +131,13 @@ def test_any_load_follows_the_reference(load: float) -> None:
 
 
 def test_no_load_at_all_is_the_weight_of_the_top_plate() -> None:
-    """N = 0 on a top plate whose centre of mass is at its top is a load of its weight on a plate that weighs nothing."""
+    """N = 0 on a plate whose centre of mass is at its top is a load of its weight on a plate that weighs nothing."""
     bearing = a_stack(TFP, RADII, **USUAL)
     top = replace(bearing.bodies[-1], centroid=0.0)
     nothing = replace(top, mass=1e-9, inertia=(1e-12, 1e-12))
-    run = pushed(replace(bearing, bodies=[*bearing.bodies[:-1], top]), PATH, load=0.0, tilt=100.0, speed=5e-4, rtol=1e-5)
+    run = pushed(
+        replace(bearing, bodies=[*bearing.bodies[:-1], top]), PATH, load=0.0, tilt=100.0, speed=5e-4, rtol=1e-5
+    )
     same = replace(bearing, bodies=[*bearing.bodies[:-1], nothing])
     seen = replace(run, scene=replace(run.scene, bearing=same, top=a_rig(9.8 * top.mass, 100.0)))
     assert off_the_reference(seen, rows=25) < 2e-3
@@ -148,7 +150,9 @@ def test_force_goes_with_the_load(load: float) -> None:
     bearing = a_stack(TFP, RADII, gravity=0.0, body={"mass": 1e-6 * load}, **USUAL)
     scene = Scene(bearing, slow_path([0.1, -0.05], 5e-3), Top.rig(load, 1e3 * load, 0.0, 10 * load), effects=PLANAR,
                   output_step=0.5, solver=Solver(rtol=1e-6))  # fmt: skip
-    one = replace(scene, bearing=a_stack(TFP, RADII, gravity=0.0, body={"mass": 1e-2}, **USUAL), top=Top.rig(1e4, 1e7, 0.0, 1e5))
+    one = replace(
+        scene, bearing=a_stack(TFP, RADII, gravity=0.0, body={"mass": 1e-2}, **USUAL), top=Top.rig(1e4, 1e7, 0.0, 1e5)
+    )
     here, there = simulate(scene).history.top_force[:, 0] / load, simulate(one).history.top_force[:, 0] / 1e4
     assert here == pytest.approx(there, abs=1e-4 * np.abs(there).max())
 
@@ -184,7 +188,9 @@ def layout_of(surfaces: int) -> tuple[int, int, int]:
     return surfaces + 1, (surfaces + 1) // 2, surfaces // 2
 
 
-@pytest.mark.parametrize("surfaces", [1, 2, 3, 4, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 10)), 10])
+@pytest.mark.parametrize(
+    "surfaces", [1, 2, 3, 4, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 10)), 10]
+)
 def test_stacks_of_one_to_ten_surfaces_follow_the_reference(surfaces: int) -> None:
     layout = layout_of(surfaces)
     bearing = a_stack(layout, nested_radii(layout, ratio=0.8))

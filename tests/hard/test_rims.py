@@ -1,4 +1,4 @@
-"""Rims: a start inside one, all of them at once, from soft to hard; each against energy or the quasi-static reference."""
+"""Rims: a start inside one, all at once, from soft to hard; each against energy or the quasi-static reference."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ def rim_energy(bearing: Bearing, over: float) -> float:
     return 0.5 * surface.rim_stiffness * (RADIUS - bearing.bodies[0].rim_offset) * RADIUS * over**2
 
 
-def thrown(bearing: Bearing, rate: float, duration: float, load: float, start: float = 0.0, rtol: float = 1e-6) -> Result:
+def thrown(
+    bearing: Bearing, rate: float, duration: float, load: float, start: float = 0.0, rtol: float = 1e-6
+) -> Result:
     top = Top.prescribed((0.0, 0.0, -load))
     return simulate(swing(bearing, start, duration, rate, top=top, solver=Solver(rtol=rtol)))
 
@@ -81,7 +83,7 @@ def test_start_inside_a_rim_is_pushed_out_at_once(stiffness: float) -> None:
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
 def test_slow_push_into_every_rim_follows_the_reference(stiffness: float) -> None:
     """Out and back over the rims of a triple pendulum, at half a millimetre a second: ten times faster, a hard rim
-    already rings by 0.3 %. The reference takes the rim as a spring too, at any stiffness that its own Newton resolves."""
+    already rings by 0.3 %. The reference takes the rim as a spring too, where its own Newton resolves it."""
     bearing = a_stack((5, 2, 2), [1.0, 0.3, 0.3, 1.0], friction=[0.03, 0.015, 0.015, 0.1],
                       capacity=[0.05, 0.02, 0.02, 0.05], rim_stiffness=stiffness)  # fmt: skip
     run = pushed(bearing, [0.11, -0.11, 0.0], speed=5e-4, rtol=1e-5)

@@ -55,3 +55,26 @@ def temperature(t: Array, q: Array, k: float, D: float, T0: float) -> Array:
         second = 2 / 3 * (a**1.5 - b**1.5)
         out[i] += np.sqrt(D / np.pi) / k * (q[:i] * first + slope * (a * first - second)).sum()
     return out
+
+
+def temperature_by_states(t: Array, q: Array, k: float, D: float, T0: float, kernel: Any) -> Array:
+    """The same with the kernel given as (rate, weight) of exponentials, each integrated exactly [degC]."""
+    rate, weight = np.array(kernel).T
+    state, out = np.zeros(len(rate)), np.full(len(t), T0)
+    for i, h in enumerate(np.diff(t), start=1):
+        constant = -np.expm1(-rate * h) / rate
+        ramp = (h - constant) / rate / h if h > 0 else 0.0
+        state = np.exp(-rate * h) * state + weight * (q[i - 1] * constant + (q[i] - q[i - 1]) * ramp)
+        out[i] += np.sqrt(D / np.pi) / k * state.sum()
+    return out
+
+
+def change_within(t: Array, q: Array, span: float) -> Array:
+    """Largest less least flux over the last `span` before each time."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    step = span / 20
+    fine = np.interp(np.arange(t[0] - span, t[-1] + step, step), t, q, left=0.0)
+    size = {"size": 24, "origin": 11}  # a little more than the span, all of it before
+    spread = maximum_filter1d(fine, **size) - minimum_filter1d(fine, **size)
+    return np.interp(t, np.arange(t[0] - span, t[-1] + step, step), spread)

@@ -1,0 +1,58 @@
+"""What measured numbers depend on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from msfp_gen.errors import CompileError
+from msfp_gen.version import __version__
+
+
+def machine() -> dict[str, str]:
+    """What the numbers depend on: processor, compiler, versions, and the commit of a checkout."""
+    found = {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "system": f"{platform.system()} {platform.machine()}",
+        "compiler": _compiler(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "msfp_gen": __version__,
+        "commit": _commit(),
+    }
+    return {name: value for name, value in found.items() if value}
+
+
+def _compiler() -> str:
+    from msfp_gen.compiler import FLAGS, find_compiler
+
+    try:
+        return f"{find_compiler().version}, {' '.join(f for f in FLAGS['c'] if f[1:2] in 'Om')}"
+    except CompileError:
+        return "none found"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+
+
+def _commit() -> str:
+    """Of the checkout that the package lies in; empty where it lies in none."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return ""
+    try:
+        run = subprocess.run(["git", "-C", str(root), "rev-parse", "--short", "HEAD"], capture_output=True, text=True,
+                             check=True)  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return run.stdout.strip()

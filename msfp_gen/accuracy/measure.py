@@ -1,0 +1,108 @@
+"""How far two runs are apart, and which of several runs may serve as the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from itertools import combinations
+
+import numpy as np
+
+from msfp_gen.accuracy.trial import Trial
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.history import Array
+
+ERRORS = {
+    "force_max": "top force, maximum",
+    "force_rms": "top force, RMS",
+    "sliding_max": "sliding, maximum",
+    "sliding_rms": "sliding, RMS",
+}
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one run is off by: the horizontal force on the top over its peak, sliding over its largest on any surface.
+
+    maximum: at the worst instant (and surface); rms: over time (at the worst surface).
+    """
+
+    force_max: float
+    force_rms: float
+    sliding_max: float
+    sliding_rms: float
+
+    @property
+    def worst_rms(self) -> float:
+        """The larger of the two RMS errors."""
+        return max(self.force_rms, self.sliding_rms)
+
+    def as_dict(self) -> dict[str, float]:
+        """By name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The run that errors are measured against, the independent one that confirms it, and how far they are apart.
+
+    Without a second run nothing confirms the first: `second` and `floor` are None.
+    """
+
+    trial: Trial
+    second: Trial | None
+    floor: Errors | None
+
+
+def errors(trial: Trial, reference: Trial) -> Errors | None:
+    """What `trial` is off by as far as it came; None where it left no rows."""
+    rows = min(len(trial.force), len(reference.force))
+    if not rows:
+        return None
+    force = np.linalg.norm(trial.force[:rows] - reference.force[:rows], axis=1)
+    sliding = np.abs(trial.sliding[:rows] - reference.sliding[:rows])
+    over_force, over_sliding = _peaks(reference)
+    return Errors(
+        float(force.max() / over_force),
+        float(_rms(force) / over_force),
+        float(sliding.max() / over_sliding),
+        float(_rms(sliding).max() / over_sliding),
+    )
+
+
+def _peaks(reference: Trial) -> tuple[float, float]:
+    force = float(np.linalg.norm(reference.force, axis=1).max())
+    sliding = float(reference.sliding.max())
+    if not force or not sliding:
+        raise InputError("scene: the bearing did not move, so there is nothing to be relative to; give it a motion")
+    return force, sliding
+
+
+def _rms(values: Array) -> Array:
+    out: Array = np.sqrt(np.mean(np.square(values), axis=0))
+    return out
+
+
+def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
+    """Of the tightest finished run of every family, the two that agree best; the tighter one is the reference.
+
+    families: method -> family. Raises RunError where no run finished.
+    """
+    tightest: dict[str, Trial] = {}
+    for trial in sorted((t for t in trials if t.finished), key=lambda t: -t.rtol):
+        tightest[families[trial.method]] = trial
+    if not tightest:
+        raise RunError("no run reached the end in the time given: raise the limit or shorten the scene", status="limit")
+    pairs = [sorted(pair, key=lambda t: t.rtol) for pair in combinations(tightest.values(), 2)]
+    if not pairs:
+        return Reference(next(iter(tightest.values())), None, None)
+    apart = [(_apart(first, second), first, second) for first, second in pairs]
+    floor, first, second = min(apart, key=lambda item: item[0].worst_rms)
+    return Reference(first, second, floor)
+
+
+def _apart(first: Trial, second: Trial) -> Errors:
+    found = errors(second, first)
+    if found is None:
+        raise RunError("a finished run left no rows", status="rows")
+    return found

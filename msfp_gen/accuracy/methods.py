@@ -1,0 +1,65 @@
+"""The methods that are compared, as data: a new one is one more row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from msfp_gen.accuracy.library import run_library
+from msfp_gen.accuracy.trial import Trial, refused, run_native
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.scene import Scene
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to integrate a scene.
+
+    family: methods of one family share their steps or their code, so that their agreement proves nothing.
+    run: scene, rtol, limit [s] -> Trial; raises InputError where it cannot run the scene.
+    """
+
+    name: str
+    family: str
+    about: str
+    run: Callable[[Scene, float, float], Trial]
+
+    def attempt(self, scene: Scene, rtol: float, limit: float) -> Trial:
+        """The trial, of whatever outcome."""
+        try:
+            return self.run(scene, rtol, limit)
+        except InputError as error:
+            return refused(self.name, rtol, scene, str(error))
+
+
+def _native(name: str, family: str, about: str) -> Method:
+    return Method(name, family, about, partial(run_native, name))
+
+
+def _library(name: str, about: str) -> Method:
+    return Method(name, name, f"SciPy: {about}", partial(run_library, name))
+
+
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        _native("implicit", "implicit", "the default: TR-BDF2, order 2, L-stable"),
+        _native("dopri5", "dopri5", "the report's: Dormand-Prince 5(4), Newton on all 6(n-1) balances"),
+        _library("Radau", "Radau IIA, order 5, L-stable"),
+        _library("BDF", "backward differences, orders 1 to 5"),
+        _library("LSODA", "Adams and backward differences, switching"),
+        _library("DOP853", "Dormand-Prince 8(5,3), explicit"),
+    )
+}
+
+
+def methods_named(names: list[str] | None) -> list[Method]:
+    """Methods by name, all of them for None. InputError for a name that is none."""
+    for name in names or ():
+        if name not in METHODS:
+            raise InputError(f"methods = {name!r}: give some of {', '.join(METHODS)}")
+    return [METHODS[name] for name in names or METHODS]

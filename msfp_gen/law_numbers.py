@@ -1,0 +1,105 @@
+"""Numbers in a law of friction: those of one surface, and whether the law holds with them."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from math import pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.errors import InputError
+from msfp_gen.friction_laws import BUILT_IN, HEAT, VARIABLES, Law, own_numbers
+from msfp_gen.law_text import Operations, fold, names_in
+
+if TYPE_CHECKING:
+    from msfp_gen.bearing import Bearing, Surface
+
+# Where a law must be finite and positive.
+RANGES: dict[str, NDArray[np.float64]] = {
+    "v": np.r_[0.0, np.geomspace(1e-6, 2.0, 20)],
+    "p": np.geomspace(1e3, 2e8, 16),
+    "T": np.linspace(-40.0, 600.0, 17),
+    "N": np.geomspace(1.0, 1e8, 9),
+}
+OPERATIONS: Operations = {
+    "number": np.float64, "neg": operator.neg, "add": operator.add, "sub": operator.sub, "mul": operator.mul,
+    "div": operator.truediv, "pow": operator.pow, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "tanh": np.tanh,
+    "Abs": np.abs, "Min": np.minimum, "Max": np.maximum,
+}  # fmt: skip
+
+
+def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
+    """Raise InputError unless every surface carries the numbers of the law, no others, and the law holds with them."""
+    takes = {} if law is None else law.takes
+    for index, surface in enumerate(bearing.surfaces):
+        for name in own_numbers():
+            if name not in takes and getattr(surface, name) is not None:
+                users = " or ".join(repr(w) for w, other in BUILT_IN.items() if name in other.takes) or "'custom'"
+                raise InputError(
+                    f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
+                    f"effects.friction = {word!r} takes no such value; leave it out or give {users}"
+                )
+        if law is not None:
+            _check_values(law, f"bearing.surfaces[{index}]", index, surface, numbers(law, bearing, index))
+
+
+def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
+    """The numbers of one surface (index from 0) by the names in `columns`, defaults put in. Raises InputError."""
+    surface, found = bearing.surfaces[index], dict[str, float | None]()
+    defaults = {**law.takes, "patch_radius": bearing.slider_rim_radius(index) or None}
+    for name in law.takes:
+        value = getattr(surface, name)
+        found[name] = defaults[name] if value is None else value
+        if found[name] is None:
+            more = ", or the slider's rim_radius" if name == "patch_radius" else ""
+            raise InputError(
+                f"bearing.surfaces[{index}].{name} is missing (surface {index + 1}): "
+                f"effects.friction = {law.word!r} needs it{more}"
+            )
+    return {name: float(value) for name, value in {**found, **_derived(found)}.items() if value is not None}
+
+
+def _derived(found: Mapping[str, float | None]) -> dict[str, float]:
+    """Area of the patch pi r^2; half the side of the square of that area, within which the patch covers the centre
+    (Kumar et al. 2015); and sqrt(D/pi)/k.
+    """
+    out: dict[str, float] = {}
+    if (radius := found.get("patch_radius")) is not None:
+        out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
+    if (k := found.get("conductivity")) is not None and (d := found.get("diffusivity")) is not None:
+        out["heating"] = sqrt(d / pi) / k
+    return out
+
+
+def _check_values(law: Law, path: str, index: int, surface: Surface, values: Mapping[str, float]) -> None:
+    """A law must be finite, and positive where the coefficient of reference is, over the `RANGES`."""
+    used = [name for name in RANGES if name in names_in(law.tree)]
+    grid = np.meshgrid(*(RANGES[name] for name in used), indexing="ij")
+    points = dict(zip(used, grid, strict=True))
+    with np.errstate(all="ignore"):
+        mu = fold(law.tree, {**values, **points, "mu": np.float64(surface.friction)}, OPERATIONS)
+    mu = np.broadcast_to(mu, grid[0].shape if grid else ())
+    wrong = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (surface.friction > 0))
+    if wrong.any():
+        where = np.unravel_index(int(np.argmax(wrong)), mu.shape)
+        at = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in used) or "every point"
+        raise InputError(
+            f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives mu = {mu[where]:.4g} "
+            f"at {at}; give numbers with which it is finite and positive"
+        )
+
+
+def heating_of(bearing: Bearing) -> list[float]:
+    """sqrt(D/pi)/k over the area of contact of every surface [K s^1/2/J], with the defaults of `HEAT`; 0 where no area
+    is known.
+    """
+    out = []
+    for index, surface in enumerate(bearing.surfaces):
+        radius = surface.patch_radius or bearing.slider_rim_radius(index)
+        given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
+        numbers = _derived({**given, "patch_radius": radius or None})
+        out.append(numbers["heating"] / numbers["area"] if radius else 0.0)
+    return out
