@@ -10,6 +10,7 @@ import numpy as np
 
 from msfp_gen.drive import plane_of
 from msfp_gen.layout import Auto, Effects
+from msfp_gen.piecewise import Array
 from msfp_gen.prescribed import Prescribed
 from msfp_gen.top import MassTop, PrescribedTop, RigTop
 
@@ -190,11 +191,11 @@ def fastest(scene: Scene) -> float:
     return float(speed / push) if push > 0 else inf
 
 
-def _sampled_times(scene: Scene) -> np.ndarray:  # type: ignore[type-arg]
+def _sampled_times(scene: Scene) -> Array:
     extra: tuple[Prescribed, ...] = (scene.load,) if scene.load is not None else ()
     knots = np.concatenate([scene.motion.knots, *(each.knots for each in extra), np.linspace(0, scene.end, 1001)])
     return np.unique(knots[knots <= scene.end])
 
 
-def _sampled_motion(scene: Scene) -> np.ndarray:  # type: ignore[type-arg]
+def _sampled_motion(scene: Scene) -> Array:
     return scene.motion.evaluate(_sampled_times(scene))

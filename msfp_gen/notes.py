@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msfp_gen.switching import JAMMED
+
 if TYPE_CHECKING:
     from msfp_gen.layout import Effects
     from msfp_gen.scene import Scene
@@ -16,7 +18,7 @@ TEXTS = {
     "inertia": "inertial forces of body {body} reach {value:.2g} of N on surface {surface}; the model has none",
     "heat": "friction may heat surface {surface} by {value:.3g} K; its coefficient knows no temperature",
     "plane": "motion or loads leave the vertical plane of the model",
-    "jammed": "no quasi-static motion goes on from here ({status})",
+    "jammed": "the equations have no way on from here ({status})",
 }
 
 
@@ -49,7 +51,7 @@ def notes_of(scene: Scene, segment: Segment, after: Effects | None) -> list[Note
         trips["plane"] = (run.time, 0, 0.0)
     if after is not None and segment.status == "uplift":
         trips["uplift"] = (run.time, *run.status[1:])
-    if after is not None and segment.status in ("newton", "step", "irregular"):
+    if after is not None and segment.status in JAMMED:
         trips["jammed"] = (run.time, *run.status[1:])
     changed = [] if after is None else _changes(segment.model.effects, after)
     return [

@@ -52,7 +52,7 @@ class Prescribed:
             raise InputError(f"{self.WORD}: an angle jumps at t = {self.jumps[0]:g} s; make it continuous")
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self._key() == other._key()  # type: ignore[attr-defined]
+        return type(self) is type(other) and self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
@@ -107,6 +107,11 @@ class Prescribed:
         knots = np.union1d(one.knots, two.knots)
         pieces = [piecewise.shifted(each.knots, each.coefficients, knots) for each in (one, two)]
         return type(self)(knots, pieces[0] + pieces[1], " + ".join(n for n in (self.name, other.name) if n))
+
+    @classmethod
+    def of(cls, knots: ArrayLike, coefficients: ArrayLike, name: str = "") -> Self:
+        """From its pieces."""
+        return cls(np.asarray(knots, dtype=float), np.asarray(coefficients, dtype=float), name)
 
     @classmethod
     def _constant(cls, values: ArrayLike) -> Self:

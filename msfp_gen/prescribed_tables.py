@@ -73,14 +73,10 @@ class SampledLoad(HistoryTable):
 class LoadPieces(HistoryTable):
     """`Load` itself, polynomial by polynomial."""
 
-    kind, of, make = "pieces", Load, "__call__"
+    kind, of, make = "pieces", Load, "of"
     knots: Annotated[tuple[float, ...], _TIMES]
     coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6))]
     name: str = ""
-
-    def build(self) -> Prescribed:
-        """The history. Raises InputError."""
-        return self.of(self.knots, self.coefficients, self.name)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,10 +117,12 @@ class SampledRotation(HistoryTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RotationPieces(LoadPieces):
+class RotationPieces(HistoryTable):
     """`Rotation` itself, polynomial by polynomial."""
 
-    of = Rotation
+    kind, of, make = "pieces", Rotation, "of"
+    knots: Annotated[tuple[float, ...], _TIMES]
+    name: str = ""
     coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 2, 6))]
 
 

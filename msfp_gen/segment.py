@@ -10,8 +10,8 @@ import numpy as np
 from msfp_gen.choice import UNLOADED, Choice, answer_time, inertia_limit, resting_load
 from msfp_gen.drive import plane_of
 from msfp_gen.errors import InputError
-from msfp_gen.law_numbers import heating_of
 from msfp_gen.history import Array
+from msfp_gen.law_numbers import heating_of
 from msfp_gen.packing import load_values, seated
 from msfp_gen.piecewise import ORDER
 from msfp_gen.plane import (

@@ -18,6 +18,8 @@ WIDER: dict[str, dict[str, object]] = {
     "inertia": {"sliders": "inertial"},
     "plane": {"dimension": "spatial"},
 }
+JAMMED = ("newton", "step", "irregular")
+"""Ends of a run that another model may not have: inertia and compliant seats make equations regular."""
 STRICT = ("rims", "uplift", "inertia", "heat")
 
 
@@ -37,8 +39,8 @@ def widened(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
         return _answer(scene, effects, "plane")
     if status == "uplift":
         return _answer(scene, effects, "uplift")
-    if status in ("newton", "step", "irregular") and effects.sliders == "massless":
-        return _answer(scene, effects, "inertia")
+    if status in JAMMED:
+        return _answer(scene, effects, "inertia") or _answer(scene, effects, "uplift")
     if status != "guard":
         return None
     wider: Effects | None = effects

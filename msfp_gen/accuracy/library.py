@@ -40,7 +40,7 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     """
     if scene.effects.uplift:
         raise InputError("effects.uplift: as_ode keeps all surfaces closed")
-    ode = build_model(scene.bearing.layout, scene.effects).as_ode(scene.bearing, scene.motion, scene.top)
+    ode = build_model(scene.bearing.layout, scene.modelled).as_ode(scene.bearing, scene.motion, scene.top)
     from scipy import integrate  # loaded before the clock starts
 
     begin, work, times = time.perf_counter(), Work(), grid(scene.end)
