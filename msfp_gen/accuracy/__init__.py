@@ -1,5 +1,6 @@
 """What accuracy costs: methods and models against a confirmed reference; a run to a wanted error (docs/accuracy.md)."""
 
+from msfp_gen.accuracy.models import model_errors
 from msfp_gen.accuracy.study import work_precision
 
-__all__ = ["work_precision"]
+__all__ = ["model_errors", "work_precision"]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene import Scene
 
 ROWS = 2000  # instants at which runs are compared
-QUICK, REPEATS = 0.1, 3  # [s]: shorter runs are timed several times, and the fastest counts
+QUICK, REPEATS = 0.1, 5  # [s]: shorter runs are timed several times, and the fastest counts
 CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
@@ -30,7 +30,8 @@ class Trial:
     message: one line in words. seconds: wall time of the integration [s], of a run that was cut off what it had taken.
     reached, end: time simulated and asked for [s]. newton: iterations of Newton's method on the equations of motion, in
     whatever loop; evaluations of them; steps accepted. force: horizontal force on the top support, ndarray, shape
-    (K, 2), [N]; sliding of every surface, shape (K, n-1), [m]: at the first K of `grid(end)`.
+    (K, 2), [N]; sliding of every surface, shape (K, n-1), [m]: at the first K of `grid(end)`. stepped: there is no
+    error control, and `rtol` is the step [s].
     """
 
     method: str
@@ -45,6 +46,12 @@ class Trial:
     force: Array
     sliding: Array
     message: str = ""
+    stepped: bool = False
+
+    @property
+    def setting(self) -> str:
+        """The tolerance, or the step with its unit."""
+        return f"{self.rtol:.3g} s" if self.stepped else f"{self.rtol:g}"
 
     @property
     def finished(self) -> bool:
