@@ -2,5 +2,6 @@
 
 from msfp_gen.accuracy.models import model_errors
 from msfp_gen.accuracy.study import work_precision
+from msfp_gen.accuracy.within import Within, simulate_within
 
-__all__ = ["model_errors", "work_precision"]
+__all__ = ["Within", "model_errors", "simulate_within", "work_precision"]

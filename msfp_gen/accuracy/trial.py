@@ -92,10 +92,10 @@ def watch(limit: float) -> Callable[[float, float], None]:
     return look
 
 
-def run_native(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
+def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
     """`scene` by a method of the compiled runtime at `rtol`, for at most about `limit` seconds.
 
-    Raises InputError where the method cannot run the scene.
+    repeats: of runs too quick to be timed once; 0: none. Raises InputError where the method cannot run the scene.
     """
     solver = replace(scene.solver, method=cast(Any, name), rtol=rtol, atol_angle=None)
     compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
@@ -103,9 +103,9 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     if result is None:
         return replace(refused(name, rtol, scene, message), status=status)
     counters = result.counters
-    if status == OK and counters.wall_time < QUICK:
+    if repeats and status == OK and counters.wall_time < QUICK:
         plain = replace(scene, solver=solver, output_step=None)
-        seconds = min(simulate(plain).counters.wall_time for _ in range(REPEATS))
+        seconds = min(simulate(plain).counters.wall_time for _ in range(repeats))
         counters = replace(counters, wall_time=seconds)
     return _trial(name, rtol, scene, result, counters, status, message)
 
