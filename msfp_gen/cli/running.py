@@ -118,9 +118,9 @@ def _run(
     return saved
 
 
-def _report(result: Result, as_json: bool, more: dict[str, Any]) -> None:
+def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -> None:
     if as_json:
-        say(json.dumps(result.summary | more, indent=2, allow_nan=False))
+        say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
     from msfp_gen.tables import summary_tables
 
