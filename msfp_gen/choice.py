@@ -56,7 +56,7 @@ def choose(scene: Scene) -> Choice:
     uplift = _uplift(scene, asked)
     sliders = _sliders(scene, asked, bool(uplift.chosen))
     plane, until = _dimension(scene, asked)
-    reasons = (plane, sliders, _rims(scene, asked), uplift)
+    reasons = (plane, sliders, _rims(scene, asked), uplift, _friction(scene, asked))
     effects = asked.closed(**{reason.effect: reason.chosen for reason in reasons}, top_rotation=turning or None)
     stays = until if effects.dimension == "planar" else inf
     return Choice(effects, reasons, stays, asked.error, asked.open)
@@ -123,6 +123,14 @@ def _sliders(scene: Scene, asked: Auto, uplift: bool) -> Reason:
     if period > 0.05 * motion:
         return Reason("sliders", "inertial", f"sliders answer in {period:.2g} s, the motion changes in {motion:.2g} s")
     return Reason("sliders", "massless", figures, "all accelerations of the sliders, and steps through their ringing")
+
+
+def _friction(scene: Scene, asked: Auto) -> Reason:
+    if (given := _given(asked, "friction")) is not None:
+        return given
+    word, _ = scene.law
+    saves = "the states of heat of every surface, until the rise in temperature matters" if word == "pv" else ""
+    return Reason("friction", word, "the numbers that the surfaces carry", saves)
 
 
 def _uplift(scene: Scene, asked: Auto) -> Reason:

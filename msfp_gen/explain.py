@@ -40,6 +40,7 @@ MEANINGS: dict[tuple[str, object], str] = {
     ("top_rotation", True): "what holds the top plate turns as given",
     ("friction", "constant"): "the friction coefficient does not change",
     ("friction", "velocity"): "it rises with the sliding velocity, exponentially from friction_slow to friction",
+    ("friction", "pv"): "it follows pressure and velocity (Kumar et al. 2015), at the temperature of the start",
     ("friction", "pvt"): "it follows pressure, velocity and temperature (Kumar et al. 2015)",
     ("friction", "custom"): "it follows the formula below",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from math import pi, sqrt
+from math import log, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,11 +33,12 @@ OPERATIONS: Operations = {
 
 def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
     """Raise InputError unless every surface carries the numbers of the law, no others, and the law holds with them."""
-    takes = {} if law is None else law.takes
+    takes = set() if law is None else {*law.takes, *law.beside}
     for index, surface in enumerate(bearing.surfaces):
         for name in own_numbers():
             if name not in takes and getattr(surface, name) is not None:
-                users = " or ".join(repr(w) for w, other in BUILT_IN.items() if name in other.takes) or "'custom'"
+                carriers = [word for word, other in BUILT_IN.items() if name in {*other.takes, *other.beside}]
+                users = " or ".join(map(repr, carriers)) or "'custom'"
                 raise InputError(
                     f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
                     f"effects.friction = {word!r} takes no such value; leave it out or give {users}"
@@ -90,6 +91,28 @@ def _check_values(law: Law, path: str, index: int, surface: Surface, values: Map
             f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives mu = {mu[where]:.4g} "
             f"at {at}; give numbers with which it is finite and positive"
         )
+
+
+def friction_of(bearing: Bearing, text: str | None) -> str:
+    """The law whose numbers the surfaces carry; of pressure and velocity before temperature, which a watch takes in."""
+    if text is not None:
+        return "custom"
+    words = {"pv": "reference_pressure", "velocity": "friction_slow"}
+    carried = (w for w, name in words.items() if any(getattr(s, name) is not None for s in bearing.surfaces))
+    return next(carried, "constant")
+
+
+def softening_of(law: Law | None, bearing: Bearing) -> float:
+    """Largest relative change of the friction coefficient for each kelvin, by the law with temperature [1/K]; near the
+    start, where it is steepest.
+    """
+    slopes = []
+    for index, surface in enumerate(bearing.surfaces):
+        found = {} if law is None else numbers(law, bearing, index)
+        ratio, start = found.get("temperature_ratio", 0.7), found.get("start_temperature", 20.0)
+        power = ratio ** (start / 50.0)
+        slopes.append(abs(log(ratio)) / 50.0 * power / (power + 0.4) if surface.friction > 0 else 0.0)
+    return max(slopes)
 
 
 def heating_of(bearing: Bearing) -> list[float]:

@@ -72,8 +72,8 @@ class Effects:
     sliders: with their inertia, or massless (quasi-static).
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
-    friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature ("pvt"),
-    or custom: the formula in friction_law (docs/friction.md).
+    friction: the law of the friction coefficient: constant, of velocity, of pressure and velocity ("pv"), of
+    temperature too ("pvt"), or custom: the formula in friction_law (docs/friction.md).
     uplift: whether bodies may part, fly and land (docs/uplift.md).
     top_rotation: whether what holds the top plate turns (docs/loads.md).
     """
@@ -83,7 +83,7 @@ class Effects:
     sliders: Literal["inertial", "massless"] = "inertial"
     rims: bool = True
     bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Literal["constant", "velocity", "pvt", "custom"] = "constant"
+    friction: Literal["constant", "velocity", "pv", "pvt", "custom"] = "constant"
     friction_law: str | None = None
     uplift: bool = False
     top_rotation: bool = False
@@ -111,12 +111,16 @@ class Effects:
         return law_of(self.friction, self.friction_law)
 
 
+LAWS = ("constant", "velocity", "pv", "pvt", "custom")
+
+
 @dataclass(frozen=True)
 class Auto:
     """Effects of which those left None are chosen from the scene: the smallest set that can matter (docs/effects.md).
 
-    dimension, sliders, rims, uplift: a word of `Effects` to insist on, or None. spin, bouc_wen, friction, friction_law:
-    as in `Effects`. error: what leaving an effect out may change, as a share of the friction force. Raises InputError.
+    dimension, sliders, rims, uplift: a word of `Effects` to insist on, or None. friction: likewise; None: the law whose
+    numbers the surfaces carry. spin, bouc_wen, friction_law: as in `Effects`. error: what leaving an effect out may
+    change, as a share of the friction force. Raises InputError.
     """
 
     dimension: Annotated[str | None, Choice(("spatial", "planar"))] = None
@@ -125,7 +129,7 @@ class Auto:
     uplift: Annotated[bool | None, Choice((True, False))] = None
     spin: Literal["locked", "patch", "free"] = "locked"
     bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Literal["constant", "velocity", "pvt", "custom"] = "constant"
+    friction: Annotated[str | None, Choice(LAWS)] = None
     friction_law: str | None = None
     error: Annotated[float, Quantity("", above=0.0)] = 0.005
 
@@ -133,12 +137,7 @@ class Auto:
         check_fields(self, "effects")
         if self.error >= 1:
             raise InputError(f"effects.error = {self.error}: a share of the friction force; give less than 1: 0.005")
-        self.closed()
-
-    @property
-    def law(self) -> Law | None:
-        """The law of the friction coefficient; None where it is constant."""
-        return self.closed().law
+        self.closed(friction=self.friction or ("custom" if self.friction_law else None))
 
     @property
     def open(self) -> tuple[str, ...]:

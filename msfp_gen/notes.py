@@ -58,14 +58,14 @@ def notes_of(scene: Scene, segment: Segment, after: Effects | None) -> list[Note
         Note(
             time, kind, surface, value,
             TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=segment.status),
-            ", ".join(changed) if kind != "heat" else "",
+            ", ".join(changed),
         )
         for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
     ]  # fmt: skip
 
 
 def _changes(before: Effects, after: Effects) -> list[str]:
-    names = ("dimension", "sliders", "rims", "uplift")
+    names = ("dimension", "sliders", "rims", "uplift", "friction")
     return [
         f"{name} = {getattr(after, name)}" for name in names if getattr(before, name) != getattr(after, name)
     ]

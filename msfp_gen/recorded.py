@@ -98,11 +98,17 @@ def joined(parts: Sequence[History], output_step: float | None = None) -> Histor
     rows: dict[str, Any] = {}
     for name in quantities():
         columns = [getattr(part, name) for part in parts]
-        if columns[0] is not None:  # the law of friction is the same in all parts
+        if columns[-1] is not None:
+            columns = [_before(column, columns[-1], part) for column, part in zip(columns, parts, strict=True)]
             rows[name] = np.concatenate([columns[0], *(column[1:] for column in columns[1:])])[kept]
     across = rows["base_displacement"] - rows["top_displacement"]
     rows["displacement"] = across - across[0]
     return History(**rows, energy={name: _carried(parts, name)[kept] for name in parts[0].energy})
+
+
+def _before(column: Array | None, later: Array, part: History) -> Array:
+    """What a later model records and this one does not: a temperature, still that of the start."""
+    return np.tile(later[0], (len(part.time), 1)) if column is None else column
 
 
 def _carried(parts: Sequence[History], name: str) -> Array:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
-from msfp_gen.friction_laws import HEAT_TIMES
-from msfp_gen.law_numbers import check_bearing
+from msfp_gen.friction_laws import HEAT_TIMES, Law, law_of
+from msfp_gen.law_numbers import check_bearing, friction_of
 from msfp_gen.layout import Auto, Effects, ModelSpec
 from msfp_gen.motion import Motion
 from msfp_gen.prescribed import Load, Rotation
@@ -95,10 +95,11 @@ class Scene:
         check_fields(self, "scene")
         self._check_times()
         self._check_sizes()
-        check_bearing(self.effects.law, self.effects.friction, self.bearing)
-        if self.effects.rims:
+        word, law = self.law
+        check_bearing(law, word, self.bearing)
+        if self.effects.rims is not False:
             self._check_rims()
-        elif self.effects.rims is False and self.stop is not None and self.stop.all_rims:
+        elif self.stop is not None and self.stop.all_rims:
             raise InputError("stop.all_rims = True: effects.rims = False models no rims; give rims = true")
         self._check_rotation()
         if self.effects.dimension == "planar":
@@ -108,6 +109,12 @@ class Scene:
     def spec(self) -> ModelSpec:
         """Which model the run needs, or begins with."""
         return ModelSpec(self.bearing.layout, self.modelled)
+
+    @property
+    def law(self) -> tuple[str, Law | None]:
+        """The law of the friction coefficient that a run begins with: its word, and its formula (None: constant)."""
+        word = self.effects.friction or friction_of(self.bearing, self.effects.friction_law)
+        return word, law_of(word, self.effects.friction_law)
 
     @property
     def modelled(self) -> Effects:
@@ -132,10 +139,10 @@ class Scene:
                 f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
                 "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
             )
-        law = self.effects.law
+        word, law = self.law
         if law is not None and law.heats and self.end > HEAT_TIMES[1]:
             raise InputError(
-                f"duration = {self.end:.12g}: effects.friction = {self.effects.friction!r} follows the heat of "
+                f"duration = {self.end:.12g}: effects.friction = {word!r} follows the heat of "
                 f"friction for {HEAT_TIMES[1]:g} s; give at most that, or a law without temperature"
             )
         if self.output_step is not None and self.output_step > self.end:
@@ -185,11 +192,10 @@ class Scene:
 
         plane, until, what = plane_of(self)
         if until < self.end:
-            where = "lies in no vertical plane" if until == 0 else f"leaves its vertical plane after {until:.6g} s"
-            azimuth = f", at azimuth {plane:.6g} rad" if what != "motion" else ""
-            raise InputError(
-                f"effects.dimension = 'planar': the {what} {where}{azimuth}; give effects.dimension = 'spatial'"
-            )
+            where = f"leaves the vertical plane at azimuth {plane:.6g} rad from {until:.6g} s on"
+            if what == "motion" and until == 0:
+                where = "lies in no vertical plane"
+            raise InputError(f"effects.dimension = 'planar': the {what} {where}; give effects.dimension = 'spatial'")
 
 
 _KINDS: dict[str, type | tuple[type, ...]] = {

@@ -11,7 +11,7 @@ from msfp_gen.choice import UNLOADED, Choice, answer_time, inertia_limit, restin
 from msfp_gen.drive import plane_of
 from msfp_gen.errors import InputError
 from msfp_gen.history import Array
-from msfp_gen.law_numbers import heating_of
+from msfp_gen.law_numbers import heating_of, softening_of
 from msfp_gen.packing import load_values, seated
 from msfp_gen.piecewise import ORDER
 from msfp_gen.plane import (
@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.motion import Motion
     from msfp_gen.scene import Scene
 
-NOTED_HEAT = 0.05  # change of friction by heat that is worth a note
-SOFTENING = 0.005  # of friction by Kumar et al. (2015) near 20 degC, for each kelvin
+NOTED_HEAT = 0.05  # change of friction by heat that is worth a note, where no numbers say what heat does
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +200,13 @@ def _taken_over(scene: Scene, model: Model, azimuth: float, at: Begin) -> tuple[
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
 
 
+def _rise(scene: Scene, effects: Effects, choice: Choice) -> float:
+    """Rise in temperature that matters [K]: by the surfaces' own numbers, else by those of Kumar et al. (2015)."""
+    softening = softening_of(effects.law, scene.bearing)
+    change = choice.error if effects.friction == "pv" else NOTED_HEAT
+    return change / softening if softening > 0 else 0.0
+
+
 def _watches(scene: Scene, effects: Effects, choice: Choice, stops: tuple[str, ...]) -> dict[str, Any]:
     """What a run watches, by the names and limits of the compiled module: all that its model leaves out."""
     heats = effects.law is not None and effects.law.heats
@@ -216,6 +222,6 @@ def _watches(scene: Scene, effects: Effects, choice: Choice, stops: tuple[str, .
         "guard_normal": UNLOADED * resting_load(scene),
         "guard_inertia": inertia_limit(scene, choice.error),
         "guard_time": answer_time(scene),
-        "guard_rise": NOTED_HEAT / SOFTENING,
+        "guard_rise": _rise(scene, effects, choice),
         "guard_heating": np.array(heating_of(scene.bearing)),
     }

@@ -19,6 +19,7 @@ from msfp_gen.history import Counters
 from msfp_gen.notes import Note, notes_of
 from msfp_gen.recorded import events_of, history_of, joined
 from msfp_gen.segment import Begin, begin_run
+from msfp_gen.start import at_rest, needs_settling, prelude
 from msfp_gen.switching import stopping, widened
 from msfp_gen.version import __version__
 
@@ -96,6 +97,7 @@ def simulate(
         The run could not go on: the message says when, where and why, `.result` holds what was computed.
 
     """
+    given, scene = scene, _settled(scene)
     choice = scene.choice
     effects: Effects | None = choice.effects
     segments: list[Segment] = []
@@ -111,10 +113,21 @@ def simulate(
     last = segments[-1]
     if not len(last.run.rows):
         raise RunError(_message(scene, last), status=last.status)
-    result = _result(scene, segments, tuple(notes))
+    result = _result(given, segments, tuple(notes))
     if not result.succeeded:
         raise RunError(result.message, status=last.status, result=result)
     return result
+
+
+def _settled(scene: Scene) -> Scene:
+    """A scene whose plates are out of level at the start, with the state that turning them leaves."""
+    if not needs_settling(scene):
+        return scene
+    try:
+        end = simulate(prelude(scene)).history
+    except RunError as error:
+        raise RunError(f"before the start, while the plates are turned: {error}", status=error.status) from error
+    return replace(scene, initial_state=at_rest(end.tilt_angles[-1], end.friction_state[-1]))
 
 
 def _file(checkpoint: str | Path, index: int) -> Path:

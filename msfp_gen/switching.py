@@ -16,6 +16,7 @@ WIDER: dict[str, dict[str, object]] = {
     "rims": {"rims": True},
     "uplift": {"uplift": True, "sliders": "inertial"},
     "inertia": {"sliders": "inertial"},
+    "heat": {"friction": "pvt"},
     "plane": {"dimension": "spatial"},
 }
 JAMMED = ("newton", "step", "irregular")
@@ -27,7 +28,7 @@ def stopping(scene: Scene, effects: Effects, strict: bool) -> tuple[str, ...]:
     """The watches at which a run with these effects stops: those that another model would answer; all if strict."""
     if strict:
         return STRICT if isinstance(scene.effects, Auto) else tuple(name for name in STRICT if name != "uplift")
-    return tuple(name for name in ("rims", "uplift", "inertia") if _answer(scene, effects, name) is not None)
+    return tuple(name for name in ("rims", "uplift", "inertia", "heat") if _answer(scene, effects, name) is not None)
 
 
 def widened(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
@@ -54,6 +55,8 @@ def _answer(scene: Scene, effects: Effects, name: str) -> Effects | None:
     """Effects with what a watch asks for, where the scene leaves that open and the method can take it."""
     asked = scene.effects
     if not isinstance(asked, Auto) or (name == "uplift" and scene.solver.method == "dopri5"):
+        return None
+    if name == "heat" and effects.friction != "pv":  # nobody gave the numbers
         return None
     needed = {key: value for key, value in WIDER[name].items() if getattr(effects, key) != value}
     if not needed or any(getattr(asked, key) is not None for key in needed):
