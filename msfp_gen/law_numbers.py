@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping
 from math import pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,18 +74,39 @@ def _derived(found: Mapping[str, float | None]) -> dict[str, float]:
     return out
 
 
+def proportional(law: Law, bearing: Bearing) -> bool:
+    """Whether the law grows in proportion to the coefficient of reference, and the second one where it has one."""
+    factor, found = 1.25, []
+    for index, surface in enumerate(bearing.surfaces):
+        values, points = numbers(law, bearing, index), _points(law)
+        more = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
+        once, twice = (_mu(law, {**each, **points, "mu": mu})
+                       for each, mu in ((values, surface.friction), (more, factor * surface.friction)))  # fmt: skip
+        found.append(np.allclose(twice, factor * once, rtol=1e-9, atol=0.0))
+    return all(found)
+
+
+def _points(law: Law) -> dict[str, NDArray[np.float64]]:
+    """A grid over the ranges of what the law depends on."""
+    used = [name for name in RANGES if name in names_in(law.tree)]
+    return dict(zip(used, np.meshgrid(*(RANGES[name] for name in used), indexing="ij"), strict=True))
+
+
+def _mu(law: Law, values: Mapping[str, Any]) -> NDArray[np.float64]:
+    with np.errstate(all="ignore"):
+        mu = fold(law.tree, values, OPERATIONS)
+    shapes = [np.shape(values[name]) for name in RANGES if name in values]
+    return np.broadcast_to(mu, shapes[0] if shapes else ())
+
+
 def _check_values(law: Law, path: str, index: int, surface: Surface, values: Mapping[str, float]) -> None:
     """A law must be finite, and positive where the coefficient of reference is, over the `RANGES`."""
-    used = [name for name in RANGES if name in names_in(law.tree)]
-    grid = np.meshgrid(*(RANGES[name] for name in used), indexing="ij")
-    points = dict(zip(used, grid, strict=True))
-    with np.errstate(all="ignore"):
-        mu = fold(law.tree, {**values, **points, "mu": np.float64(surface.friction)}, OPERATIONS)
-    mu = np.broadcast_to(mu, grid[0].shape if grid else ())
+    points = _points(law)
+    mu = _mu(law, {**values, **points, "mu": np.float64(surface.friction)})
     wrong = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (surface.friction > 0))
     if wrong.any():
         where = np.unravel_index(int(np.argmax(wrong)), mu.shape)
-        at = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in used) or "every point"
+        at = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in points) or "every point"
         raise InputError(
             f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives mu = {mu[where]:.4g} "
             f"at {at}; give numbers with which it is finite and positive"

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.history import Array
-
 if TYPE_CHECKING:
     from msfp_gen.result import Result
 
@@ -39,7 +37,7 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
     """The use of every surface over `rows`, bottom first."""
     history, bearing = result.history, result.scene.bearing
     speed = np.linalg.norm(history.slip_velocity[rows], axis=2)
-    power = friction_coefficient(result)[rows] * history.normal_force[rows] * speed
+    power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.trapezoid(power, history.time[rows], axis=0)
     found = []
     for i, surface in enumerate(bearing.surfaces):
@@ -59,12 +57,3 @@ def _contact_area(result: Result, surface: int) -> float | None:
     patch = bearing.surfaces[surface].patch_radius
     radius = bearing.slider_rim_radius(surface) if patch is None else patch
     return pi * radius**2 if radius > 0 else None
-
-
-def friction_coefficient(result: Result) -> Array:
-    """Coefficient mu of every surface, shape (T, n-1): recorded where the law varies, else the bearing's."""
-    history = result.history
-    if history.friction_coefficient is not None:
-        return history.friction_coefficient
-    constant = np.array([surface.friction for surface in result.scene.bearing.surfaces])
-    return np.broadcast_to(constant, history.normal_force.shape)
