@@ -47,7 +47,7 @@ def test_errors_are_relative_to_the_peaks_of_the_reference():
     assert found.force_max == pytest.approx(0.01, rel=1e-3) and found.sliding_max == pytest.approx(0.01, rel=1e-3)
     rms = np.sqrt(np.mean((0.01 * np.sin(40 * TIME)) ** 2))
     assert found.force_rms == pytest.approx(rms) and found.sliding_rms == pytest.approx(rms)
-    assert list(found.as_dict()) == list(ERRORS)
+    assert set(ERRORS) < set(found.as_dict()) and found.force_peak < 1e-2
 
 
 def test_a_run_that_ended_early_is_compared_as_far_as_it_came():

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from msfp_gen.errors import InputError
 from msfp_gen.figures import plot_correction, plot_response_spectrum, plot_work_precision
-from msfp_gen.records import Record, baseline_corrected
+from msfp_gen.records import Record, baseline_corrected, uncorrected
 
 TABLE = {
     "implicit": {"seconds": [0.01, 0.1], "newton": [100, 1000], "force_max": [1e-2, 1e-4], "slide_max": [1e-3, 1e-5]},
@@ -81,6 +83,34 @@ def test_correction_shows_raw_and_corrected(tmp_path):
     assert axes[2, 0].get_ylim()[1] < raw.get_ydata()[-1]  # it leaves the panel, and says where it ends
     assert [text.get_text() for text in axes[2, 0].texts] == ["as recorded: ends at 40 m"]
     assert [a.get_title(loc="left").split()[0] for a in axes[0]] == ["E₁", "E₃"]
+
+
+def test_a_scaled_motion_is_compared_with_the_record_at_the_same_scale():
+    record = drifting()
+    corrected = baseline_corrected(record)
+    plain, scaled = plot_correction(record, corrected), plot_correction(record, corrected.scaled(2.5))
+    assert "times" not in plain.get_suptitle()
+    assert scaled.get_suptitle() == "made-up: as recorded (grey) and corrected, both times 2.5"
+    for one, other in zip(plain.get_axes()[0].get_lines(), scaled.get_axes()[0].get_lines(), strict=True):
+        np.testing.assert_allclose(other.get_ydata(), 2.5 * one.get_ydata())
+
+
+def test_a_record_taken_as_it_is_is_not_called_corrected():
+    record = drifting()
+    calm = replace(record, acceleration=record.acceleration - [0.05, 0, 0])
+    assert plot_correction(calm, uncorrected(calm)).get_suptitle().endswith("and taken as it is")
+
+
+@pytest.mark.parametrize("name", [r"$\frac$", "a $ b", r"50 $ and \$5", "$x$", "{}_^\\", "地震"])
+def test_a_name_is_drawn_as_it_is_whatever_it_holds(name):
+    record = replace(drifting(), name=name, channels=(name, "", name))
+    corrected = baseline_corrected(record)
+    figure = plot_correction(record, corrected)
+    figure.draw_without_rendering()  # TeX in a name must not be read
+    shown = "??" if name == "地震" else name  # the font has none of these letters
+    assert figure.get_suptitle().replace(r"\$", "$").startswith(shown)
+    spectrum = plot_response_spectrum([1.0, 2.0], {"E1": [1.0, 2.0]}, title=name)
+    spectrum.draw_without_rendering()
 
 
 def test_correction_takes_the_window_that_was_kept():

@@ -78,6 +78,7 @@ def test_a_bundled_record_by_its_name(capsys):
         (["--scale-to", "nonsense"], "scale_to: 'nonsense'; give name=value"),
         (["--duration", "1e6"], "leaves the record"),
         (["--corner", "x"], "'x' is no number"),
+        (["--as-is", "--corner", "0.1"], "--as-is: nothing is corrected with it"),
     ],
 )
 def test_bad_options_are_one_line_and_write_nothing(options, message, capsys, short, tmp_path, monkeypatch):

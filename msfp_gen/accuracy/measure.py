@@ -24,18 +24,21 @@ ERRORS = {
 class Errors:
     """What one run is off by: the horizontal force on the top over its peak, sliding over its largest on any surface.
 
-    maximum: at the worst instant (and surface); rms: over time (at the worst surface).
+    maximum: at the worst instant (and surface); rms: over time (at the worst surface); peak: of the peak alone,
+    whenever it occurs. nan where a run does not tell sliding.
     """
 
     force_max: float
     force_rms: float
     sliding_max: float
     sliding_rms: float
+    force_peak: float
+    sliding_peak: float
 
     @property
     def worst_rms(self) -> float:
         """The larger of the two RMS errors."""
-        return max(self.force_rms, self.sliding_rms)
+        return float(np.fmax(self.force_rms, self.sliding_rms))
 
     def as_dict(self) -> dict[str, float]:
         """By name."""
@@ -60,22 +63,24 @@ def errors(trial: Trial, reference: Trial) -> Errors | None:
     if not rows:
         return None
     force = np.linalg.norm(trial.force[:rows] - reference.force[:rows], axis=1)
-    sliding = np.abs(trial.sliding[:rows] - reference.sliding[:rows])
+    told = trial.sliding if trial.sliding.shape[1] else np.full((rows, 1), np.nan)
+    sliding = np.abs(told[:rows] - reference.sliding[:rows])
     over_force, over_sliding = _peaks(reference)
+    if not over_force or not over_sliding:
+        raise InputError("scene: the bearing did not move, so there is nothing to be relative to; give it a motion")
     return Errors(
         float(force.max() / over_force),
         float(_rms(force) / over_force),
         float(sliding.max() / over_sliding),
         float(_rms(sliding).max() / over_sliding),
+        abs(_peaks(trial)[0] / over_force - 1),
+        abs(_peaks(trial)[1] / over_sliding - 1),
     )
 
 
-def _peaks(reference: Trial) -> tuple[float, float]:
-    force = float(np.linalg.norm(reference.force, axis=1).max())
-    sliding = float(reference.sliding.max())
-    if not force or not sliding:
-        raise InputError("scene: the bearing did not move, so there is nothing to be relative to; give it a motion")
-    return force, sliding
+def _peaks(trial: Trial) -> tuple[float, float]:
+    sliding = float(trial.sliding.max()) if trial.sliding.size else float("nan")
+    return float(np.linalg.norm(trial.force, axis=1).max()), sliding
 
 
 def _rms(values: Array) -> Array:

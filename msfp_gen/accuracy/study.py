@@ -122,7 +122,7 @@ def ladder(
 def told(trial: Trial) -> str:
     """A trial in one line."""
     outcome = trial.status if trial.finished else f"{trial.status} at t = {trial.reached:.4g} of {trial.end:.4g} s"
-    return f"{trial.method} at {trial.rtol:g}: {outcome}, {trial.seconds:.3g} s"
+    return f"{trial.method} at {trial.setting}: {outcome}, {trial.seconds:.3g} s"
 
 
 def tighter(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name: str = "implicit") -> list[Trial]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import note, number, show
+from msfp_gen.errors import InputError
 from msfp_gen.output import FIGURE_SUFFIXES, check_output
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ def record(
     ):
         if path is not None:
             check_output(path, suffixes, name)
-    from msfp_gen.records import ScaleTo
+    if as_is and (correct or corner is not None):
+        raise InputError("--as-is: nothing is corrected with it; leave out --correct and --corner")
+    from msfp_gen.records import Corrected, ScaleTo
     from msfp_gen.records.tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
@@ -66,10 +69,10 @@ def record(
     ready, factor = _prepared(raw, target, start, duration, not as_is, corner) if wanted else (None, 1.0)
     motion = raw if ready is None else ready if target is None else ready.scaled(factor)
     show(record_tables(raw, motion))
-    if plot is not None and ready is not None:  # before scaling: the picture is of the correction
+    if plot is not None and isinstance(motion, Corrected):
         from msfp_gen.figures import plot_correction
 
-        plot_correction(raw, ready, plot)
+        plot_correction(raw, motion, plot)
     if spectrum is not None:
         _write_spectrum(raw, motion, target, spectrum)
     if output is not None:

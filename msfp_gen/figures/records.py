@@ -23,6 +23,7 @@ from msfp_gen.figures.style import (
     engineering,
     headline,
     page,
+    plain,
     subscript,
 )  # fmt: skip
 from msfp_gen.history import Array
@@ -43,14 +44,16 @@ ROWS = (("acceleration", "a", "m/s²", False), ("velocity", "v", "m/s", True), (
 def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
     """What baseline correction did: acceleration, velocity and displacement before (grey) and after, per component.
 
-    Before means the raw acceleration, mean and all, integrated from rest over the window that was kept. Panels are
-    scaled to the corrected motion; where the raw one ends is written in, since it may leave them. Raises InputError for
-    `path`.
+    Before means the raw acceleration, mean and all, integrated from rest over the window that was kept; where the
+    motion was scaled, both are, and the title names the factor. Panels fit the corrected motion; where the raw one ends
+    is written in, since it may leave them. Raises InputError for `path`.
     """
-    raw = _integrated(record_before, float(record_after.metadata.get("window_start", 0.0)), len(record_after.time))
+    about = record_after.metadata
+    start, factor = float(about.get("window_start", 0.0)), float(about.get("scale", 1.0))
+    raw = _integrated(record_before, start, len(record_after.time), factor)
     moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
     with page(3.7 * len(moving) + 0.6, 6.8, path) as figure:
-        headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and corrected")
+        headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and {_became(record_after, factor)}")
         grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
         for column, axis in zip(grid.T, moving, strict=True):
             for axes, (name, symbol, unit, prefixed) in zip(column, ROWS, strict=True):
@@ -61,7 +64,7 @@ def plot_correction(record_before: Record, record_after: Corrected, path: str | 
                     _note_end(axes, before, unit)
                 axes.set_ylabel(f"{symbol}{subscript(axis + 1)} [{scale.unit}]")
             channel = record_before.channels[axis]
-            column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({channel})" if channel else ""))
+            column[0].set_title(f"E{subscript(axis + 1)}" + (f"  ({plain(channel)})" if channel else ""))
             column[-1].set_xlabel("time t [s]")
     return figure
 
@@ -113,10 +116,16 @@ def plot_response_spectrum(
     return figure
 
 
-def _integrated(record: Record, start: float, points: int) -> dict[str, Array]:
-    """A window of the raw record and its integrals from rest by the trapezoidal rule, each shape (points, 3)."""
+def _became(motion: Corrected, factor: float) -> str:
+    """What was made of a record, for the title."""
+    untouched = str(motion.metadata.get("correction", "")).startswith("none")
+    return ("taken as it is" if untouched else "corrected") + ("" if factor == 1 else f", both times {factor:.4g}")
+
+
+def _integrated(record: Record, start: float, points: int, factor: float) -> dict[str, Array]:
+    """A window of the raw record, scaled, and its integrals from rest by the trapezoidal rule, each (points, 3)."""
     first = round(start / record.time_step)
-    acceleration = record.acceleration[first : first + points]
+    acceleration = factor * record.acceleration[first : first + points]
     velocity = _integral(acceleration, record.time_step)
     return {"acceleration": acceleration, "velocity": velocity, "displacement": _integral(velocity, record.time_step)}
 

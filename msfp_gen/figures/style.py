@@ -24,8 +24,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 INK, FAINT, PALE = "#222222", "#999999", "#E4E4E4"
 LINE, THIN, HAIR, BOLD = 1.3, 0.9, 0.7, 2.6  # widths [pt]: curves, references, grids, what the eye shall find first
 SMALL = 8.0  # size of notes in a picture [pt]
+FAMILY = "DejaVu Sans"  # comes with matplotlib
 STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
+    "font.family": FAMILY,
     "font.size": 9.5,
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
@@ -84,9 +85,17 @@ def page(width: float, height: float, path: str | Path | None = None, name: str 
                 figure.savefig(temporary, metadata={"Date": None} if target.suffix.lower() == ".svg" else None)
 
 
+def plain(text: str) -> str:
+    """A name out of a file, such that matplotlib takes no TeX from it; ? for what the font does not have."""
+    from matplotlib.font_manager import findfont, get_font
+
+    font = get_font(findfont(FAMILY))
+    return "".join(letter if font.get_char_index(ord(letter)) else "?" for letter in text).replace("$", r"\$")
+
+
 def headline(figure: Figure, text: str) -> None:
-    """The title of a whole figure."""
-    figure.suptitle(text, fontsize=12, fontweight="bold", color=INK, x=0.01, ha="left")
+    """The title of a whole figure, as it is."""
+    figure.suptitle(plain(text), fontsize=12, fontweight="bold", color=INK, x=0.01, ha="left")
 
 
 def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
