@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from msfp_gen.friction_laws import BUILT_IN, VARIABLES, Law, own_numbers
 from msfp_gen.law_text import Operations, fold, names_in
 
 if TYPE_CHECKING:
-    from msfp_gen.bearing import Bearing, Surface
+    from msfp_gen.bearing import Bearing
 
 # Where a law must be finite and positive.
 RANGES: dict[str, NDArray[np.float64]] = {
@@ -87,7 +88,10 @@ def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
                     f"effects.friction = {word!r} takes no such value; leave it out or give {users}"
                 )
         if law is not None:
-            _check_values(law, f"bearing.surfaces[{index}]", index, surface, numbers(law, bearing, index))
+            flaw = _flaw(law, (("mu", surface.friction), *numbers(law, bearing, index).items()))
+            if flaw is not None:
+                raise InputError(f"bearing.surfaces[{index}] (surface {index + 1}): the law of effects.friction = "
+                                 f"{law.word!r} {flaw}")  # fmt: skip
 
 
 def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
@@ -136,20 +140,23 @@ def _points(law: Law) -> dict[str, NDArray[np.float64]]:
     return dict(zip(used, np.meshgrid(*(RANGES[name] for name in used), indexing="ij"), strict=True))
 
 
-def _check_values(law: Law, path: str, index: int, surface: Surface, values: Mapping[str, float]) -> None:
-    """Over the `RANGES` a law must be finite, positive where the coefficient of reference is, and nowhere vertical."""
+@lru_cache(maxsize=256)
+def _flaw(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
+    """What is wrong with a law and the numbers of one surface, `mu` among them; surfaces are often alike.
+
+    Over the `RANGES` a law must be finite, positive where the coefficient of reference is, and nowhere vertical.
+    """
     points = _points(law)
-    at = {**values, **points, "mu": surface.friction}
+    at: dict[str, Any] = {**dict(values), **points}
     mu = coefficient(law, at)[0]
     slopes = {f"d mu/d{name}": coefficient(law, at, name)[1] for name in points}
-    unfit = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (surface.friction > 0))
+    unfit = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (at["mu"] > 0))
     checks = [("mu", mu, unfit, "finite and positive"),
               *((what, slope, ~np.isfinite(slope), "of finite slope") for what, slope in slopes.items())]  # fmt: skip
     for what, found, wrong, remedy in checks:
         if wrong.any():
             where = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
             place = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in points)
-            raise InputError(
-                f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives {what} = "
-                f"{found[where]:.4g} at {place or 'every point'}; give a law and numbers with which it is {remedy}"
-            )
+            return (f"gives {what} = {found[where]:.4g} at {place or 'every point'}; give a law and numbers with which "
+                    f"it is {remedy}")  # fmt: skip
+    return None

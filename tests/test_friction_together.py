@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,14 +17,19 @@ from test_checkpoint import assert_same, interrupted
 from test_friction_laws import FORMULA, LAWS, P_REF, VALUES, heated, lawful
 from test_uplift import shaken
 
-from msfp_gen import Effects, InputError, Scene, load_scene, simulate, simulation
+from msfp_gen import Effects, InputError, Scene, Surface, load_scene, simulate, simulation
 from msfp_gen.bounding import bounded_scenes, load_factors
 from msfp_gen.cli import main
+from msfp_gen.fields import Quantity, ruled_fields
+from msfp_gen.friction_laws import BUILT_IN, VARIABLES, own_numbers
 from msfp_gen.generator.heat import HEAT_KERNEL
+from msfp_gen.law_text import FUNCTIONS
 from msfp_gen.result import Result
+from msfp_gen.scenefile import scene_from_table
 from msfp_gen.shape import friction_circles, poses
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "heating.toml"
+ROOT = Path(__file__).parents[1]
+EXAMPLE, PAGE = ROOT / "examples" / "heating.toml", ROOT / "docs" / "friction.md"
 BOUNDS = 'rule = "asce7"\n[[factor]]\nproperty = "friction"\nsurfaces = [1, 4]\ndirect = { test = [0.8, 1.5] }\n'
 
 
@@ -179,6 +186,32 @@ def test_models_are_generated_with_a_law(given: list[str], effects: Effects, mon
     monkeypatch.setattr("msfp_gen.build.prepare", prepare)
     assert main(["generate", "5", "2", "2", *given]) == 2
     assert [spec.effects for spec in specs] == [effects]
+
+
+def test_page_names_every_number_and_name() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for name in {*own_numbers(), *VARIABLES, *FUNCTIONS} - {"c2", "c3"}:
+        assert f"`{name}`" in text, name
+    units = {name: rule.unit for name, rule, _ in ruled_fields(Surface) if isinstance(rule, Quantity)}
+    for law in BUILT_IN.values():
+        for name, default in law.takes.items():
+            rows = re.findall(rf"^\| `{name}` \|.*\| (.*) \| (.*) \|$", text, re.MULTILINE)
+            shown = {(unit.replace("°C", "degC").replace("²", "^2"), value) for unit, value in rows}
+            assert (units[name] or "-", f"{default:g}" if default is not None else None) in {
+                (unit, f"{float(value):g}" if value[0].isdigit() else None) for unit, value in shown
+            } or name == "patch_radius", name
+
+
+def test_blocks_of_the_page_run() -> None:
+    blocks = dict(re.findall(r"```(toml|python)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
+    rig = {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "damping": 5.0}
+    motion = {"kind": "harmonic", "amplitude": 0.02, "frequency": 0.5}
+    scene = scene_from_table({**tomllib.loads(blocks["toml"]), "motion": motion, "top": rig})
+    assert scene.effects.law is not None and scene.effects.law.word == "custom" and not scene.effects.law.heats
+    assert [surface.c3 for surface in scene.bearing.surfaces] == [2e-8, 1e-8, 1e-8, 2e-8]
+    names: dict[str, Any] = {}
+    exec(compile(blocks["python"], str(PAGE), "exec"), names)  # a block of our own documentation
+    assert names["run"].history.friction_coefficient.shape[1] == 4
 
 
 def test_a_formula_that_cannot_be_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
