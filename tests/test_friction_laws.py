@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from reference import friction_laws as reference
 from support import Array, bearing_of, differences, model_of, scene_of
+from test_emission import warnings_of
 from test_equations import inputs, sensible
 
 from msfp_gen import Effects, InputError, Layout, Motion, Scene, Solver, simulate
@@ -255,6 +256,20 @@ def test_friction_that_grows_with_velocity_never_pushes(word: str, solver: dict[
     """With |slip| for the velocity this record stops: a light slider runs away while its surface unloads."""
     run = simulate(slowed(scene_of("ridgecrest-clc", {"bouc_wen": word}, solver, duration=16.0)))
     assert run.history.normal_force.max() < 2e5
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"friction": "pvt", "dimension": "planar", "uplift": True},
+        {"friction": "velocity", "spin": "free", "rims": False},
+        {"friction": "custom", "spin": "patch", "sliders": "massless"},
+        {"friction": "pvt", "bouc_wen": "isotropic", "uplift": True},
+    ],
+    ids=str,
+)
+def test_models_with_a_law_compile_without_a_warning(effects: dict[str, Any], tmp_path: Any) -> None:
+    assert warnings_of({**effects, **LAWS[effects["friction"]]}, tmp_path, "-fsyntax-only") == ""
 
 
 # ---- heat as exponentials -------------------------------------------------------------------------------------------
