@@ -41,7 +41,7 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
     history, bearing = result.history, result.scene.bearing
     speed = np.where(parted(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
-    heat = np.trapezoid(power, history.time[rows], axis=0)
+    heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
     found = []
     for i, surface in enumerate(bearing.surfaces):
         left, area = float(history.gap[rows, i].min()), _contact_area(result, i)
