@@ -86,6 +86,8 @@ def test_a_success_far_above_its_tolerance_is_wrong():
     for wave, wrong in ((0.1, True), (0.01, False)):
         run = trial(rtol=1e-3, wave=wave)
         assert is_wrong(run, errors(run, sure.trial), sure) is wrong
+    loose = trial(rtol=0.1, wave=0.3)
+    assert is_wrong(loose, errors(loose, sure.trial), sure)  # no tolerance makes a fifth of the peak right
     failed = trial(rtol=1e-3, wave=0.5, status="failed")
     assert not is_wrong(failed, errors(failed, sure.trial), sure)
     vague = replace(sure, floor=errors(trial(wave=0.09), trial()))
@@ -115,7 +117,9 @@ def test_what_would_end_soon_is_taken_to_its_end():
     scene = short(duration=0.02)
     nearly = METHODS["DOP853"].attempt(scene, 1e-4, 10.0)
     stopped = replace(nearly, status=CUT_OFF, seconds=1.0, reached=0.01)
-    assert [t.status for t in affordable(scene, [stopped], 1.0, lambda line: None)] == [OK]
+    ended = affordable(scene, [stopped], 1.0, lambda line: None)
+    assert [t.status for t in ended] == [OK]
+    assert [t.status for t in study.completed([stopped, trial()], ended)] == [OK, OK]
     assert not affordable(scene, [replace(stopped, reached=1e-4)], 1.0, lambda line: None)
 
 
