@@ -68,9 +68,15 @@ def test_the_reference_is_of_two_families_that_agree():
     assert found.floor.force_max == pytest.approx(1e-4, rel=1e-2)
 
 
-def test_one_family_alone_confirms_nothing():
-    found = best_reference([trial("a", 1e-6), trial("c", 1e-9)], FAMILIES)
+def test_one_family_alone_confirms_little():
+    found = best_reference([trial("a", 1e-6, 1e-3), trial("c", 1e-9)], FAMILIES)
+    assert (found.trial.method, found.second.method, found.independent) == ("c", "a", False)
+    assert found.floor.force_max == pytest.approx(1e-3, rel=1e-2) and "own kind alone" in study.doubts(found)[0]
+    found = best_reference([trial("a", 1e-6), trial("a", 1e-4, 1e-2), trial("a", 1e-5, 1e-3)], FAMILIES)
+    assert (found.second.rtol, found.independent) == (1e-5, False)
+    found = best_reference([trial("a")], FAMILIES)
     assert found.second is None and "nothing confirms" in study.doubts(found)[0]
+    assert not is_wrong(trial(wave=0.5), errors(trial(wave=0.5), trial()), found)  # nothing is known to be wrong
     with pytest.raises(RunError, match="raise the limit"):
         best_reference([trial(status=CUT_OFF)], FAMILIES)
 
@@ -214,7 +220,7 @@ def test_command_writes_and_prints(tmp_path, capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert len(json.loads(out)["points"]) == 4 and "implicit at 0.01: ok" in err and err.count("wrote ") == 5
     assert main([*words[:5], "--tolerances", "1e-2", "--methods", "implicit"]) == 0
-    assert "confirmed by nothing" in capsys.readouterr().out
+    assert "own kind alone" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("words", [["--tolerances", "tight"], ["--methods", "euler"], ["--limit", "-1"]])

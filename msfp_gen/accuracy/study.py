@@ -169,14 +169,18 @@ def point_of(series: str, trial: Trial, reference: Reference) -> Point:
 
 def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
     """Whether a run claimed success and its RMS error is far above its tolerance, and above what is known."""
-    known = 0.0 if reference.floor is None else 3 * reference.floor.worst_rms
+    if reference.floor is None:
+        return False
+    known = 3 * reference.floor.worst_rms
     return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, WRONG_ANYWAY), known)
 
 
 def doubts(reference: Reference) -> list[str]:
     """What a reader should know of the reference."""
     if reference.second is None or reference.floor is None:
-        return ["only one family of methods reached the end: nothing confirms the reference"]
+        return ["only one run reached the end: nothing confirms the reference"]
+    if not reference.independent:
+        return ["only one family of methods reached the end: the reference is confirmed by its own kind alone"]
     if reference.floor.worst_rms > 1e-2:
         return [f"the two references differ by {reference.floor.worst_rms:.1%} RMS: no error below that means anything"]
     return []
