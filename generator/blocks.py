@@ -37,6 +37,8 @@ class Blocks:
     rim_coordinates: Block
     gap: Block
     top_wrench: Block
+    support: Block
+    upright: Block
     linear: Block
     angular: Block
     arms: Block
@@ -233,6 +235,16 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
         "top_wrench": new("top_wrench")
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
+        .build(),
+        "support": new("support")
+        .scalar("psi", "rad", "psi of what the rotational stiffness holds the top plate to", 0)
+        .scalar("theta", "rad", "its theta")
+        .scalar("psi1", "rad/s", "d psi/dt", 0)
+        .scalar("theta1", "rad/s", "d theta/dt")
+        .build(),
+        "upright": new("upright")
+        .vector("e", "-", "the direction it holds the top plate's t_3 to", POLAR)
+        .vector("w", "rad/s", "its angular velocity", AXIAL)
         .build(),
         "linear": new("linear")
         .vector("r", "N", "(3.26), (3.28): left side less right side, along E1, E2, E3", POLAR)

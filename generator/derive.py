@@ -54,10 +54,12 @@ def derive(spec: ModelSpec) -> Equations:
         body.linear_balance(blocks, massless),
         body.angular_balance(blocks, massless),
         body.body_energy(blocks, massless),
-        top.top_wrench(blocks, massless),
+        top.top_wrench(blocks, effects.top_rotation),
         top.top_energy(blocks),
         contact.gap(blocks),
     ]
+    if effects.top_rotation:
+        programs.append(top.upright(blocks))
     if effects.rims:
         programs.append(contact.rim(blocks))
     if effects.uplift:

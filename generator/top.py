@@ -25,7 +25,19 @@ def mass_point(p: Program, par: Symbols, body: Symbols) -> tuple[Vector, Vector,
     return p.let_vector(r, "r"), v, p.rate_vector(v)
 
 
-def top_wrench(b: Blocks, massless: bool) -> Program:
+def upright(b: Blocks) -> Program:
+    """What the rotational stiffness holds the top plate to where that turns: t_3 (2.1) of psi and theta."""
+    p = Program("upright", "axis and angular velocity of what holds the top plate: (2.1), (3.12) without spin")
+    s: Symbols = p.read(b.support, "s", active=False)
+    sin_psi, cos_psi = p.let(sp.sin(s["psi"])), p.let(sp.cos(s["psi"]))
+    sin_theta, cos_theta = p.let(sp.sin(s["theta"])), p.let(sp.cos(s["theta"]))
+    zero = sp.Integer(0)
+    turning = add((s["psi1"], zero, zero), scale(s["theta1"], (zero, cos_psi, sin_psi)))
+    p.write(b.upright, {"e": (sin_theta, -sin_psi * cos_theta, cos_psi * cos_theta), "w": turning}, tangents=False)
+    return p
+
+
+def top_wrench(b: Blocks, turned: bool) -> Program:
     """-F_top and -M_top about r_nn: what the bearing exerts on its support."""
     p = Program("top_wrench", "-F_top, -M_top of (3.28), (3.29): rig springs, prescribed load, supported mass")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
@@ -44,8 +56,12 @@ def top_wrench(b: Blocks, massless: bool) -> Program:
     inertia = p.let_vector(scale(par["m"], add(a, (zero, zero, par["g"]))), "inertia")
     f = add(p.let_vector(horizontal, "rig"), inertia, scale(sp.Integer(-1), force["F"]))
     t3 = body["t3"]
+    axis, relative = (zero, zero, sp.Integer(1)), body["wp"]
+    if turned:
+        held: Symbols = p.read(b.upright, "u", active=False)
+        axis, relative = held["e"], add(relative, scale(sp.Integer(-1), held["w"]))
     restoring = add(
-        cross((zero, zero, par["kr"]), t3), scale(p.let(par["kr"] * x["phi"]), t3), scale(par["cr"], body["wp"])
+        cross(scale(par["kr"], axis), t3), scale(p.let(par["kr"] * x["phi"]), t3), scale(par["cr"], relative)
     )
     h_dot = rate_of_angular_momentum(p, par, body)
     m = add(

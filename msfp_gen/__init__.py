@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing, Body, Surface
     from msfp_gen.build import build_model
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
-    from msfp_gen.layout import Effects, Layout
+    from msfp_gen.layout import Auto, Effects, Layout
     from msfp_gen.motion import Motion
+    from msfp_gen.prescribed import Load, Rotation
     from msfp_gen.scene import Scene, Stop
     from msfp_gen.scenefile import load_scene
     from msfp_gen.simulation import simulate
@@ -25,14 +26,17 @@ if TYPE_CHECKING:
 
 # Name -> module that holds it; a package is its own value.
 _HOMES = {
+    "Auto": "layout",
     "Bearing": "bearing",
     "Body": "bearing",
     "CompileError": "errors",
     "Effects": "layout",
     "InputError": "errors",
     "Layout": "layout",
+    "Load": "prescribed",
     "Motion": "motion",
     "MsfpError": "errors",
+    "Rotation": "prescribed",
     "RunError": "errors",
     "Scene": "scene",
     "Solver": "solver",
@@ -46,14 +50,17 @@ _HOMES = {
 }
 
 __all__ = [
+    "Auto",
     "Bearing",
     "Body",
     "CompileError",
     "Effects",
     "InputError",
     "Layout",
+    "Load",
     "Motion",
     "MsfpError",
+    "Rotation",
     "RunError",
     "Scene",
     "Solver",

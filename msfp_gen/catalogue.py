@@ -13,6 +13,9 @@ from msfp_gen.errors import InputError
 
 Table = dict[str, Any]
 
+# Presets are the report's model in full, unless they say otherwise.
+REPORTED = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
+
 
 def bearing_table(name: str) -> Table:
     """The bearing preset `name`, without its description; raises InputError for an unknown name."""
@@ -21,7 +24,8 @@ def bearing_table(name: str) -> Table:
 
 def scene_table(name: str) -> Table:
     """The scene preset `name`, complete, without its description; raises InputError for an unknown name."""
-    return _find("scene", _catalogue()[1], name) | {"name": name}
+    table = _find("scene", _catalogue()[1], name)
+    return table | {"name": name, "effects": {**REPORTED, **table.get("effects", {})}}
 
 
 def descriptions(kind: str) -> dict[str, str]:

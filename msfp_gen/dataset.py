@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
@@ -13,6 +14,7 @@ import numpy as np
 
 from msfp_gen.errors import InputError
 from msfp_gen.history import ENERGY, LABELS, Counters, Event, History, quantities
+from msfp_gen.notes import Note
 from msfp_gen.output import DATASET_SUFFIXES, check_output, write_bytes
 
 if TYPE_CHECKING:
@@ -74,6 +76,8 @@ def read_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="h5netcdf", group=group) as dataset:
             return dataset.load()
+    except FileNotFoundError as error:
+        raise InputError(f"path = {str(path)!r}: no such file; give the name of a result") from error
     except OSError as error:
         raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
 
@@ -94,7 +98,7 @@ def read_result(path: str | Path) -> Result:
     return Result(
         scene_from_table(scene), _history(dataset), _event_list(dataset),
         Counters(**_without(COUNTER, attributes)), attributes["status"], attributes["message"],
-        _without(PROVENANCE, attributes),
+        _without(PROVENANCE, attributes), tuple(Note(**note) for note in json.loads(attributes.get("notes", "[]"))),
     )  # fmt: skip
 
 
@@ -140,6 +144,7 @@ def _attributes(result: Result) -> dict[str, str | int | float]:
         "source": "msfp-gen",
         "status": result.status,
         "message": result.message,
+        "notes": json.dumps([asdict(note) for note in result.notes]),
         "scene": recipe(result.scene),
         "motion": PIECES if needs_pieces(result.scene) else RECIPE,
         **_prefixed(COUNTER, asdict(result.counters)),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
     from msfp_gen.layout import Effects
     from msfp_gen.motion import Motion
+    from msfp_gen.prescribed import Prescribed
     from msfp_gen.scene import Scene
     from msfp_gen.solver import Solver
     from msfp_gen.top import Top
@@ -35,8 +36,11 @@ MEANINGS: dict[tuple[str, object], str] = {
     ("bouc_wen", "isotropic"): "one switch along the slip, the same in every direction",
     ("uplift", False): "bodies never part; a run in which they would stops with a named error",
     ("uplift", True): "bodies may part, fly and land at every surface",
+    ("top_rotation", False): "what holds the top plate stays level",
+    ("top_rotation", True): "what holds the top plate turns as given",
     ("friction", "constant"): "the friction coefficient does not change",
     ("friction", "velocity"): "it rises with the sliding velocity, exponentially from friction_slow to friction",
+    ("friction", "pv"): "it follows pressure and velocity (Kumar et al. 2015), at the temperature of the start",
     ("friction", "pvt"): "it follows pressure, velocity and temperature (Kumar et al. 2015)",
     ("friction", "custom"): "it follows the formula below",
 }
@@ -58,6 +62,7 @@ BODY_COLUMNS = {
 }
 METHODS = {
     "implicit": "L-stable, states and unknowns solved together",
+    "esdirk4": "L-stable of order 4, for tight tolerances",
     "dopri5": "explicit Dormand-Prince, the report's",
 }
 TOPS = {
@@ -71,7 +76,8 @@ def explain(scene: Scene) -> list[Table]:
     """Tables that describe `scene`: bearing, motion, top, effects with their meaning, and solver."""
     return [
         _surfaces(scene.bearing), _bodies(scene.bearing), _motion(scene.motion), _top(scene.top),
-        _effects(scene.effects), *_laws(scene), _solver(scene),
+        *_history("load on the top plate", scene.load), *_history("rotation of the top", scene.top_rotation),
+        _effects(scene), *_laws(scene), _solver(scene),
     ]  # fmt: skip
 
 
@@ -120,17 +126,42 @@ def _top(top: Top) -> Table:
     return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
 
 
-def _effects(effects: Effects) -> Table:
-    chosen = {field.name: getattr(effects, field.name) for field in fields(effects) if field.name != "friction_law"}
-    rows = [(name, _value(value), MEANINGS[name, value]) for name, value in chosen.items()]
+def _effects(scene: Scene) -> Table:
+    """What is modelled and what it means; of what was chosen, the figure it rests on and what it saves."""
+    effects: Effects = scene.modelled
+    reasons = {reason.effect: reason for reason in scene.choice.reasons}
+    rows = []
+    for name in (field.name for field in fields(effects) if field.name != "friction_law"):
+        value = getattr(effects, name)
+        rows.append((name, _value(value), MEANINGS[name, value]))
+        if name in reasons and (because := reasons[name].because) != "asked for":
+            rows.append(("", "because", because))
+            rows += [("", "saves", saves)] if (saves := reasons[name].saves) else []
     if effects.law is not None:
         rows.append(("", "mu =", effects.law.text))
-    return Table("effects", (), rows)
+    if not reasons:
+        return Table("effects, as given; what they leave out is watched and noted", (), rows)
+    error = scene.choice.error
+    title = f"effects, chosen for {error:.3g} of the friction force; what is left out is watched, and taken in if met"
+    return Table(title, (), rows)
+
+
+def _history(title: str, history: Prescribed | None) -> list[Table]:
+    """Ranges of the channels of a load or a rotation."""
+    if history is None:
+        return []
+    values = history.evaluate(np.union1d(history.knots, np.linspace(0, history.duration, 2001)))
+    rows = [
+        (name, f"{low:.5g} ... {high:.5g} {history.unit(name)}")
+        for name, low, high in zip(history.CHANNELS, values.min(axis=0), values.max(axis=0), strict=True)
+        if low or high
+    ]
+    return [Table(f"{title}, changing until {history.duration:.6g} s", (), rows)]
 
 
 def _laws(scene: Scene) -> list[Table]:
     """The numbers of each surface in the law of friction, defaults put in."""
-    law, bearing = scene.effects.law, scene.bearing
+    law, bearing = scene.modelled.law, scene.bearing
     if law is None:
         return []
     rows = [numbers(law, bearing, index) for index in range(len(bearing.surfaces))]

@@ -25,11 +25,15 @@ HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "
 
 @dataclass(frozen=True)
 class Law:
-    """A law: its formula, and the numbers of a surface in it with their defaults (None: must be given)."""
+    """A law: its formula, and the numbers of a surface in it with their defaults (None: must be given).
+
+    beside: numbers that a surface may carry all the same, for a wider law that may follow (docs/effects.md).
+    """
 
     word: str
     text: str
     values: tuple[tuple[str, float | None], ...]
+    beside: tuple[str, ...] = ()
 
     @cached_property
     def tree(self) -> ast.expr:
@@ -60,11 +64,16 @@ _PVT = (
     "mu * pressure_ratio ** ((p - reference_pressure) / 50e6) * (1 - velocity_drop * exp(-velocity_rate * v))"
     " * (temperature_ratio ** (T / 50) + 0.4) / (temperature_ratio ** (20 / 50) + 0.4)"
 )
+_AT_START = _PVT.replace("T /", "start_temperature /")
+_NUMBERS: tuple[tuple[str, float | None], ...] = (
+    ("reference_pressure", None), ("pressure_ratio", 0.7), ("velocity_drop", 0.5), ("velocity_rate", 100.0),
+    ("temperature_ratio", 0.7),
+)  # fmt: skip
 BUILT_IN: dict[str, Law] = {
     "velocity": Law("velocity", _VELOCITY, (("friction_slow", None), ("velocity_rate", None))),
-    "pvt": Law("pvt", _PVT, (("reference_pressure", None), ("pressure_ratio", 0.7), ("velocity_drop", 0.5),
-                             ("velocity_rate", 100.0), ("temperature_ratio", 0.7))),
-}  # fmt: skip
+    "pv": Law("pv", _AT_START, (*_NUMBERS, ("start_temperature", HEAT["start_temperature"])), tuple(HEAT)),
+    "pvt": Law("pvt", _PVT, _NUMBERS),
+}
 
 
 @lru_cache(maxsize=32)

@@ -6,11 +6,11 @@ values and live elsewhere: changing them never recompiles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 from msfp_gen.errors import InputError
-from msfp_gen.fields import Quantity, check_fields
+from msfp_gen.fields import Choice, Quantity, check_fields
 from msfp_gen.friction_laws import Law, law_of
 
 _COUNT = Quantity("", least=0, whole=True)
@@ -72,9 +72,10 @@ class Effects:
     sliders: with their inertia, or massless (quasi-static).
     rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
     bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
-    friction: the law of the friction coefficient: constant, of velocity, of pressure, velocity and temperature ("pvt"),
-    or custom: the formula in friction_law (docs/friction.md).
+    friction: the law of the friction coefficient: constant, of velocity, of pressure and velocity ("pv"), of
+    temperature too ("pvt"), or custom: the formula in friction_law (docs/friction.md).
     uplift: whether bodies may part, fly and land (docs/uplift.md).
+    top_rotation: whether what holds the top plate turns (docs/loads.md).
     """
 
     dimension: Literal["spatial", "planar"] = "spatial"
@@ -82,9 +83,10 @@ class Effects:
     sliders: Literal["inertial", "massless"] = "inertial"
     rims: bool = True
     bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Literal["constant", "velocity", "pvt", "custom"] = "constant"
+    friction: Literal["constant", "velocity", "pv", "pvt", "custom"] = "constant"
     friction_law: str | None = None
     uplift: bool = False
+    top_rotation: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self, "effects")
@@ -109,6 +111,49 @@ class Effects:
         return law_of(self.friction, self.friction_law)
 
 
+LAWS = ("constant", "velocity", "pv", "pvt", "custom")
+
+
+@dataclass(frozen=True)
+class Auto:
+    """Effects of which those left None are chosen from the scene: the smallest set that can matter (docs/effects.md).
+
+    dimension, sliders, rims, uplift: a word of `Effects` to insist on, or None. friction: likewise; None: the law whose
+    numbers the surfaces carry. spin, bouc_wen, friction_law: as in `Effects`. error: what leaving an effect out may
+    change, as a share of the friction force. Raises InputError.
+    """
+
+    dimension: Annotated[str | None, Choice(("spatial", "planar"))] = None
+    sliders: Annotated[str | None, Choice(("inertial", "massless"))] = None
+    rims: Annotated[bool | None, Choice((True, False))] = None
+    uplift: Annotated[bool | None, Choice((True, False))] = None
+    spin: Literal["locked", "patch", "free"] = "locked"
+    bouc_wen: Literal["report", "isotropic"] = "report"
+    friction: Annotated[str | None, Choice(LAWS)] = None
+    friction_law: str | None = None
+    error: Annotated[float, Quantity("", above=0.0)] = 0.005
+
+    def __post_init__(self) -> None:
+        check_fields(self, "effects")
+        if self.error >= 1:
+            raise InputError(f"effects.error = {self.error}: a share of the friction force; give less than 1: 0.005")
+        self.closed(friction=self.friction or ("custom" if self.friction_law else None))
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """The effects that are chosen."""
+        return tuple(name for name in CHOSEN if getattr(self, name) is None)
+
+    def closed(self, **choices: object) -> Effects:
+        """Effects with the given choices; what is still open is modelled, but uplift. Raises InputError."""
+        given = {field.name: getattr(self, field.name) for field in fields(Effects) if hasattr(self, field.name)}
+        return Effects(**{name: value for name, value in {**given, **choices}.items() if value is not None})
+
+
+CHOSEN = ("dimension", "sliders", "rims", "uplift")
+"""Effects that `Auto` chooses."""
+
+
 @dataclass(frozen=True)
 class ModelSpec:
     """Everything that determines one set of equations, and so one compiled model."""
@@ -123,4 +168,5 @@ class ModelSpec:
         rims = "rims" if effects.rims else "norims"
         friction = effects.friction + (f"[{effects.friction_law.replace(' ', '')}]" if effects.friction_law else "")
         words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, friction)
-        return "-".join((self.layout.name, *words, *(("uplift",) if effects.uplift else ())))
+        more = (word for word in ("uplift", "top_rotation") if getattr(effects, word))
+        return "-".join((self.layout.name, *words, *more))

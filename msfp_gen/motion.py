@@ -17,6 +17,7 @@ from msfp_gen.piecewise import Array, Metadata, Pieces
 if TYPE_CHECKING:
     from os import PathLike
 
+    from msfp_gen.prescribed import Rotation
     from msfp_gen.records import Record, ScaleTo
 
 CHANNELS = ("u_g1", "u_g2", "u_g3", "psi_1", "theta_1", "phi_1")
@@ -129,6 +130,19 @@ class Motion:
             return None
         azimuth, across = _ROCKING_PLANES[turning]
         return None if np.any(moving[:, across]) else azimuth
+
+    def rocking(self, rotation: Rotation) -> Motion:
+        """The motion with the base turned by `rotation` as well: a plate out of level, or one that rocks.
+
+        Raises InputError where the rotation ends while it still turns and the motion goes on.
+        """
+        whole = rotation.until(self.duration)
+        pieces = np.zeros((len(whole.knots) - 1, 6, piecewise.ORDER))
+        pieces[:, 3:5] = whole.coefficients
+        inside = whole.knots[:-1] < self.duration
+        knots = np.append(whole.knots[:-1][inside], self.duration)
+        settled = [rotation.duration] if 0 < rotation.duration < self.duration else []
+        return self + Motion(knots, pieces[inside], np.array(settled), name=rotation.name)
 
     def rotated(self, angle: float) -> Motion:
         """The motion with its horizontal channels turned by `angle` [rad] about E3, from E1 towards E2.

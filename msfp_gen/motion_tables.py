@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Notes, Quantity, Text
 from msfp_gen.motion import Motion
+from msfp_gen.prescribed_tables import ROTATIONS, history_from
 
 RECORDS = "MSFP_GEN_RECORDS"  # folders, beside that of the scene file, in which records may lie
 _LENGTH = Quantity("m", above=0.0)
@@ -36,17 +37,21 @@ class Paths(Text):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionTable:
-    """What every kind may hold: a name, and how long the base rests where the motion ends [s]."""
+    """What every kind may hold: a name, how long the base rests at its end [s], and a table of how it turns."""
 
     kind: ClassVar[str]
     name: str = ""
     hold: Annotated[float | None, _TIME] = None
+    rotation: Mapping[str, Any] | None = None
 
     def build(self) -> Motion:
         """The motion; raises InputError with a message that starts with `motion`."""
         try:
             motion = self._motion()
-            return motion if self.hold is None else motion.held(self.hold)
+            motion = motion if self.hold is None else motion.held(self.hold)
+            if self.rotation is None:
+                return motion
+            return motion.rocking(history_from(ROTATIONS, self.rotation, "motion.rotation"))
         except InputError as error:
             text = str(error)
             raise InputError(text if text.startswith("motion") else f"motion.{text}") from None
@@ -55,7 +60,7 @@ class MotionTable:
         raise NotImplementedError
 
     def _values(self, *without: str) -> dict[str, Any]:
-        skipped = {"hold", *without}
+        skipped = {"hold", "rotation", *without}
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in skipped}
 
 

@@ -67,9 +67,12 @@ def load_values(top: Top) -> Array:
     return np.zeros(6)
 
 
-def seated(bearing: Bearing, top: Top | None) -> Array:
-    """Separations at which the seats carry the weights and the vertical load at rest, ndarray, shape (n-1, 3), [m]."""
-    load = 0.0 if top is None else -float(load_values(top)[2])
+def seated(bearing: Bearing, top: Top | None, pressing: float = 0.0) -> Array:
+    """Separations at which the seats carry the weights and the vertical load at rest, ndarray, shape (n-1, 3), [m].
+
+    pressing: vertical load beside that of the top [N].
+    """
+    load = pressing + (0.0 if top is None else -float(load_values(top)[2]))
     mass = top.mass if isinstance(top, MassTop) else 0.0
     masses = np.array([body.mass for body in bearing.bodies])
     masses[-1] += mass

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from msfp_gen.errors import InputError
 from msfp_gen.packing import Array
+
+if TYPE_CHECKING:
+    from msfp_gen.motion import Motion
 
 Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
 
@@ -44,6 +47,36 @@ def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
         )
     out = np.zeros_like(q)
     out[..., 1] = sign * q[..., along]
+    return out
+
+
+def motion_in_plane(motion: Motion, azimuth: float) -> Motion:
+    """A motion seen in the frame of its vertical plane."""
+    if not azimuth:
+        return motion
+    coefficients = motion.coefficients.copy()
+    coefficients[:, :3] = turned(coefficients[:, :3].transpose(0, 2, 1), azimuth).transpose(0, 2, 1)
+    coefficients[:, 3:] = tilt_pieces(coefficients[:, 3:], azimuth)
+    return replace(motion, coefficients=coefficients)
+
+
+def wrench_in_plane(wrench: Array, azimuth: float) -> Array:
+    """Pieces of force and moment, shape (k, 6, 6), in that frame."""
+    rows = wrench.transpose(0, 2, 1)
+    return np.ascontiguousarray(
+        np.concatenate([turned(rows[..., :3], azimuth), turned(rows[..., 3:], azimuth)], axis=-1).transpose(0, 2, 1)
+    )
+
+
+def tilt_pieces(angles: Array, azimuth: float) -> Array:
+    """Pieces of psi, theta and more, shape (k, c, 6), of a tilt in the E1-E3 or the E2-E3 plane as theta alone.
+
+    What leaves the plane stays out of it: a planar model looks at theta, and only until then.
+    """
+    if abs(azimuth - np.pi / 2) > 1e-9:
+        return angles
+    out = np.zeros_like(angles)
+    out[:, 1] = -angles[:, 0]
     return out
 
 

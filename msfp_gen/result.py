@@ -7,12 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.history import Counters, Event, History
+import numpy as np
+
+from msfp_gen.history import Array, Counters, Event, History
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.characterise import Characterisation
+    from msfp_gen.notes import Note
     from msfp_gen.scene import Scene
 
 __all__ = ["Counters", "Event", "History", "Result"]
@@ -23,7 +26,8 @@ class Result:
     """What `simulate` gives, and what a RunError carries of a run that failed.
 
     status: "ok", "stopped" (the scene's stop was met) or the name of a failure; message: one line in words.
-    provenance: versions and keys that say how the numbers came about.
+    provenance: versions and keys that say how the numbers came about. notes: where something that a model left out
+    began to matter, and what followed (docs/effects.md).
     """
 
     scene: Scene
@@ -33,11 +37,20 @@ class Result:
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
 
     @property
     def succeeded(self) -> bool:
         """Whether the run reached its end or the stop it was asked for."""
         return self.status in ("ok", "stopped")
+
+    @property
+    def friction_coefficient(self) -> Array:
+        """Coefficient mu of every surface, ndarray, shape (T, n-1): by its law, or the constant one of the bearing."""
+        recorded = self.history.friction_coefficient
+        if recorded is not None:
+            return recorded
+        return np.broadcast_to(self.scene.bearing.arrays()["friction"], self.history.normal_force.shape)
 
     @cached_property
     def dataset(self) -> xr.Dataset:

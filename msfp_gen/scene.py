@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import cos, isclose, sin
-from typing import Annotated, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
-from msfp_gen.friction_laws import HEAT_TIMES
+from msfp_gen.friction_laws import HEAT_TIMES, Law, law_of
+from msfp_gen.law_choice import friction_of
 from msfp_gen.law_numbers import check_bearing
-from msfp_gen.layout import Effects, ModelSpec
+from msfp_gen.layout import Auto, Effects, ModelSpec
 from msfp_gen.motion import Motion
+from msfp_gen.prescribed import Load, Rotation
 from msfp_gen.solver import Solver
-from msfp_gen.top import PrescribedTop, Top
+from msfp_gen.top import Top
+
+if TYPE_CHECKING:
+    from msfp_gen.choice import Choice
 
 _TIME = Quantity("s", above=0.0)
 MOST_ROWS = 1e8  # of output: some 100 GB
@@ -66,18 +71,22 @@ class Scene:
 
     duration [s]; None: as long as the motion. initial_state; None: centred and at rest. output_step [s]; None: the
     solver's own steps. stop: what ends the run early. motion_table: the motion as a scene file writes it, kept so that
-    the scene can be written back. Raises InputError: a part of the wrong kind, or parts that do not fit together.
+    the scene can be written back. load: on the top plate, beside what the top applies. top_rotation: how what the top's
+    rotational stiffness is fixed to turns. effects: what is modelled, or `Auto`: chosen from the scene. Raises
+    InputError: a part of the wrong kind, or parts that do not fit together.
     """
 
     bearing: Bearing
     motion: Motion
     top: Top
-    effects: Effects = field(default_factory=Effects)
+    effects: Effects | Auto = field(default_factory=Auto)
     solver: Solver = field(default_factory=Solver)
     duration: Annotated[float | None, _TIME] = None
     initial_state: InitialState | None = None
     output_step: Annotated[float | None, _TIME] = None
     stop: Stop | None = None
+    load: Load | None = None
+    top_rotation: Rotation | None = None
     name: str = ""
     motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
@@ -87,18 +96,38 @@ class Scene:
         check_fields(self, "scene")
         self._check_times()
         self._check_sizes()
-        check_bearing(self.effects.law, self.effects.friction, self.bearing)
-        if self.effects.rims:
+        word, law = self.law
+        check_bearing(law, word, self.bearing)
+        if self.effects.rims is not False:
             self._check_rims()
         elif self.stop is not None and self.stop.all_rims:
             raise InputError("stop.all_rims = True: effects.rims = False models no rims; give rims = true")
+        self._check_rotation()
         if self.effects.dimension == "planar":
             self._check_plane()
 
     @property
     def spec(self) -> ModelSpec:
-        """Which model the run needs."""
-        return ModelSpec(self.bearing.layout, self.effects)
+        """Which model the run needs, or begins with."""
+        return ModelSpec(self.bearing.layout, self.modelled)
+
+    @property
+    def law(self) -> tuple[str, Law | None]:
+        """The law of the friction coefficient that a run begins with: its word, and its formula (None: constant)."""
+        word = self.effects.friction or friction_of(self.bearing, self.effects.friction_law)
+        return word, law_of(word, self.effects.friction_law)
+
+    @property
+    def modelled(self) -> Effects:
+        """The effects a run begins with: the given ones, or those chosen from the scene."""
+        return self.choice.effects
+
+    @cached_property
+    def choice(self) -> Choice:
+        """The effects a run begins with and the reason for each."""
+        from msfp_gen.choice import choose
+
+        return choose(self)
 
     @property
     def end(self) -> float:
@@ -111,10 +140,10 @@ class Scene:
                 f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
                 "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
             )
-        law = self.effects.law
+        word, law = self.law
         if law is not None and law.heats and self.end > HEAT_TIMES[1]:
             raise InputError(
-                f"duration = {self.end:.12g}: effects.friction = {self.effects.friction!r} follows the heat of "
+                f"duration = {self.end:.12g}: effects.friction = {word!r} follows the heat of "
                 f"friction for {HEAT_TIMES[1]:g} s; give at most that, or a law without temperature"
             )
         if self.output_step is not None and self.output_step > self.end:
@@ -148,29 +177,36 @@ class Scene:
                     "give a stiffness [N/m], or effects.rims = false"
                 )
 
-    def _check_plane(self) -> None:
-        plane = self.motion.plane()
-        remedy = "give effects.dimension = 'spatial'"
-        if plane is None:
-            raise InputError(f"effects.dimension = 'planar': the motion lies in no vertical plane; {remedy}")
-        if not isinstance(self.top, PrescribedTop):
-            return
-        (f1, f2, _), (m1, m2, m3) = self.top.force, self.top.moment
-        out_of_plane = (f2 * cos(plane) - f1 * sin(plane), m1 * cos(plane) + m2 * sin(plane), m3)
-        scales = (abs(f1) + abs(f2), abs(m1) + abs(m2), 0.0)
-        if not all(isclose(part, 0.0, abs_tol=1e-12 * scale) for part, scale in zip(out_of_plane, scales, strict=True)):
+    def _check_rotation(self) -> None:
+        stiff = getattr(self.top, "rotational_stiffness", 0.0) or getattr(self.top, "rotational_damping", 0.0)
+        if self.top_rotation is not None and not stiff:
             raise InputError(
-                f"top.force = {self.top.force}, top.moment = {self.top.moment}: they leave the vertical plane of the "
-                f"motion, at azimuth {plane:.6g} rad; {remedy}"
+                f"top_rotation: a {self.top.kind} top without rotational_stiffness passes no rotation on; give it one "
+                "[N m/rad]"
             )
+        if isinstance(self.effects, Effects) and self.effects.top_rotation != (self.top_rotation is not None):
+            remedy = "give top_rotation, or leave the effect out" if self.effects.top_rotation else "set it to True"
+            raise InputError(f"effects.top_rotation = {self.effects.top_rotation}: not what the scene holds; {remedy}")
+
+    def _check_plane(self) -> None:
+        from msfp_gen.drive import plane_of
+
+        plane, until, what = plane_of(self)
+        if until < self.end:
+            where = f"leaves the vertical plane at azimuth {plane:.6g} rad from {until:.6g} s on"
+            if what == "motion" and until == 0:
+                where = "lies in no vertical plane"
+            raise InputError(f"effects.dimension = 'planar': the {what} {where}; give effects.dimension = 'spatial'")
 
 
 _KINDS: dict[str, type | tuple[type, ...]] = {
     "bearing": Bearing,
     "motion": Motion,
     "top": Top,
-    "effects": Effects,
+    "effects": (Effects, Auto),
     "solver": Solver,
     "initial_state": (InitialState, type(None)),
     "stop": (Stop, type(None)),
+    "load": (Load, type(None)),
+    "top_rotation": (Rotation, type(None)),
 }

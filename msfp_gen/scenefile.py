@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ from msfp_gen import catalogue, schema
 from msfp_gen.bearing import Bearing, Body, Surface
 from msfp_gen.errors import InputError
 from msfp_gen.fields import located, ruled_fields
-from msfp_gen.layout import Effects, Layout
+from msfp_gen.layout import CHOSEN, Auto, Effects, Layout
 from msfp_gen.motion import Motion
 from msfp_gen.motion_tables import KINDS, Pieces, is_file, placed
+from msfp_gen.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
 from msfp_gen.toml_text import dumps
@@ -22,7 +23,7 @@ from msfp_gen.top import MassTop, PrescribedTop, RigTop, Top
 
 Table = dict[str, Any]
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
-_PARTS = {"effects": Effects, "solver": Solver, "initial_state": InitialState, "stop": Stop}
+_PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
 
 
 def load_scene(source: str | Path) -> Scene:
@@ -65,6 +66,13 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Sc
         motion["file"] = placed(motion["file"], folder)
     top = dict(given["top"])
     parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
+    if "effects" in given:
+        parts["effects"] = _effects(given.pop("effects"))
+    for name, kinds in (("load", LOADS), ("top_rotation", ROTATIONS)):
+        if name in given:
+            parts[name] = history_from(kinds, given.pop(name), name)
+    if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
+        parts["effects"] = replace(parts["effects"], top_rotation=True)
     parts["bearing"] = _bearing(given["bearing"])
     parts["top"] = _TOPS[top.pop("kind")](**top)
     parts["motion"] = _motion(motion)
@@ -82,7 +90,8 @@ def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     motion: what to write as `[motion]` instead of what makes the scene's own; an empty table leaves it out.
     """
     own = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
-    tables = {name: getattr(scene, name) for name in _PARTS}
+    tables = {name: getattr(scene, name) for name in ("effects", *_PARTS)}
+    histories = {name: getattr(scene, name) for name in ("load", "top_rotation")}
     return dumps(
         {
             **own,
@@ -95,8 +104,16 @@ def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
             **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
             "top": {"kind": scene.top.kind, **_plain(scene.top)},
             **{name: _plain(value) for name, value in tables.items() if value is not None},
+            **{name: table_of(value) for name, value in histories.items() if value is not None},
         }
     )
+
+
+def _effects(given: Mapping[str, Any]) -> Effects | Auto:
+    """A table that says all there is to choose is followed to the letter; what it leaves out is chosen."""
+    if "error" in given or any(name not in given for name in CHOSEN):
+        return Auto(**given)
+    return Effects(**given)
 
 
 def _bearing(given: Mapping[str, Any]) -> Bearing:
@@ -128,6 +145,7 @@ def _motion_table(scene: Scene) -> Table:
     return Pieces.of(scene.motion)
 
 
-def _plain(value: Top | Bearing | Layout | Surface | Body | Effects | Solver | InitialState | Stop) -> Table:
-    names = [name for name, _, _ in ruled_fields(type(value))]
+def _plain(value: Top | Bearing | Layout | Surface | Body | Effects | Auto | Solver | InitialState | Stop) -> Table:
+    # That the top turns is said by its history.
+    names = [name for name, _, _ in ruled_fields(type(value)) if name != "top_rotation"]
     return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}

@@ -29,7 +29,8 @@ from msfp_gen.bearing import Bearing, Body, Surface
 from msfp_gen.catalogue import suggestion
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, Rule, Text, ruled_fields
-from msfp_gen.layout import Effects, Layout
+from msfp_gen.layout import Auto, Layout
+from msfp_gen.prescribed_tables import LOADS, ROTATIONS
 from msfp_gen.records.scaling import ScaleTo
 from msfp_gen.scene import InitialState, Scene, Stop
 from msfp_gen.solver import Solver
@@ -66,13 +67,17 @@ def _column(rule: Rule, value: object, *, text: bool) -> Any:
 
 def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
     """The union of tables told apart by their `kind`, and each table's model by its kind."""
-    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_INNER.get(kind, {})) for kind in kinds}
+    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds}
     return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
 
 
 _SCALE_TO = _model(ScaleTo)
-# Tables inside the table of a kind.
-_INNER: dict[type, Table] = {motion_tables.RecordMotion: {"scale_to": (_SCALE_TO, None)}}
+
+
+def _inner(kind: type) -> Table:
+    """Tables inside the table of a kind."""
+    scaled = {"scale_to": (_SCALE_TO, None)} if kind is motion_tables.RecordMotion else {}
+    return scaled | ({"rotation": (_ROTATION, None)} if issubclass(kind, motion_tables.MotionTable) else {})
 
 
 def _named(value: Any) -> Any:
@@ -93,6 +98,11 @@ def _bearing_union(full: Model, preset: Model) -> Any:
     return Annotated[union, Discriminator(_bearing_kind), BeforeValidator(_named)]
 
 
+def _auto(model: Model) -> Any:
+    """Effects as a table; the word "auto" alone leaves all of them to be chosen."""
+    return Annotated[model, BeforeValidator(lambda value: {} if value == "auto" else value)]
+
+
 _SURFACE, _BODY, _LAYOUT = _model(Surface), _model(Body), _model(Layout)
 _BEARING = _model(Bearing, layout=(_LAYOUT, ...), surfaces=(_rows(_SURFACE), ...), bodies=(_rows(_BODY), ...))
 _CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fields(Bearing)} | {
@@ -100,18 +110,22 @@ _CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fi
 }
 _PRESET: Model = create_model("PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), **_CHANGES)
 _EITHER = _bearing_union(_BEARING, _PRESET)
+_ROTATION, _ROTATIONS = _union(ROTATIONS.values())
+_LOAD, _LOADS = _union(LOADS.values())
 _MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
 _TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
 _PARTS: dict[str, Model] = {
     name: _model(kind)
-    for name, kind in (("effects", Effects), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
+    for name, kind in (("effects", Auto), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
 }
 _SCENE = _model(
     Scene,
     bearing=(_EITHER, ...),
     motion=(_MOTION, ...),
     top=(_TOP, ...),
-    **{name: (model, None) for name, model in _PARTS.items()},
+    load=(_LOAD, None),
+    top_rotation=(_ROTATION, None),
+    **{name: (_auto(model) if name == "effects" else model, None) for name, model in _PARTS.items()},
 )
 # Every table by its path, union tags included, to tell what a misspelt or missing key could be.
 _TABLES: dict[str, Model] = {
@@ -124,9 +138,12 @@ _TABLES: dict[str, Model] = {
     **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
     "motion.record.scale_to": _SCALE_TO,
     **{f"top.{kind}": model for kind, model in _TOPS.items()},
+    **{f"load.{kind}": model for kind, model in _LOADS.items()},
+    **{f"top_rotation.{kind}": model for kind, model in _ROTATIONS.items()},
+    **{f"motion.{kind}.rotation.{turn}": model for kind in _MOTIONS for turn, model in _ROTATIONS.items()},
     **_PARTS,
 }
-_TAGGED = ("bearing", "motion", "top")
+_TAGGED = ("bearing", "motion", "top", "load", "top_rotation")
 _WANTED = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
 
 

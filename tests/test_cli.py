@@ -24,7 +24,7 @@ def simulated(monkeypatch):
     """Replace building and integrating: scenes that were asked for are kept, and made-up loops come back."""
     asked = []
 
-    def simulate(scene, *, progress=None):
+    def simulate(scene, *, progress=None, strict=False):
         asked.append(scene)
         return dataclasses.replace(loops(), scene=scene)
 
@@ -37,7 +37,7 @@ def simulated(monkeypatch):
 def failing(simulated, monkeypatch):
     """The run stops half-way with what was computed until then."""
 
-    def simulate(scene, *, progress=None):
+    def simulate(scene, *, progress=None, strict=False):
         partial = dataclasses.replace(loops(), scene=scene, status="newton_failed", message="t = 3 s, surface 2")
         raise RunError("t = 3 s, surface 2:\nNewton did not converge; give a smaller max_step", status="newton_failed",
                        result=partial)  # fmt: skip

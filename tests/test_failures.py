@@ -43,7 +43,7 @@ def drop(size: float) -> Motion:
 
 
 def test_uplift_under_a_falling_base_names_surface_and_force() -> None:
-    scene = Scene(presets.bearing("fenz-tfp"), drop(12.0), Top.mass(11e3, 300.0, 0.5, 1e7, 1e4))
+    scene = Scene(presets.bearing("fenz-tfp"), drop(12.0), Top.mass(11e3, 300.0, 0.5, 1e7, 1e4), Effects())
     result = partial(failure_of(scene), "uplift")
     assert re.search(r", surface [1-4], P\.t3 \[N\] = \S+: .*uplift", result.message), result.message
     assert len(result.history.time) > 2 and result.history.normal_force.min() > 0
@@ -52,7 +52,7 @@ def test_uplift_under_a_falling_base_names_surface_and_force() -> None:
 @pytest.mark.parametrize("top", [Top.rig(0.0, 1e8), Top.prescribed((0.0, 0.0, 5e3))], ids=["lifted off", "pulled up"])
 def test_uplift_at_the_start_keeps_no_false_rows(top: Top) -> None:
     """Without axial load a falling base lifts off; pulled up it does so at once, and there is nothing to keep."""
-    error = failure_of(Scene(presets.bearing("fenz-tfp"), drop(12.0), top))
+    error = failure_of(Scene(presets.bearing("fenz-tfp"), drop(12.0), top, Effects()))
     assert error.status == "uplift" and "surface" in str(error)
     if isinstance(error.result, Result):
         assert error.result.history.normal_force.min() > 0
@@ -125,7 +125,7 @@ def test_interrupt_keeps_what_was_computed() -> None:
 def test_initial_state_under_tension_is_refused_at_once() -> None:
     q = np.zeros((4, 3))
     start = InitialState(q, q, q[:, :2])
-    scene = Scene(presets.bearing("fenz-tfp"), STILL, Top.prescribed((0.0, 0.0, 1e5)), initial_state=start)
+    scene = Scene(presets.bearing("fenz-tfp"), STILL, Top.prescribed((0.0, 0.0, 1e5)), Effects(), initial_state=start)
     assert failure_of(scene).status == "uplift"
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from msfp_gen import presets
 from msfp_gen.errors import InputError
-from msfp_gen.layout import Effects, ModelSpec
+from msfp_gen.layout import Auto, Effects, ModelSpec
 from msfp_gen.motion import Motion
 from msfp_gen.records import bundled
 from msfp_gen.scene import InitialState, Scene, Stop
@@ -86,7 +86,7 @@ def test_every_part_of_a_file_arrives_in_si(tmp_path):
     assert found.bearing.gravity == 9.80665
     assert found.motion == Motion.harmonic(0.025, 0.5, direction=pi / 2, cycles=1.0).held(2.0)
     assert found.top == Top.mass(11e3, (300, 280), 0.5, 1e7)
-    assert found.effects == Effects(spin="patch", rims=False)
+    assert found.effects == Auto(spin="patch", rims=False)
     assert found.solver == Solver("dopri5", rtol=1e-6, max_step=1e-3)
     assert found.stop == Stop(displacement=0.14)
     assert found.initial_state.q[3] == (-0.01, 0.0, 0.0) and found.initial_state.h[3] == (0.0, 1.0)
@@ -127,7 +127,8 @@ def test_scene_is_a_value():
     one = scene(name="x")
     assert one == scene(name="x") and one != scene(name="y") and hash(one) == hash(scene(name="x"))
     assert pickle.loads(pickle.dumps(presets.scene("fenz-test1"))) == presets.scene("fenz-test1")
-    assert one.spec == ModelSpec(one.bearing.layout, Effects())
+    assert one.effects == Auto() and one.spec == ModelSpec(one.bearing.layout, one.modelled)
+    assert scene(effects=Effects()).spec == ModelSpec(one.bearing.layout, Effects())
     assert one.end == MOTION.duration and scene(duration=1.5).end == 1.5
 
 
@@ -160,8 +161,8 @@ def test_a_full_bearing_and_a_csv_beside_the_file(tmp_path):
         ({"bearing": presets.bearing("fenz-tfp").replace(rim_radius=0.0)}, "bearing.bodies[0].rim_radius = 0 (body 2)"),
         ({"bearing": presets.bearing("fenz-tfp").replace(rim_stiffness=0.0)}, "rim_stiffness = 0 (surface 1)"),
         ({"effects": Effects(dimension="planar"), "motion": Motion.circle(0.02, 1.0)}, "no vertical plane"),
-        ({"effects": Effects(dimension="planar"), "top": Top.prescribed((0, 1, -1e5))}, "leave the vertical plane"),
-        ({"effects": Effects(dimension="planar"), "top": Top.prescribed((0, 0, -1e5), (1, 0, 0))}, "leave the vert"),
+        ({"effects": Effects(dimension="planar"), "top": Top.prescribed((0, 1, -1e5))}, "leaves the vertical plane"),
+        ({"effects": Effects(dimension="planar"), "top": Top.prescribed((0, 0, -1e5), (1, 0, 0))}, "leaves the vert"),
     ],
 )
 def test_parts_that_do_not_fit_are_refused(changes, word):

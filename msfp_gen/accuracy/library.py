@@ -38,9 +38,9 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     `rtol` for Y and Z. Steps are kept to what the motion resolves, and a run starts anew at a declared jump.
     Raises InputError where the model is no ordinary differential equation.
     """
-    if scene.effects.uplift:
+    if scene.modelled.uplift:
         raise InputError("effects.uplift: as_ode keeps all surfaces closed")
-    ode = build_model(scene.bearing.layout, scene.effects).as_ode(scene.bearing, scene.motion, scene.top)
+    ode = build_model(scene.bearing.layout, scene.modelled).as_ode(scene.bearing, scene.motion, scene.top)
     from scipy import integrate  # loaded before the clock starts
 
     begin, work, times = time.perf_counter(), Work(), grid(scene.end)

@@ -24,18 +24,21 @@ ERRORS = {
 class Errors:
     """What one run is off by: the horizontal force on the top over its peak, sliding over its largest on any surface.
 
-    maximum: at the worst instant (and surface); rms: over time (at the worst surface).
+    maximum: at the worst instant (and surface); rms: over time (at the worst surface); peak: of the peak alone,
+    whenever it occurs. nan where a run does not tell sliding.
     """
 
     force_max: float
     force_rms: float
     sliding_max: float
     sliding_rms: float
+    force_peak: float
+    sliding_peak: float
 
     @property
     def worst_rms(self) -> float:
         """The larger of the two RMS errors."""
-        return max(self.force_rms, self.sliding_rms)
+        return float(np.fmax(self.force_rms, self.sliding_rms))
 
     def as_dict(self) -> dict[str, float]:
         """By name."""
@@ -44,14 +47,16 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The run that errors are measured against, the independent one that confirms it, and how far they are apart.
+    """The run that errors are measured against, the one that confirms it, and how far they are apart.
 
-    Without a second run nothing confirms the first: `second` and `floor` are None.
+    Without a second run nothing confirms the first: `second` and `floor` are None. independent: the two are of
+    different families of methods.
     """
 
     trial: Trial
     second: Trial | None
     floor: Errors | None
+    independent: bool = True
 
 
 def errors(trial: Trial, reference: Trial) -> Errors | None:
@@ -60,22 +65,24 @@ def errors(trial: Trial, reference: Trial) -> Errors | None:
     if not rows:
         return None
     force = np.linalg.norm(trial.force[:rows] - reference.force[:rows], axis=1)
-    sliding = np.abs(trial.sliding[:rows] - reference.sliding[:rows])
+    told = trial.sliding if trial.sliding.shape[1] else np.full((rows, 1), np.nan)
+    sliding = np.abs(told[:rows] - reference.sliding[:rows])
     over_force, over_sliding = _peaks(reference)
+    if not over_force or not over_sliding:
+        raise InputError("scene: the bearing did not move, so there is nothing to be relative to; give it a motion")
     return Errors(
         float(force.max() / over_force),
         float(_rms(force) / over_force),
         float(sliding.max() / over_sliding),
         float(_rms(sliding).max() / over_sliding),
+        abs(_peaks(trial)[0] / over_force - 1),
+        abs(_peaks(trial)[1] / over_sliding - 1),
     )
 
 
-def _peaks(reference: Trial) -> tuple[float, float]:
-    force = float(np.linalg.norm(reference.force, axis=1).max())
-    sliding = float(reference.sliding.max())
-    if not force or not sliding:
-        raise InputError("scene: the bearing did not move, so there is nothing to be relative to; give it a motion")
-    return force, sliding
+def _peaks(trial: Trial) -> tuple[float, float]:
+    sliding = float(trial.sliding.max()) if trial.sliding.size else float("nan")
+    return float(np.linalg.norm(trial.force, axis=1).max()), sliding
 
 
 def _rms(values: Array) -> Array:
@@ -84,21 +91,22 @@ def _rms(values: Array) -> Array:
 
 
 def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
-    """Of the tightest finished run of every family, the two that agree best; the tighter one is the reference.
+    """Of the tightest finished run of every method, the two of different families that agree best; the tighter leads.
 
-    families: method -> family. Raises RunError where no run finished.
+    families: method -> family. Without two families two methods of one must do, or two tolerances of one method: then
+    the floor is a lower bound, and `Reference.independent` is false. Raises RunError where no run finished.
     """
-    tightest: dict[str, Trial] = {}
-    for trial in sorted((t for t in trials if t.finished), key=lambda t: -t.rtol):
-        tightest[families[trial.method]] = trial
-    if not tightest:
+    finished = sorted((t for t in trials if t.finished), key=lambda t: t.rtol)
+    if not finished:
         raise RunError("no run reached the end in the time given: raise the limit or shorten the scene", status="limit")
-    pairs = [sorted(pair, key=lambda t: t.rtol) for pair in combinations(tightest.values(), 2)]
-    if not pairs:
-        return Reference(next(iter(tightest.values())), None, None)
-    apart = [(_apart(first, second), first, second) for first, second in pairs]
-    floor, first, second = min(apart, key=lambda item: item[0].worst_rms)
-    return Reference(first, second, floor)
+    tightest = list({trial.method: trial for trial in reversed(finished)}.values())
+    pairs = list(combinations(sorted(tightest, key=lambda t: t.rtol), 2))
+    apart = [pair for pair in pairs if families[pair[0].method] != families[pair[1].method]]
+    chosen = apart or pairs or [(finished[0], second) for second in finished[1:2]]
+    if not chosen:
+        return Reference(finished[0], None, None, independent=False)
+    floor, first, second = min(((_apart(*pair), *pair) for pair in chosen), key=lambda item: item[0].worst_rms)
+    return Reference(first, second, floor, independent=bool(apart))
 
 
 def _apart(first: Trial, second: Trial) -> Errors:

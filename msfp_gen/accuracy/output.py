@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import fields
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.accuracy.machine import machine
-from msfp_gen.accuracy.measure import ERRORS
+from msfp_gen.accuracy.measure import ERRORS, Errors
 from msfp_gen.accuracy.trial import CUT_OFF, REFUSED
 from msfp_gen.output import make_folder, replacing
 from msfp_gen.tables import Table
@@ -16,8 +18,9 @@ from msfp_gen.tables import Table
 if TYPE_CHECKING:
     from msfp_gen.accuracy.study import Point, Study
 
+NAMES = tuple(field.name for field in fields(Errors))
 COLUMNS = ("series", "method", "rtol", "status", "seconds", "expected_seconds", "newton", "evaluations", "steps",
-           "reached", *ERRORS, "wrong", "message")  # fmt: skip
+           "reached", *NAMES, "wrong", "message")  # fmt: skip
 HEAD = ("", "tolerance", "outcome", "seconds", "Newton iterations", "force max", "force RMS", "sliding max",
         "sliding RMS")  # fmt: skip
 
@@ -29,7 +32,8 @@ def rows(study: Study) -> list[dict[str, Any]]:
 
 def _row(point: Point) -> dict[str, Any]:
     trial = point.trial
-    found = dict.fromkeys(ERRORS) if point.errors is None else point.errors.as_dict()
+    known = {} if point.errors is None else point.errors.as_dict()
+    found = {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
     values = (point.series, trial.method, trial.rtol, trial.status, trial.seconds, trial.expected_seconds, trial.newton,
               trial.evaluations, trial.steps, trial.reached, *found.values(), point.wrong, trial.message)  # fmt: skip
     return dict(zip(COLUMNS, values, strict=True))
@@ -63,9 +67,10 @@ def tables(study: Study) -> list[Table]:
 def _cells(point: Point) -> tuple[str, ...]:
     trial = point.trial
     expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
-    found = ["-"] * len(ERRORS) if point.errors is None else [f"{e:.1e}" for e in point.errors.as_dict().values()]
+    known = {} if point.errors is None else point.errors.as_dict()
+    found = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
     outcome = "WRONG SUCCESS" if point.wrong else trial.status
-    return point.series, f"{trial.rtol:g}", outcome, expected, str(trial.newton), *found
+    return point.series, trial.setting, outcome, expected, str(trial.newton), *found
 
 
 def reference_text(study: Study) -> str:
@@ -123,7 +128,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     """CSV, JSON, Markdown and the figure as SVG and PNG, in `folder`; the paths written. Raises InputError."""
     make_folder(folder, "--output")
     base = folder / study.kind
-    written = [_write_csv(study, base.with_suffix(".csv"))]
+    written = [write_csv(study, base.with_suffix(".csv"))]
     for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
         with replacing(base.with_suffix(suffix)) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -134,7 +139,8 @@ def write(study: Study, folder: Path) -> list[Path]:
     return written
 
 
-def _write_csv(study: Study, path: Path) -> Path:
+def write_csv(study: Study, path: Path) -> Path:
+    """One row a run, by the names of `COLUMNS`; whole or not at all."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()

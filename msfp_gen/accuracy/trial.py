@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene import Scene
 
 ROWS = 2000  # instants at which runs are compared
-QUICK, REPEATS = 0.1, 3  # [s]: shorter runs are timed several times, and the fastest counts
+QUICK, REPEATS = 0.1, 5  # [s]: shorter runs are timed several times, and the fastest counts
 CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
@@ -30,7 +30,8 @@ class Trial:
     message: one line in words. seconds: wall time of the integration [s], of a run that was cut off what it had taken.
     reached, end: time simulated and asked for [s]. newton: iterations of Newton's method on the equations of motion, in
     whatever loop; evaluations of them; steps accepted. force: horizontal force on the top support, ndarray, shape
-    (K, 2), [N]; sliding of every surface, shape (K, n-1), [m]: at the first K of `grid(end)`.
+    (K, 2), [N]; sliding of every surface, shape (K, n-1), [m]: at the first K of `grid(end)`. stepped: there is no
+    error control, and `rtol` is the step [s].
     """
 
     method: str
@@ -45,6 +46,12 @@ class Trial:
     force: Array
     sliding: Array
     message: str = ""
+    stepped: bool = False
+
+    @property
+    def setting(self) -> str:
+        """The tolerance, or the step with its unit."""
+        return f"{self.rtol:.3g} s" if self.stepped else f"{self.rtol:g}"
 
     @property
     def finished(self) -> bool:
@@ -85,10 +92,10 @@ def watch(limit: float) -> Callable[[float, float], None]:
     return look
 
 
-def run_native(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
+def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
     """`scene` by a method of the compiled runtime at `rtol`, for at most about `limit` seconds.
 
-    Raises InputError where the method cannot run the scene.
+    repeats: of runs too quick to be timed once; 0: none. Raises InputError where the method cannot run the scene.
     """
     solver = replace(scene.solver, method=cast(Any, name), rtol=rtol, atol_angle=None)
     compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
@@ -96,9 +103,9 @@ def run_native(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     if result is None:
         return replace(refused(name, rtol, scene, message), status=status)
     counters = result.counters
-    if status == OK and counters.wall_time < QUICK:
+    if repeats and status == OK and counters.wall_time < QUICK:
         plain = replace(scene, solver=solver, output_step=None)
-        seconds = min(simulate(plain).counters.wall_time for _ in range(REPEATS))
+        seconds = min(simulate(plain).counters.wall_time for _ in range(repeats))
         counters = replace(counters, wall_time=seconds)
     return _trial(name, rtol, scene, result, counters, status, message)
 

@@ -69,6 +69,28 @@ def work_precision(
     )  # fmt: skip
 
 
+@bench.command(
+    "model-error",
+    epilog="Examples:\n\n\b\n  msfp-gen bench model-error fenz-test2 -o study\n"
+    "  msfp-gen bench model-error scene.toml --tolerances 1e-2,1e-3,1e-4",
+)
+def model_error(
+    scene: SceneName,
+    tolerances: Tolerances = None,
+    limit: Limit = 10.0,
+    duration: Duration = None,
+    output: Folder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Error against cost of models that leave something out: planar, massless, no rims, linearised, OpenSees."""
+    from msfp_gen.accuracy.models import TOLERANCES, model_errors
+
+    _report(
+        scene, duration, output, as_json,
+        lambda chosen: model_errors(chosen, tolerances=_numbers(tolerances, TOLERANCES), limit=limit, say=note),
+    )  # fmt: skip
+
+
 def _report(
     name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
 ) -> None:

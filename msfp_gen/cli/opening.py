@@ -28,7 +28,7 @@ def build(scene: Scene) -> None:
     from msfp_gen.build import build_model
 
     with building() as progress:
-        build_model(scene.bearing.layout, scene.effects, progress=progress)
+        build_model(scene.bearing.layout, scene.modelled, progress=progress)
 
 
 def simulated(scene: Scene, **options: Any) -> tuple[Result | None, RunError | None]:

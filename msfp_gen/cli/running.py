@@ -12,6 +12,7 @@ import typer
 from msfp_gen.cli.console import Output, SceneName, note, number, say, show, words
 from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
 from msfp_gen.cli.opening import simulated
+from msfp_gen.cli.wanted import Budget, Explain, Wanted, WantedError
 from msfp_gen.errors import RunError
 from msfp_gen.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.solver import Solver
@@ -27,6 +28,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
+    "  msfp-gen run scene.toml --error 0.5%   # say what this run is off by, and what less would cost\n"
     "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
     "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
@@ -47,12 +49,20 @@ def run(
     duration: Annotated[
         float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this time.")
     ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Stop where what the model leaves out would matter.")
+    ] = False,
+    error: WantedError = None,
+    explain: Explain = False,
+    budget: Budget = None,
     checkpoint: CheckpointFile = None,
     every: Every = None,
     resume: ResumeFile = None,
 ) -> None:
     """Simulate a scene."""
     keep = Keep.of(checkpoint, every, resume)
+    others = {"--rtol": rtol, "--method": method, "--checkpoint": checkpoint, "--resume": resume}
+    wanted = Wanted.of(error, explain, budget, others)
     if output is not None:
         from msfp_gen.export import check_result_path
 
@@ -62,7 +72,7 @@ def run(
     from msfp_gen.scenefile import load_scene
 
     chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json, keep):
+    for path in _run(chosen, output, plot, as_json, keep, wanted, strict):
         note(f"wrote {path}")
 
 
@@ -91,13 +101,17 @@ def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
 
 
 def _run(
-    scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False, keep: Keep = NOT_KEPT
-) -> list[Path]:
+    scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False, keep: Keep = NOT_KEPT,
+    wanted: Wanted | None = None, strict: bool = False,
+) -> list[Path]:  # fmt: skip
     """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
-    result, failure = simulated(scene, **keep.arguments)
+    found = None if wanted is None else wanted.simulate(scene)
+    result, failure = simulated(scene, strict=strict, **keep.arguments) if found is None else (found.result, None)
     saved: list[Path] = []
     if result is not None:
-        _report(result, as_json)
+        _report(result, as_json, {} if found is None else {"accuracy": found.as_dict()})
+        if found is not None and not as_json:
+            show(found.tables)
         with keep.while_saving():
             saved = _save(result, output, plot)
     if failure is not None:
@@ -107,13 +121,15 @@ def _run(
     return saved
 
 
-def _report(result: Result, as_json: bool) -> None:
+def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -> None:
     if as_json:
-        say(json.dumps(result.summary, indent=2, allow_nan=False))
+        say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
     from msfp_gen.tables import summary_tables
 
     show(summary_tables(result))
+    for line in (entry.line for entry in result.notes):
+        note(line)
 
 
 def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:

@@ -132,6 +132,17 @@ static void load_top(const msfp_point *at, double *force, double *moment)
     msfp_moment_M_put(moment, at->load + 3);
 }
 
+#if MSFP_TURNED
+void msfp_held(const msfp_point *at, double *upright)
+{
+    double support[MSFP_SUPPORT_SIZE];
+    for (int order = 0; order < 2; ++order)
+        for (int i = 0; i < PAIR; ++i)
+            support[order * PAIR + i] = at->support[order][MSFP_PLANAR ? 1 : i];
+    msfp_upright(support, upright);
+}
+#endif
+
 static void split_wrench(const double *wrench, double *force, double *moment)
 {
     memcpy(force, wrench, VECTOR * sizeof *force);
@@ -142,7 +153,11 @@ MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_wor
 {
     double force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE];
     load_top(at, force, moment);
-    msfp_top_wrench(p->top, w->body[NB], w->x[NB], force, moment, wrench);
+#if MSFP_TURNED
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_held(at, upright);
+#endif
+    msfp_top_wrench(p->top, w->body[NB], w->x[NB], force, moment TURNED(upright), wrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
@@ -152,8 +167,12 @@ MSFP_WIDE void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, 
     static const double zero[6 * DOF];
     double force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     load_top(at, force, moment);
+#if MSFP_TURNED
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_held(at, upright);
+#endif
     const double *df = dload ? dload : zero, *dm = dload ? dload + VECTOR * DOF : zero;
-    msfp_top_wrench_tangent(p->top, w->body[NB], w->x[NB], force, moment, wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
+    msfp_top_wrench_tangent(p->top, w->body[NB], w->x[NB], force, moment TURNED(upright), wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
     memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);

@@ -57,6 +57,9 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 typedef struct {
     double base[3][6]; /* u_g1..3, psi_1, theta_1, phi_1; first and second derivatives */
     double load[6];    /* force and moment that the outside applies to the top plate at r_nn */
+#if MSFP_TURNED
+    double support[2][6]; /* psi, theta of what holds the top plate, then their rates; the rest is unused */
+#endif
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];
     double f[MSFP_NB][2];
 #if MSFP_HEAT
@@ -107,7 +110,8 @@ enum {
     MSFP_E_ANGLE,         /* theta near +-pi/2: the Euler angles are singular */
     MSFP_E_STEPS,         /* the allowed number of steps is used up */
     MSFP_E_FINITE,        /* a value is not finite */
-    MSFP_E_MEMORY
+    MSFP_E_MEMORY,
+    MSFP_E_GUARD          /* what the model leaves out would matter from here on: see run->guard */
 };
 
 /* The condensed equations: angular balances with interface forces summed from the top and contact in
@@ -151,6 +155,11 @@ int msfp_pulling(const msfp_work *w);
 /* How far the seat of surface j is compressed; negative: how far it is open. 1 where bodies cannot part. */
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 
+#if MSFP_TURNED
+/* The direction that the top plate is held to, and its angular velocity: block upright. */
+void msfp_held(const msfp_point *at, double *upright);
+#endif
+
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);
 
 /* Named points (3.1)-(3.11) of bodies 0..NB: [body][bottom, centre of mass, top, sphere centre][r, v, a][3];
@@ -174,7 +183,7 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
 /* ---- runs ----------------------------------------------------------------------------------- */
 
-enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1 };
+enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1, MSFP_ESDIRK4 = 2 };
 #define MSFP_STAGES 7 /* at most */
 
 typedef struct {
@@ -186,10 +195,26 @@ typedef struct {
     double stop_displacement;     /* 0: none */
     int stop_all_rims;
     int stop_at_knots;            /* the acceleration of the base has a kink at every knot: land on each */
+    int stop_at_loads;            /* the load has a kink at every knot: likewise */
+    double start_time;            /* a run that goes on from another, with its origin and its heat */
+    const double *origin;         /* [3] r_01 - r_nn at the start of the whole; NULL: where this one starts */
+    const double *heat;           /* [NB][MSFP_HEAT]; NULL: none */
+    int guards, guard_stop;       /* which watches look, and at which a run stops: bits of MSFP_GUARD_.. */
+    double guard_normal;          /* least normal force [N] */
+    double guard_inertia, guard_time; /* most inertial over normal force; time over which a velocity may change [s] */
+    double guard_rise;            /* most rise in temperature [K] */
+    double guard_heating[MSFP_NB]; /* sqrt(D/pi)/k over the area of contact [K s^1/2/J] */
 } msfp_options;
 
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
        MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
+
+/* Watches over what a model leaves out: guard.c. */
+enum { MSFP_GUARD_RIMS, MSFP_GUARD_UPLIFT, MSFP_GUARD_INERTIA, MSFP_GUARD_HEAT, MSFP_GUARDS };
+typedef struct {
+    double time, value; /* [s]; beyond the capacity [m], N [N], m a/N, rise [K] */
+    int surface;        /* 1-based; 0: not tripped */
+} msfp_trip;
 
 /* Integrals over the run, in order: work put in, recoverable friction, dissipated friction, rims, top dampers, seats. */
 enum { MSFP_WORK_INPUT, MSFP_WORK_FRICTION_STORED, MSFP_WORK_FRICTION, MSFP_WORK_RIM, MSFP_WORK_TOP, MSFP_WORK_SEAT, MSFP_WORKS };
@@ -221,7 +246,7 @@ typedef struct {
     double displacement[3], top_force[3];
 } msfp_event;
 
-/* Event functions of a run: the gap of every rim, what is left to the stop displacement, and how far every seat is
+/* Event functions of a run: the gap of every rim (to first order while it is open), what is left to the stop displacement, and how far every seat is
  * compressed where bodies may part. */
 #define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
 
@@ -235,25 +260,30 @@ typedef struct {
 #endif
 } msfp_state;
 
-/* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
+/* Values at a share of the last step, for dense output. */
 typedef struct {
-    double share; /* of the step */
+    double share;
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif
 } msfp_middle;
+#define MSFP_MIDDLES 3 /* at most */
 
 typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
+#if MSFP_TURNED
+    msfp_history support;
+#endif
     const double *jumps;
     int jump_count;
     msfp_options options;
     /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
     int next_jump;
     msfp_state now, next;
-    msfp_middle middle;
+    msfp_middle middle[MSFP_MIDDLES]; /* between the ends of the last step */
+    int middles;                      /* 0: none, the ends and their rates must do */
     msfp_work work;
 #if MSFP_HEAT
     struct { /* of the step in progress: what the stages before leave, the stage itself, and all their rates */
@@ -266,6 +296,10 @@ typedef struct {
     double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
     int pivots[MSFP_DOF];
     double slope[MSFP_NB][MSFP_NQ]; /* of the accelerations over the last step, where it goes on */
+    struct {
+        double velocity[MSFP_NB][3], energy[MSFP_NB], peak[MSFP_NB]; /* [m/s]; of the flux: [K s^1/2], [K/s^1/2] */
+        msfp_trip trips[MSFP_GUARDS];
+    } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
     long counts[MSFP_COUNTS];
@@ -281,6 +315,9 @@ typedef struct {
 
 /* Start a run: histories and jumps must outlive it. */
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+#if MSFP_TURNED
+                   const msfp_history *support,
+#endif
                    const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f);
 /* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
@@ -289,10 +326,16 @@ int msfp_run_advance(msfp_run *run, long steps);
  * Returns 0, MSFP_E_MEMORY, or MSFP_E_FINITE for bytes that no run of this model leaves. */
 int msfp_run_restore(msfp_run *run, const char *state, const msfp_row *rows, size_t row_count,
                      const msfp_event *events, size_t event_count);
+/* Record the present state, if it is not: 0 or MSFP_E_MEMORY. */
+int msfp_write_now(msfp_run *run);
 void msfp_run_free(msfp_run *run);
 const char *msfp_status_name(int status);
 
+const char *msfp_guard_name(int guard);
+
 /* Between the files of the runtime. */
+/* Friction of one surface: mu N f . slip, added to what Y, Z store and what is lost (3.16)-(3.18). */
+void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
@@ -302,6 +345,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */
 double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], const double dv[MSFP_NB][MSFP_NQ], const double df[MSFP_NB][2]);
+/* Order of a method's error estimate, plus one: the exponent of its step control. */
+double msfp_order(int method);
 /* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
 int msfp_step_implicit(msfp_run *run, double h, double *error);
 int msfp_step_dopri5(msfp_run *run, double h, double *error);

@@ -46,8 +46,7 @@ static double friction_coefficient(const double *par, const double *contact)
 #endif
 }
 
-/* Friction of one surface: mu N f . slip, split into what Y, Z store and what is lost (3.16)-(3.18). */
-static void friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost)
+void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost)
 {
     const double u = contact[MSFP_CONTACT_U], v = msfp_contact_v(contact);
     const double yu = f[0] * u, zv = f[1] * v, square = f[0] * f[0] + f[1] * f[1];
@@ -80,6 +79,23 @@ static double rim_power(const msfp_work *w, int j)
     return -dot3(moment, turning);
 }
 
+#if MSFP_TURNED
+/* Power of a support that turns; leaves in `turning` how the plate turns against it. */
+static double support_power(const double *t, const msfp_point *at, const double *axis, double *turning)
+{
+    double upright[MSFP_UPRIGHT_SIZE], e[3], w[3], moment[3];
+    msfp_held(at, upright);
+    msfp_upright_e_get(upright, e);
+    msfp_upright_w_get(upright, w);
+    for (int i = 0; i < 3; ++i)
+        turning[i] -= w[i];
+    for (int i = 0; i < 3; ++i)
+        moment[i] = t[MSFP_TOP_PARAMETERS_KR] * (e[(i + 1) % 3] * axis[(i + 2) % 3] - e[(i + 2) % 3] * axis[(i + 1) % 3])
+                    + t[MSFP_TOP_PARAMETERS_CR] * turning[i];
+    return -dot3(moment, w);
+}
+#endif
+
 /* Work of the base on the stack by turning, of the rig's base point, and of the loads. */
 static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
 {
@@ -96,6 +112,9 @@ static double drive_power(const msfp_parameters *p, const msfp_point *at, const 
     power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
     for (int i = 0; i < 2; ++i)
         power += (t[MSFP_TOP_PARAMETERS_K] * (C[i] - anchor[i]) + t[MSFP_TOP_PARAMETERS_C] * V[i]) * at->base[1][i];
+#if MSFP_TURNED
+    power += support_power(t, at, axis, turning);
+#endif
     *damped = t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning);
     msfp_body_V_get(w->body[0], centre);
     msfp_body_wp_get(w->body[0], turning);
@@ -127,22 +146,29 @@ void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[
     power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
     power[MSFP_WORK_SEAT] = seat_power(w);
     for (int j = 0; j < NB; ++j) {
-        friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
+        msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
         if (w->rim_active[j])
             power[MSFP_WORK_RIM] += rim_power(w, j);
     }
 }
 
-static double restraint_energy(const msfp_parameters *p, const msfp_work *w)
+static double restraint_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     const double *t = p->top;
-    double C[3], axis[3], anchor[3];
+    double C[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, lean = 0.0;
     msfp_body_C_get(w->body[NB], C);
     msfp_body_t3_get(w->body[NB], axis);
     msfp_top_parameters_x0_get(t, anchor);
     const double x = C[0] - anchor[0], y = C[1] - anchor[1];
-    /* 1 - t3.E3 without cancellation at small tilt */
-    const double lean = (axis[0] * axis[0] + axis[1] * axis[1]) / (1.0 + axis[2]);
+#if MSFP_TURNED
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_held(at, upright);
+    msfp_upright_e_get(upright, held);
+#else
+    (void)at;
+#endif
+    for (int i = 0; i < 3; ++i) /* 1 - t3.e without cancellation at small tilt */
+        lean += 0.5 * (axis[i] - held[i]) * (axis[i] - held[i]);
     return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean;
 }
 
@@ -205,7 +231,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     energies(p, at, w, total);
     row->kinetic = total[0];
     row->potential = total[1];
-    row->restraint = restraint_energy(p, w);
+    row->restraint = restraint_energy(p, at, w);
     row->rim_stored = rim_energy(p, w, row->gap);
     row->seat_stored = 0.0;
 #if MSFP_UPLIFT

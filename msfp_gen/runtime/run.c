@@ -12,7 +12,7 @@ static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
-    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory" };
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard" };
     return names[status];
 }
 
@@ -23,6 +23,9 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
         t = nextafter(run->jumps[run->next_jump], -INFINITY);
     msfp_history_at(&run->motion, t, 3, at->base);
     msfp_history_at(&run->load, t, 1, (double(*)[6])at->load);
+#if MSFP_TURNED
+    msfp_history_at(&run->support, t, 2, at->support);
+#endif
 }
 
 /* Absolute tolerance of a coordinate: the solver's for angles; a separation's that of the force it stands for, as for Y, Z. */
@@ -80,13 +83,21 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
 #define EVENTS MSFP_EVENTS
 #define FIRST_SEAT (NB + 1)
 
-/* Event functions of a state: the gaps to first order where they close, what is left to the stop displacement, compressions. */
+/* Event functions of a state: the gaps (while open, to first order where they close), what is left to the stop displacement, compressions. */
 static void event_values(msfp_run *run, const msfp_state *s, double *g)
 {
-    double u[3];
+    double u[3], sliding[NB][MSFP_GAP_SIZE];
     msfp_row row;
-    for (int j = 0; j < NB; ++j)
+    int met = 0;
+    for (int j = 0; j < NB; ++j) { /* no arc tangent while the rim is away */
         g[j] = (cos(s->q[j][0]) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        met |= g[j] <= 0.0;
+    }
+    if (met) {
+        msfp_gaps(&run->parameters, s->q, sliding);
+        for (int j = 0; j < NB; ++j)
+            g[j] = g[j] <= 0.0 ? sliding[j][MSFP_GAP_G] : g[j];
+    }
     g[NB] = 1.0;
     if (run->options.stop_displacement > 0.0) {
         msfp_observe_state(run, s, &row);
@@ -173,7 +184,7 @@ static int settle(msfp_run *run)
         const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
         if (status)
             return status;
-        if (solution.iterations && run->options.method == MSFP_IMPLICIT && run->determinant == 0)
+        if (solution.iterations && run->options.method != MSFP_DOPRI5 && run->determinant == 0)
             run->determinant = solution.determinant;
     }
     memcpy(seed.fp, at.f, sizeof seed.fp);
@@ -192,6 +203,9 @@ static int settle(msfp_run *run)
 }
 
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+#if MSFP_TURNED
+                   const msfp_history *support,
+#endif
                    const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f)
 {
@@ -199,13 +213,21 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     run->parameters = *p;
     run->motion = *motion;
     run->load = *load;
+#if MSFP_TURNED
+    run->support = *support;
+#endif
     run->jumps = jumps;
     run->jump_count = jump_count;
     run->options = *options;
     memcpy(run->now.q, q, sizeof run->now.q);
     memcpy(run->now.v, v, sizeof run->now.v);
     memcpy(run->now.f, f, sizeof run->now.f);
-    while (run->next_jump < jump_count && jumps[run->next_jump] <= 0.0)
+    run->now.t = options->start_time;
+#if MSFP_HEAT
+    if (options->heat)
+        memcpy(run->now.heat, options->heat, sizeof run->now.heat);
+#endif
+    while (run->next_jump < jump_count && jumps[run->next_jump] <= run->now.t)
         ++run->next_jump;
     run->status = settle(run);
     if (run->status)
@@ -213,36 +235,45 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
     msfp_row row;
     msfp_observe_state(run, &run->now, &row);
     for (int i = 0; i < 3; ++i)
-        run->start[i] = row.base[i] - row.top[i];
-    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * options->duration);
+        run->start[i] = options->origin ? options->origin[i] : row.base[i] - row.top[i];
+    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * (options->duration - run->now.t));
     run->previous_error = 1.0;
     event_values(run, &run->now, run->events_now);
+    msfp_guard_begin(run);
     run->status = msfp_write_row(run, &run->now);
-    run->output_time = options->output_step;
+    if (options->output_step > 0.0)
+        run->output_time = msfp_next_output(run);
     return run->status;
 }
 
 /* Times closer than this are one time: what rounding leaves of a step that was to land there [s]. */
 static double same_time(double t) { return 1e-12 * fmax(1.0, t); }
 
+/* Whether the base acceleration may have a kink where the run is. */
 static int at_knot(const msfp_run *run)
 {
     const msfp_history *m = &run->motion;
     return fabs(run->now.t - m->knots[m->last]) <= same_time(run->now.t) || fabs(run->now.t - m->knots[m->last + 1]) <= same_time(run->now.t);
 }
 
+/* The knot of a history that comes next. */
+static double next_knot(const msfp_history *h, double t)
+{
+    int i = h->last;
+    while (i > 0 && h->knots[i] > t)
+        --i;
+    while (i < h->pieces && h->knots[i] <= t + same_time(t))
+        ++i;
+    return h->knots[i] > t ? h->knots[i] : INFINITY;
+}
+
 static double target(const msfp_run *run)
 {
     double end = run->options.duration;
-    if (run->options.stop_at_knots) {
-        const msfp_history *m = &run->motion;
-        int i = m->last;
-        while (i > 0 && m->knots[i] > run->now.t)
-            --i;
-        while (i < m->pieces && m->knots[i] <= run->now.t + same_time(run->now.t))
-            ++i;
-        end = fmin(end, m->knots[i]);
-    }
+    if (run->options.stop_at_knots)
+        end = fmin(end, next_knot(&run->motion, run->now.t));
+    if (run->options.stop_at_loads)
+        end = fmin(end, next_knot(&run->load, run->now.t));
     if (run->next_jump < run->jump_count)
         end = fmin(end, run->jumps[run->next_jump]);
     return end;
@@ -260,7 +291,7 @@ static int try_step(msfp_run *run, double h, double *error)
 
 static double controlled(const msfp_run *run, double error)
 {
-    const double order = run->options.method == MSFP_DOPRI5 ? 5.0 : 3.0;
+    const double order = msfp_order(run->options.method);
     const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
     return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
 }
@@ -324,7 +355,7 @@ static int one_step(msfp_run *run)
         }
         if (error > 1.0) {
             ++run->counts[MSFP_COUNT_REJECTED];
-            return !shrink(run, h, fmax(0.1, 0.9 * pow(error, run->options.method == MSFP_DOPRI5 ? -0.2 : -1.0 / 3.0)), MSFP_E_STEP);
+            return !shrink(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_order(run->options.method))), MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);
         event_values(run, &run->next, after);
@@ -335,6 +366,10 @@ static int one_step(msfp_run *run)
     }
     if (fabs(run->next.t - target(run)) <= same_time(run->next.t)) /* land on the target exactly */
         run->next.t = target(run);
+    if (msfp_guarded(run, after)) {
+        run->status = MSFP_E_GUARD;
+        return 0;
+    }
     return accept(run, before, after, error, h);
 }
 

@@ -11,8 +11,13 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
 /* Displacement across the bearing, less its start. */
 void msfp_across(const msfp_run *run, const msfp_row *row, double *displacement);
+/* Whether the step just made leaves what the model holds for, and the run is to stop for it. */
+int msfp_guarded(msfp_run *run, const double *gaps);
+void msfp_guard_begin(msfp_run *run);
 /* 0 or MSFP_E_MEMORY. */
 int msfp_write_row(msfp_run *run, const msfp_state *s);
+/* Time of the next row where rows are wanted at even times. */
+double msfp_next_output(const msfp_run *run);
 int msfp_write_step(msfp_run *run);
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 

@@ -17,6 +17,11 @@
 #else
 #define LAW(...)
 #endif
+#if MSFP_TURNED
+#define TURNED(...) , __VA_ARGS__ /* one more argument where the support of the top plate turns */
+#else
+#define TURNED(...)
+#endif
 
 /* Field of block coordinates: angle i of order 0, 1, 2. */
 static inline int coordinate(int order, int i) { return MSFP_PLANAR ? order : 3 * order + i; }

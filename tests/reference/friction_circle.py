@@ -24,7 +24,7 @@ from .stack import complex_jacobian, newton
 STILL = 1e-6  # [rad/m] a sliding surface turning back faster than this is stuck; slower is "at yield, not moving"
 SLACK = 1e-9  # relative excess over the friction circle that starts a slip
 TOUCH = 1e-10  # [m] a stage starts this far behind the meeting with a rim, so that its stiffness is in the rates
-STRIDE = (1e-11, 1e-3)  # [m] events are looked for once a stride, which doubles from the first to the second
+STRIDE = (1e-11, 4e-3)  # [m] events are looked for once a stride, which doubles from the first to the second
 
 
 @dataclass(frozen=True)
@@ -223,8 +223,12 @@ def transitions(push: Push, end: float) -> list[Transition]:
 def force_at(push: Push, displacements: Sequence[float], story: list[Transition] | None = None) -> Array:
     """Horizontal force [N] that a monotonic push needs at each displacement [m] > 0; story: its transitions."""
     story = story or transitions(push, max(displacements))
-    stages = [max((s.at for s in story if s.at.displacement <= d), key=lambda at: at.displacement)
-              for d in displacements]  # fmt: skip
-    # of several transitions at one place the last one told counts
-    stages = [[s.at for s in story if s.at.displacement == stage.displacement][-1] for stage in stages]
-    return np.array([advance(push, stage, d).force for stage, d in zip(stages, displacements, strict=True)])
+    reached, force = story[0].at, np.empty(len(displacements))
+    for index in np.argsort(displacements):
+        d = displacements[index]
+        # of several transitions at one place the last one told counts
+        stage = max((s.at for s in story if s.at.displacement <= d), key=lambda at: at.displacement)
+        stage = [s.at for s in story if s.at.displacement == stage.displacement][-1]
+        reached = advance(push, max(stage, reached, key=lambda at: at.displacement), d)
+        force[index] = reached.force
+    return force

@@ -1,0 +1,74 @@
+"""What a run says about what its model left out: when a watch tripped, by how much, and what followed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msfp_gen.switching import JAMMED, WIDER
+
+if TYPE_CHECKING:
+    from msfp_gen.layout import Effects
+    from msfp_gen.scene import Scene
+    from msfp_gen.simulation import Segment
+
+TEXTS = {
+    "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
+    "uplift": "surface {surface} presses with {value:.4g} N only; the model keeps all surfaces closed",
+    "inertia": "inertial forces of body {body} reach {value:.2g} of N on surface {surface}; the model has none",
+    "heat": "friction may heat surface {surface} by {value:.3g} K; its coefficient knows no temperature",
+    "plane": "motion or loads leave the vertical plane of the model",
+    "jammed": "the equations have no way on from here ({status})",
+}
+
+
+@dataclass(frozen=True)
+class Note:
+    """One line of a run. time [s]; kind: rims, uplift, inertia, heat, plane or jammed; surface 1..n-1, 0: none.
+
+    value: how far [m], N [N], inertial over normal force, bound of the rise [K]. action: the model that the run went on
+    with, or "" where it went on as it was.
+    """
+
+    time: float
+    kind: str
+    surface: int
+    value: float
+    text: str
+    action: str = ""
+
+    @property
+    def line(self) -> str:
+        """When, what, and what followed."""
+        return f"t = {self.time:.6g} s: {self.text}" + (f"; went on with {self.action}" if self.action else "")
+
+
+def notes_of(scene: Scene, segment: Segment, after: Effects | None) -> list[Note]:
+    """The notes of a segment; `after`: the effects that the run goes on with, None where it does not."""
+    run = segment.run
+    trips = dict(run.trips)
+    if after is not None and segment.status == "ok":
+        trips["plane"] = (run.time, 0, 0.0)
+    if after is not None and segment.status == "uplift":
+        trips["uplift"] = (run.time, *run.status[1:])
+    if after is not None and segment.status in JAMMED:
+        trips["jammed"] = (run.time, *run.status[1:])
+    before = segment.model.effects
+    return [
+        Note(
+            time, kind, surface, value,
+            TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=segment.status),
+            ", ".join(_changes(kind, before, after)),
+        )
+        for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
+    ]  # fmt: skip
+
+
+def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
+    """What a watch that tripped has changed; a run without a way on tries whatever is left."""
+    names = WIDER.get(kind, {**WIDER["inertia"], **WIDER["uplift"]})
+    return [
+        f"{name} = {getattr(after, name)}"
+        for name in names
+        if after is not None and getattr(before, name) != getattr(after, name)
+    ]
