@@ -53,7 +53,8 @@ class Function:
 def jacobian(kernel: Kernel) -> tuple[tuple[str, ...], tuple[tuple[int, str], ...]]:
     """Text of the derivatives of a program's results with respect to its own inputs, row by row of what is wanted."""
     sources = own_inputs(kernel.program)
-    rows = [name for name in kernel.program.results if name in kernel.program.tangents]
+    assert kernel.program.output is not None
+    rows = [f.name for f in kernel.program.output.block.fields if f.name in kernel.program.tangents]
     lines: list[str] = []
     stores: list[tuple[int, str]] = []
     for i, source in enumerate(sources):

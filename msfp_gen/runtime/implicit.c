@@ -14,12 +14,11 @@
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
-#define STAGES MSFP_STAGES
 static const int unknown[ND] = MSFP_FREE;
 
 typedef struct {
     const msfp_tableau *method;
-    double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
+    double v[MSFP_STAGES][NB][NQ], a[MSFP_STAGES][NB][NQ], df[MSFP_STAGES][NB][2], power[MSFP_STAGES][MSFP_WORKS];
     double Q[NB][NQ], V[NB][NQ];
     double beta;
     msfp_seed seed;
