@@ -204,7 +204,7 @@ static double now_ns(void)
 
 int main(void)
 {
-    double q[NB][2], v[NB][2], a[NB][2], moment[NB + 1][3] = { { 0 } }, sink = 0.0, best = 1e30;
+    double q[NB][2], v[NB][2], a[NB][2], first[NB][2], moment[NB + 1][3] = { { 0 } }, sink = 0.0, best = 1e30;
     const double base[3] = { 0.5, 0.2, 0.0 }, load[3] = { 100.0, 50.0, -112e3 };
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < 2; ++i) {
@@ -212,6 +212,7 @@ int main(void)
             v[k][i] = 0.1 * (i + 1);
             moment[k][i] = 30.0 * (i + 1) - k;
         }
+    accelerations((const double(*)[2])q, (const double(*)[2])v, (const double(*)[3])moment, base, load, first);
     for (int batch = 0; batch < BATCHES; ++batch) {
         const double begin = now_ns();
         for (int i = 0; i < COUNT; ++i) {
@@ -224,7 +225,7 @@ int main(void)
     }
     printf("%.1f", best);
     for (int k = 0; k < NB; ++k)
-        printf(" %.15g %.15g", a[k][0], a[k][1]);
+        printf(" %.15g %.15g", first[k][0], first[k][1]);
     printf("\n");
     return isnan(sink);
 }
