@@ -85,6 +85,7 @@ typedef struct {
     double contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB];
+    double rim_sum[MSFP_NB]; /* k gap + c dgap/dt where a gap has closed, pull or push */
 #if MSFP_LAW
     double coefficient[MSFP_NB][MSFP_COEFFICIENT_SIZE]; /* mu: what Newton starts from; 0 does */
 #endif
@@ -111,7 +112,8 @@ enum {
     MSFP_E_STEPS,         /* the allowed number of steps is used up */
     MSFP_E_FINITE,        /* a value is not finite */
     MSFP_E_MEMORY,
-    MSFP_E_GUARD          /* what the model leaves out would matter from here on: see run->guard */
+    MSFP_E_GUARD,         /* what the model leaves out would matter from here on: see run->guard */
+    MSFP_E_PARTED         /* a body is beside its place by more than its slider is wide: it has left the stack */
 };
 
 /* The condensed equations: angular balances with interface forces summed from the top and contact in
@@ -207,7 +209,8 @@ typedef struct {
 } msfp_options;
 
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
-       MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
+       MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNT_HALVED_STEPS, MSFP_COUNT_FRESH_TANGENTS,
+       MSFP_COUNT_OTHER_STARTS, MSFP_COUNT_QUASISTATIC_STARTS, MSFP_COUNTS };
 
 /* Watches over what a model leaves out: guard.c. */
 enum { MSFP_GUARD_RIMS, MSFP_GUARD_UPLIFT, MSFP_GUARD_INERTIA, MSFP_GUARD_HEAT, MSFP_GUARDS };
@@ -302,6 +305,7 @@ typedef struct {
     } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
+    int shortened; /* the step at hand is a shorter one after Newton failed */
     long counts[MSFP_COUNTS];
     int status, status_surface, worst_surface;
     double status_value;

@@ -8,11 +8,12 @@
 #define SMALLEST_STEP 1e-9     /* [s], far below any period of a bearing */
 #define SHORTEST_TO_EVENT 1e-6 /* [s]; an event nearer than this is stepped over: rounding would drown a step to it */
 
+
 static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
-    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard" };
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard", "parted" };
     return names[status];
 }
 
@@ -53,29 +54,6 @@ double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], c
             worst = fmax(worst, fabs(df[k][d]) / (10.0 * rtol));
     }
     return worst;
-}
-
-int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
-{
-    for (int j = 0; j < NB; ++j) {
-        double p[3];
-        msfp_local_p_get(w->local[j], p);
-        if (!(fabs(s->q[j][0]) + fabs(s->q[j][1]) + fabs(s->q[j][2]) < INFINITY) || !(fabs(p[2]) < INFINITY)) {
-            run->status_surface = j + 1;
-            return MSFP_E_FINITE;
-        }
-        if (p[2] <= 0.0 && !MSFP_UPLIFT) {
-            run->status_surface = j + 1;
-            run->status_value = p[2];
-            return MSFP_E_UPLIFT;
-        }
-        if (fabs(s->q[j][1]) > 1.5 || fabs(s->q[j][0]) > 1.5) {
-            run->status_surface = j + 1;
-            run->status_value = fabs(s->q[j][1]) > 1.5 ? s->q[j][1] : s->q[j][0];
-            return MSFP_E_ANGLE;
-        }
-    }
-    return MSFP_OK;
 }
 
 /* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
@@ -184,7 +162,7 @@ static int settle(msfp_run *run)
         const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
         if (status)
             return status;
-        if (solution.iterations && run->options.method != MSFP_DOPRI5 && run->determinant == 0)
+        if (run->options.method != MSFP_DOPRI5 && run->determinant == 0)
             run->determinant = solution.determinant;
     }
     memcpy(seed.fp, at.f, sizeof seed.fp);
@@ -281,6 +259,8 @@ static double target(const msfp_run *run)
 
 static int try_step(msfp_run *run, double h, double *error)
 {
+    run->status_surface = 0;
+    run->status_value = 0.0;
     const int status = run->options.method == MSFP_DOPRI5 ? msfp_step_dopri5(run, h, error) : msfp_step_implicit(run, h, error);
     if (status)
         return status;
@@ -302,7 +282,7 @@ static int shrink(msfp_run *run, double h, double factor, int status)
     run->h = h * factor;
     if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
         return 0;
-    run->status = status;
+    run->status = msfp_parting(run) ? MSFP_E_UPLIFT : status;
     return 1;
 }
 
@@ -314,7 +294,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     const int cut = h < 0.9 * run->h && error < 0.5;
     run->h = fmax(h * controlled(run, error), cut ? run->h : 0.0);
     run->previous_error = error;
-    run->restart = 0;
+    run->restart = run->shortened = 0;
     const int stop = record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);
@@ -350,6 +330,7 @@ static int one_step(msfp_run *run)
         const int status = try_step(run, h, &error);
         if (status) {
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
+            run->shortened |= status == MSFP_E_NEWTON;
             ++run->counts[MSFP_COUNT_REJECTED];
             return !shrink(run, h, 0.25, status);
         }
