@@ -54,7 +54,9 @@ def draw() -> None:
         error, rise = panels(figure, "relative error of the sum", "rise under strokes of a patch")
         error.semilogx(t, 100 * (summed(t) * np.sqrt(t) - 1), color=COLOURS[0])
         error.axvspan(SHORTEST, LONGEST, color=COLOURS[1], alpha=0.12, lw=0)
-        error.axhline(0, color="0.6", lw=0.6)
+        for bound in (-HEAT_ERROR, HEAT_ERROR):
+            error.axhline(100 * bound, color=COLOURS[1], lw=0.8, ls="--", label=f"bound ±{100 * HEAT_ERROR:g} %")
+        error.legend(*[each[:1] for each in error.get_legend_handles_labels()])
         error.set(xlabel="time since the heat came in [s]", ylabel="[%]", ylim=(-1, 1))
         exact, found = convolved(strokes, flux), marched(strokes, flux)
         rise.plot(strokes, exact, color=COLOURS[0], label="convolution, every time with every other")

@@ -167,16 +167,15 @@ def by(p: Program, value: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
 def operations(p: Program) -> dict[str, Callable[..., sp.Expr]]:
     """What the parts of a formula mean for the generator: every result gets a name."""
 
-    def power(base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-        if exponent.is_Number:
-            return p.let(base ** (sp.Integer(exponent) if exponent == int(exponent) else exponent))
-        return p.let(sp.exp(p.let(p.let(sp.log(base)) * exponent)))
+    def pow_(base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        return p.let(base ** (sp.Integer(exponent) if exponent == int(exponent) else exponent))
 
     def least(a: sp.Expr, b: sp.Expr) -> sp.Expr:
         return p.let(b + (a - b) * Step(b - a))
 
     return {
-        "number": lambda value: sp.Float(value), "neg": lambda a: p.let(-a), "pow": power,
+        "number": lambda value: sp.Float(value), "neg": lambda a: p.let(-a), "pow": pow_,
+        "power": lambda base, exponent: p.let(sp.exp(p.let(p.let(sp.log(base)) * exponent))),
         "add": lambda a, b: p.let(a + b), "sub": lambda a, b: p.let(a - b),
         "mul": lambda a, b: p.let(a * b), "div": lambda a, b: p.let(a / b),
         "exp": lambda a: p.let(sp.exp(a)), "log": lambda a: p.let(sp.log(a)), "sqrt": lambda a: p.let(sp.sqrt(a)),

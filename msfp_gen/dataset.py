@@ -76,6 +76,8 @@ def read_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="h5netcdf", group=group) as dataset:
             return dataset.load()
+    except FileNotFoundError as error:
+        raise InputError(f"path = {str(path)!r}: no such file; give the name of a result") from error
     except OSError as error:
         raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
 

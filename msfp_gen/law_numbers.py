@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
+from functools import lru_cache
 from math import log, pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from msfp_gen.friction_laws import BUILT_IN, HEAT, VARIABLES, Law, own_numbers
 from msfp_gen.law_text import Operations, fold, names_in
 
 if TYPE_CHECKING:
-    from msfp_gen.bearing import Bearing, Surface
+    from msfp_gen.bearing import Bearing
 
 # Where a law must be finite and positive.
 RANGES: dict[str, NDArray[np.float64]] = {
@@ -24,11 +24,56 @@ RANGES: dict[str, NDArray[np.float64]] = {
     "T": np.linspace(-40.0, 600.0, 17),
     "N": np.geomspace(1.0, 1e8, 9),
 }
+Pair = tuple[Any, Any]  # a value and its derivative by one of what the law depends on
+
+
+def _times(factor: Any, rate: Any) -> Any:
+    """A term of a derivative: none where the argument does not change, whatever the factor."""
+    return np.where(rate == 0.0, 0.0, factor * rate)
+
+
+def _exp(a: Pair) -> Pair:
+    return np.exp(a[0]), _times(np.exp(a[0]), a[1])
+
+
+def _log(a: Pair) -> Pair:
+    return np.log(a[0]), _times(1 / a[0], a[1])
+
+
+def _mul(a: Pair, b: Pair) -> Pair:
+    return a[0] * b[0], _times(b[0], a[1]) + _times(a[0], b[1])
+
+
+def _less(a: Pair, b: Pair, first: Any) -> Pair:
+    return np.where(first, a[0], b[0]), np.where(first, a[1], b[1])
+
+
 OPERATIONS: Operations = {
-    "number": np.float64, "neg": operator.neg, "add": operator.add, "sub": operator.sub, "mul": operator.mul,
-    "div": operator.truediv, "pow": operator.pow, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "tanh": np.tanh,
-    "Abs": np.abs, "Min": np.minimum, "Max": np.maximum,
-}  # fmt: skip
+    "number": lambda x: (np.float64(x), 0.0),
+    "neg": lambda a: (-a[0], -a[1]),
+    "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
+    "sub": lambda a, b: (a[0] - b[0], a[1] - b[1]),
+    "mul": _mul,
+    "div": lambda a, b: (a[0] / b[0], _times(1 / b[0], a[1]) - _times(a[0] / b[0] ** 2, b[1])),
+    "pow": lambda a, b: (a[0] ** b[0], _times(b[0] * a[0] ** (b[0] - 1.0), a[1])),
+    "power": lambda a, b: _exp(_mul(_log(a), b)),
+    "exp": _exp,
+    "log": _log,
+    "sqrt": lambda a: (np.sqrt(a[0]), _times(0.5 / np.sqrt(a[0]), a[1])),
+    "tanh": lambda a: (np.tanh(a[0]), _times(1 - np.tanh(a[0]) ** 2, a[1])),
+    "Abs": lambda a: (np.abs(a[0]), _times(np.sign(a[0]), a[1])),
+    "Min": lambda a, b: _less(a, b, a[0] < b[0]),
+    "Max": lambda a, b: _less(a, b, a[0] > b[0]),
+}
+
+
+def coefficient(law: Law, values: Mapping[str, Any], by: str = "") -> Pair:
+    """Mu by the law at `values` of all names in it, arrays or numbers, and its derivative by one of them."""
+    pairs = {name: (np.asarray(value, float), float(name == by)) for name, value in values.items()}
+    with np.errstate(all="ignore"):
+        mu, slope = fold(law.tree, pairs, OPERATIONS)
+    shape = np.broadcast_shapes(*(pair[0].shape for pair in pairs.values()))
+    return np.broadcast_to(mu, shape), np.broadcast_to(slope, shape)
 
 
 def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
@@ -44,7 +89,10 @@ def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
                     f"effects.friction = {word!r} takes no such value; leave it out or give {users}"
                 )
         if law is not None:
-            _check_values(law, f"bearing.surfaces[{index}]", index, surface, numbers(law, bearing, index))
+            flaw = _flaw(law, (("mu", surface.friction), *numbers(law, bearing, index).items()))
+            if flaw is not None:
+                raise InputError(f"bearing.surfaces[{index}] (surface {index + 1}): the law of effects.friction = "
+                                 f"{law.word!r} {flaw}")  # fmt: skip
 
 
 def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
@@ -75,22 +123,44 @@ def _derived(found: Mapping[str, float | None]) -> dict[str, float]:
     return out
 
 
-def _check_values(law: Law, path: str, index: int, surface: Surface, values: Mapping[str, float]) -> None:
-    """A law must be finite, and positive where the coefficient of reference is, over the `RANGES`."""
+def proportional(law: Law, bearing: Bearing) -> bool:
+    """Whether the law grows in proportion to the coefficient of reference, and the second one where it has one."""
+    factor, found = 1.25, []
+    for index, surface in enumerate(bearing.surfaces):
+        values, points = numbers(law, bearing, index), _points(law)
+        more = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
+        once, twice = (coefficient(law, {**each, **points, "mu": mu})[0]
+                       for each, mu in ((values, surface.friction), (more, factor * surface.friction)))  # fmt: skip
+        found.append(np.allclose(twice, factor * once, rtol=1e-9, atol=0.0))
+    return all(found)
+
+
+def _points(law: Law) -> dict[str, NDArray[np.float64]]:
+    """A grid over the ranges of what the law depends on."""
     used = [name for name in RANGES if name in names_in(law.tree)]
-    grid = np.meshgrid(*(RANGES[name] for name in used), indexing="ij")
-    points = dict(zip(used, grid, strict=True))
-    with np.errstate(all="ignore"):
-        mu = fold(law.tree, {**values, **points, "mu": np.float64(surface.friction)}, OPERATIONS)
-    mu = np.broadcast_to(mu, grid[0].shape if grid else ())
-    wrong = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (surface.friction > 0))
-    if wrong.any():
-        where = np.unravel_index(int(np.argmax(wrong)), mu.shape)
-        at = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in used) or "every point"
-        raise InputError(
-            f"{path} (surface {index + 1}): the law of effects.friction = {law.word!r} gives mu = {mu[where]:.4g} "
-            f"at {at}; give numbers with which it is finite and positive"
-        )
+    return dict(zip(used, np.meshgrid(*(RANGES[name] for name in used), indexing="ij"), strict=True))
+
+
+@lru_cache(maxsize=256)
+def _flaw(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
+    """What is wrong with a law and the numbers of one surface, `mu` among them; surfaces are often alike.
+
+    Over the `RANGES` a law must be finite, positive where the coefficient of reference is, and nowhere vertical.
+    """
+    points = _points(law)
+    at: dict[str, Any] = {**dict(values), **points}
+    mu = coefficient(law, at)[0]
+    slopes = {f"d mu/d{name}": coefficient(law, at, name)[1] for name in points}
+    unfit = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (at["mu"] > 0))
+    checks = [("mu", mu, unfit, "finite and positive"),
+              *((what, slope, ~np.isfinite(slope), "of finite slope") for what, slope in slopes.items())]  # fmt: skip
+    for what, found, wrong, remedy in checks:
+        if wrong.any():
+            where = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
+            place = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in points)
+            return (f"gives {what} = {found[where]:.4g} at {place or 'every point'}; give a law and numbers with which "
+                    f"it is {remedy}")  # fmt: skip
+    return None
 
 
 def friction_of(bearing: Bearing, text: str | None) -> str:

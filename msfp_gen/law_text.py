@@ -55,7 +55,10 @@ def fold(tree: ast.expr, names: Mapping[str, Any], do: Operations) -> Any:
     if isinstance(tree, ast.Name):
         return names[tree.id]
     if isinstance(tree, ast.BinOp):
-        return do[_BINARY[type(tree.op)]](fold(tree.left, names, do), fold(tree.right, names, do))
+        word = _BINARY[type(tree.op)]
+        if word == "pow" and names_in(tree.right):
+            word = "power"  # of a value: exp(exponent log(base)); that of a number also takes a base below zero
+        return do[word](fold(tree.left, names, do), fold(tree.right, names, do))
     if isinstance(tree, ast.UnaryOp):
         value = fold(tree.operand, names, do)
         return do["neg"](value) if isinstance(tree.op, ast.USub) else value

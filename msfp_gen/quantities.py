@@ -12,7 +12,9 @@ from typing import Any
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _TERM = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)-?\d)?[²³]?"
-_TEXT = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_TERM}(?:\s*[*/·⋅]\s*{_TERM}|\s+{_TERM})*)?\s*")
+_PRODUCT = rf"{_TERM}(?:\s*[*·⋅]\s*{_TERM}|\s+{_TERM})*"
+_FACTOR = rf"(?:\s*[*/·⋅]\s*{_TERM}|\s+{_TERM}|\s*/\s*\(\s*{_PRODUCT}\s*\))"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_TERM}{_FACTOR}*)?\s*")
 
 # Pint calls radians dimensionless and would take 0.1 Hz for 0.1 rad/s without a word, so angles are told apart here.
 _ANGLE = re.compile(r"(?<![A-Za-z])(?:[mµμ]?rad(?:ian)?s?|deg(?:ree)?s?|°|turns?|rev(?:olution)?s?|rpm)(?![A-Za-z])")

@@ -7,7 +7,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.history import Counters, Event, History
+import numpy as np
+
+from msfp_gen.history import Array, Counters, Event, History
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +43,14 @@ class Result:
     def succeeded(self) -> bool:
         """Whether the run reached its end or the stop it was asked for."""
         return self.status in ("ok", "stopped")
+
+    @property
+    def friction_coefficient(self) -> Array:
+        """Coefficient mu of every surface, ndarray, shape (T, n-1): by its law, or the constant one of the bearing."""
+        recorded = self.history.friction_coefficient
+        if recorded is not None:
+            return recorded
+        return np.broadcast_to(self.scene.bearing.arrays()["friction"], self.history.normal_force.shape)
 
     @cached_property
     def dataset(self) -> xr.Dataset:

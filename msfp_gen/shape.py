@@ -105,14 +105,13 @@ def stacked(bearing: Bearing, basis: Array, separation: Array) -> tuple[Array, A
     return bottom, top, centre
 
 
-def friction_circles(bearing: Bearing) -> Array:
-    """Radius mu R / sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (n-1,), [m].
+def friction_circles(result: Result) -> Array:
+    """Radius mu R / sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (T, n-1), [m].
 
     The line of force touches the circle about the sphere centre while the surface slides (docs/model.md).
     """
-    lengths = bearing.arrays()
-    mu = lengths["friction"]
-    radii: Array = lengths["radius"] * mu / np.sqrt(1 + mu**2)
+    mu = result.friction_coefficient
+    radii: Array = result.scene.bearing.arrays()["radius"] * mu / np.sqrt(1 + mu**2)
     return radii
 
 

@@ -22,8 +22,9 @@ def summarise(result: Result) -> dict[str, Any]:
     peak_displacement [m], peak_top_force [N]: largest size along E1, E2, E3 and radial, in the horizontal plane;
     axial_load [N] and peak_force_ratio = radial force over it (None without a constant load); peak_sliding,
     minimum_gap [m], minimum_normal_force, maximum_normal_force [N]: one a surface; rims_met: the surfaces that reached
-    their rim; energy: see `energy_balance`; counters; wall_time [s]; real_time_factor: seconds simulated a second (None
-    if no time was taken); transitions: of a monotonic run only.
+    their rim; energy: see `energy_balance`; counters; wall_time [s]; with a law of friction least_friction,
+    most_friction, and where it heats peak_temperature [degC], one a surface; real_time_factor: seconds simulated a
+    second (None if no time was taken); transitions: of a monotonic run only.
     """
     history, counters = result.history, asdict(result.counters)
     duration = float(history.time[-1] - history.time[0])
@@ -50,6 +51,11 @@ def summarise(result: Result) -> dict[str, Any]:
         "wall_time": wall_time,
         "real_time_factor": duration / wall_time if wall_time > 0 else None,
     }
+    if history.friction_coefficient is not None:
+        summary["least_friction"] = history.friction_coefficient.min(axis=0).tolist()
+        summary["most_friction"] = history.friction_coefficient.max(axis=0).tolist()
+    if history.temperature is not None:
+        summary["peak_temperature"] = history.temperature.max(axis=0).tolist()
     if is_monotonic(result):
         summary["transitions"] = transitions(result, load)
     return summary

@@ -117,25 +117,32 @@ def _run_table(summary: Mapping[str, Any]) -> Table:
     return Table(summary["name"] or "unnamed scene", (), rows)
 
 
+# Column -> name of the values, scale (of texts 1), format; what a run does not have has no column.
+SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
+    "peak sliding [mm]": ("peak_sliding", 1e3, ".2f"),
+    "capacity [mm]": ("capacity", 1e3, ".2f"),
+    "least gap [mm]": ("minimum_gap", 1e3, ".2f"),
+    "rim met": ("rim_met", 1, ""),
+    "N least [kN]": ("minimum_normal_force", 1e-3, ".3f"),
+    "N most [kN]": ("maximum_normal_force", 1e-3, ".3f"),
+    "mu least": ("least_friction", 1.0, ".4f"),
+    "mu most": ("most_friction", 1.0, ".4f"),
+    "peak T [degC]": ("peak_temperature", 1.0, ".1f"),
+}
+
+
 def _surface_table(result: Result) -> Table:
     summary, surfaces = result.summary, result.scene.bearing.surfaces
-    columns = (
-        "surface",
-        "peak sliding [mm]",
-        "capacity [mm]",
-        "least gap [mm]",
-        "rim met",
-        "N least [kN]",
-        "N most [kN]",
-    )
-    values = zip(surfaces, summary["peak_sliding"], summary["minimum_gap"], summary["minimum_normal_force"],
-                 summary["maximum_normal_force"], strict=True)  # fmt: skip
+    values: dict[str, Any] = {
+        **summary, "capacity": [surface.capacity for surface in surfaces],
+        "rim_met": [yes(index + 1 in summary["rims_met"]) for index in range(len(surfaces))],
+    }  # fmt: skip
+    columns = {name: column for name, column in SURFACE_COLUMNS.items() if column[0] in values}
     rows = [
-        (str(number), f"{sliding * 1e3:.2f}", f"{surface.capacity * 1e3:.2f}", f"{gap * 1e3:.2f}",
-         yes(number in summary["rims_met"]), f"{least / 1e3:.3f}", f"{most / 1e3:.3f}")
-        for number, (surface, sliding, gap, least, most) in enumerate(values, start=1)
-    ]  # fmt: skip
-    return Table("surfaces, bottom first", columns, rows)
+        (str(index + 1), *(format(values[key][index] * scale, style) for key, scale, style in columns.values()))
+        for index in range(len(surfaces))
+    ]
+    return Table("surfaces, bottom first", ("surface", *columns), rows)
 
 
 def transition_table(transitions: Mapping[str, float | None]) -> Table:

@@ -121,6 +121,19 @@ def test_uplift_is_read_where_the_run_has_it() -> None:
     assert found.cycles[0].surfaces[0].maximum_uplift == 0.0
 
 
+def test_a_slider_that_is_loose_has_no_slip_velocity() -> None:
+    run = bilinear()
+    speed, lift = np.zeros_like(run.history.slip_velocity), np.zeros_like(run.history.lift)
+    speed[:, 0, 0], speed[7, 0, 0], lift[7, 0] = 0.01, 12.0, 1e-3  # it tumbles while it flies
+    effects = dataclasses.replace(run.scene.effects, uplift=True)
+    flying = dataclasses.replace(
+        run, scene=dataclasses.replace(run.scene, effects=effects),
+        history=dataclasses.replace(run.history, slip_velocity=speed, lift=lift),
+    )  # fmt: skip
+    assert characterise(flying).surfaces[0].peak_velocity == 0.01
+
+
+
 def test_without_a_radius_there_is_no_heat_flux() -> None:
     found = characterise(bilinear(rim_radius=0.0))
     assert (found.surfaces[0].peak_heat_flux, found.surfaces[0].heat, found.surfaces[0].contact_area) == (None,) * 3

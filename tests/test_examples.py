@@ -12,6 +12,7 @@ from msfp_gen import load_scene, presets, simulate
 EXAMPLES = Path(__file__).parents[1] / "examples"
 BEARINGS = {
     "single": "single-articulated-fp", "double": "double-fp", "triple": "fenz-tfp", "quintuple": "quintuple-fp",
+    "heating": "single-articulated-fp",
 }  # fmt: skip
 
 

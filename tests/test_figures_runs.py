@@ -96,7 +96,7 @@ def test_drawn_force_line_touches_the_circle_of_what_slides():
     """About 65 s of test 5 surfaces 1 and 4 slide free of their rims (section 4.1, stage III)."""
     run = preset_run("fenz-test5")
     time = float(run.history.time[np.searchsorted(run.history.time, 65.0)])  # a row: nothing is interpolated
-    section, radii = cut_at("fenz-test5", time), friction_circles(run.scene.bearing)
+    section, radii = cut_at("fenz-test5", time), friction_circles(run)[0]
     arm = section.centres - section.points
     unit = section.forces / np.hypot(*section.forces.T)[:, None]
     distance = np.abs(arm[:, 0] * unit[:, 1] - arm[:, 1] * unit[:, 0])
@@ -126,7 +126,7 @@ def test_friction_circles_are_drawn_on_request():
     run = preset_run("fenz-test5")
     (axes,) = plot_section(run, time=65.0, friction_circles=True).get_axes()
     found = [patch.radius for patch in axes.patches if isinstance(patch, Circle)]
-    assert found == pytest.approx(friction_circles(run.scene.bearing) * MILLI)
+    assert found == pytest.approx(friction_circles(run)[0] * MILLI)
 
 
 def test_the_plane_follows_the_displacement_or_the_azimuth():

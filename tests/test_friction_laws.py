@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from reference import friction_laws as reference
 from support import Array, bearing_of, differences, model_of, scene_of
+from test_emission import warnings_of
 from test_equations import inputs, sensible
 
 from msfp_gen import Effects, InputError, Layout, Motion, Scene, Solver, simulate
@@ -19,8 +20,7 @@ from msfp_gen.dataset import read_result
 from msfp_gen.friction_laws import BUILT_IN, law_of
 from msfp_gen.generator import generate
 from msfp_gen.generator.heat import HEAT_ERROR, HEAT_KERNEL, HEAT_ONSET, LONGEST, SHORTEST
-from msfp_gen.law_numbers import OPERATIONS
-from msfp_gen.law_text import fold
+from msfp_gen.law_numbers import coefficient
 from msfp_gen.layout import ModelSpec
 from msfp_gen.result import Result
 from msfp_gen.scenefile import scene_from_table, scene_text
@@ -55,7 +55,7 @@ def test_factors_of_kumar_are_the_published_ones() -> None:
 
     def mu(**at: Any) -> Any:
         neutral = {"v": 10.0, "p": 50e6, "T": 20.0}
-        return fold(law.tree, {**{k: v for k, v in law.takes.items() if v}, **given, **neutral, **at}, OPERATIONS)
+        return coefficient(law, {**{k: v for k, v in law.takes.items() if v}, **given, **neutral, **at})[0]
 
     assert mu(T=20.0) == pytest.approx(1.0, abs=1e-15)
     assert mu(T=200.0) == pytest.approx(0.505, abs=5e-4)
@@ -258,6 +258,20 @@ def test_friction_that_grows_with_velocity_never_pushes(word: str, solver: dict[
     assert run.history.normal_force.max() < 2e5
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"friction": "pvt", "dimension": "planar", "uplift": True},
+        {"friction": "velocity", "spin": "free", "rims": False},
+        {"friction": "custom", "spin": "patch", "sliders": "massless"},
+        {"friction": "pvt", "bouc_wen": "isotropic", "uplift": True},
+    ],
+    ids=str,
+)
+def test_models_with_a_law_compile_without_a_warning(effects: dict[str, Any], tmp_path: Any) -> None:
+    assert warnings_of({**effects, **LAWS[effects["friction"]]}, tmp_path, "-fsyntax-only") == ""
+
+
 # ---- heat as exponentials -------------------------------------------------------------------------------------------
 
 
@@ -341,6 +355,8 @@ def test_formulas_are_read_and_never_run(text: str, said: str) -> None:
         ("pvt", None, {"reference_pressure": P_REF, "velocity_drop": 1.5}, r"gives mu = -.* at v = 0 m/s"),
         ("custom", "mu - c1 * v", {"c1": 1.0}, r"gives mu = -.*finite and positive"),
         ("custom", "mu - c1 * v", {}, r"c1 is missing"),
+        ("custom", "mu * (1 + sqrt(c1 * v))", {"c1": 1.0}, r"gives d mu/dv = inf at v = 0 m/s; .* of finite slope"),
+        ("custom", "mu * (1 + (c1 * v) ** c2)", {"c1": -1.0, "c2": 2.0}, r"gives mu = nan at v = .*finite"),
     ],
 )
 def test_numbers_must_be_those_of_the_law(word: str, text: str | None, values: dict[str, Any], said: str) -> None:

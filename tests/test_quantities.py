@@ -33,6 +33,10 @@ from msfp_gen.quantities import to_si
         ("100 mHz", "Hz", 0.1),
         ("10 kN/mm", "N/m", 1e7),
         ("3.01 kg cm^2", "kg m^2", 3.01e-4),
+        ("18 W/(m K)", "W/(m K)", 18.0),
+        ("0.18 W / (cm*K)", "W/(m K)", 18.0),
+        ("68 degF", "degC", 20.0),
+        ("4.44 mm^2/s", "m^2/s", 4.44e-6),
     ],
 )
 def test_units_become_si(text, unit, value):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from msfp_gen.bounding.factors import PROPERTIES, FactorTable
 from msfp_gen.characterise import Characterisation, characterise
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.law_numbers import proportional
 from msfp_gen.simulation import simulate
 
 if TYPE_CHECKING:
@@ -115,7 +116,12 @@ def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None)
 
 def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`."""
-    lambdas = _lambdas(scene.bearing, table)
+    lambdas, law = _lambdas(scene.bearing, table), scene.effects.law
+    if "friction" in lambdas and law is not None and not proportional(law, scene.bearing):
+        raise InputError(
+            f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, which this law does not follow "
+            "in proportion; give a formula that is mu times the rest"
+        )
     scenes = {}
     for case in CASES:
         bearing = scene.bearing

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.history import Array
+from msfp_gen.stages import parted
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class SurfaceUse:
     """Extremes of one surface (1..n-1) over some rows; SI.
 
-    capacity_left: least gap to the rim [m]; below zero the rim is pressed. peak_velocity: largest slip velocity [m/s].
+    capacity_left: least gap to the rim [m]; below zero the rim is pressed. peak_velocity: largest slip velocity while
+    the surface is closed [m/s].
     peak_heat_flux: largest mu N |v|/A [W/m^2], and heat: its integral over time [J/m^2]; None where A is not known.
     contact_area: A = pi r^2 with r the radius of the sliding patch, else the rim radius of the slider [m^2]; None where
     the bearing has neither.
@@ -38,8 +39,8 @@ class SurfaceUse:
 def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
     """The use of every surface over `rows`, bottom first."""
     history, bearing = result.history, result.scene.bearing
-    speed = np.linalg.norm(history.slip_velocity[rows], axis=2)
-    power = friction_coefficient(result)[rows] * history.normal_force[rows] * speed
+    speed = np.where(parted(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
+    power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.trapezoid(power, history.time[rows], axis=0)
     found = []
     for i, surface in enumerate(bearing.surfaces):
@@ -59,12 +60,3 @@ def _contact_area(result: Result, surface: int) -> float | None:
     patch = bearing.surfaces[surface].patch_radius
     radius = bearing.slider_rim_radius(surface) if patch is None else patch
     return pi * radius**2 if radius > 0 else None
-
-
-def friction_coefficient(result: Result) -> Array:
-    """Coefficient mu of every surface, shape (T, n-1): recorded where the law varies, else the bearing's."""
-    history = result.history
-    if history.friction_coefficient is not None:
-        return history.friction_coefficient
-    constant = np.array([surface.friction for surface in result.scene.bearing.surfaces])
-    return np.broadcast_to(constant, history.normal_force.shape)

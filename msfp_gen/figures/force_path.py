@@ -37,7 +37,7 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
         ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.7))
         axes = left.subplots()
         draw_section(axes, then, section)
-        draw_circles(axes, section, friction_circles(result.scene.bearing))
+        draw_circles(axes, section, friction_circles(then)[0])
         _draw_offsets(right, result)
     return figure
 

@@ -65,7 +65,7 @@ def plot_orbit(result: Result, path: str | Path | None = None) -> Figure:
         right.set(title="Orbit of the force", xlabel=f"F₁ [{scale.unit}]", ylabel=f"F₂ [{scale.unit}]")
         right.set_aspect("equal", adjustable="datalim")
         right.margins(0.06)
-        left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, handletextpad=0.1, borderpad=0.0)
+        figure.legend(loc="outside lower left", ncols=7, handletextpad=0.1)
     return figure
 
 

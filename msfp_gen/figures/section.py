@@ -64,7 +64,7 @@ def plot_section(
         axes = figure.subplots()
         draw_section(axes, then, section)
         if friction_circles:
-            draw_circles(axes, section, circle_radii(result.scene.bearing))
+            draw_circles(axes, section, circle_radii(then)[0])
         figure.legend(loc="outside lower center", ncols=2 if friction_circles else 3)
     return figure
 

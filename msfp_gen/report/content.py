@@ -94,7 +94,11 @@ def _surface_table(result: Result) -> Table:
         "least gap [mm]": ("minimum_gap", MILLI),
         "N least [kN]": ("minimum_normal_force", KILO),
         "N most [kN]": ("maximum_normal_force", KILO),
+        "mu least": ("least_friction", 1.0),
+        "mu most": ("most_friction", 1.0),
+        "peak T [degC]": ("peak_temperature", 1.0),
     }
+    columns = {name: column for name, column in columns.items() if column[0] in result.summary}
     rows = [
         (str(index + 1), f"{surface.capacity * MILLI:.5g}", yes(index + 1 in met),
          *(_figure(result, f"{key}.{index}", scale) or "-" for key, scale in columns.values()))

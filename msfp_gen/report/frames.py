@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.characterise.surfaces import friction_coefficient
 from msfp_gen.figures import COLOURS
 from msfp_gen.history import Array, History
 from msfp_gen.outline import POINTS, outline
 from msfp_gen.resample import at_times
-from msfp_gen.shape import Poses, poses
+from msfp_gen.shape import Poses, friction_circles, poses
 from msfp_gen.stages import parted, sliding_now
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
         "normal": history.normal_force,
         "mobilised": np.linalg.norm(history.friction_state, axis=-1),
         "state": states(history),
-        "circle": circles(shown),
+        "circle": friction_circles(shown),
     }
     return {
         "azimuth": main_direction(history.displacement[:, :2]),
@@ -133,12 +132,6 @@ def packed(values: Array) -> dict[str, Any]:
     """An array as little-endian float32 in base64, with its shape."""
     data = base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
     return {"shape": list(values.shape), "data": data}
-
-
-def circles(result: Result) -> Array:
-    """Radius mu R / sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (T, n-1), [m]."""
-    friction = friction_coefficient(result)
-    return friction * result.scene.bearing.arrays()["radius"] / np.hypot(1.0, friction)
 
 
 def _surfaces(bearing: Bearing, radii: Array) -> list[dict[str, Any]]:

@@ -62,17 +62,14 @@ function label(text, colour, at, size) {
   return sprite;
 }
 
-// E1 and E2 on the floor, at a corner of its grid.
+// A grid along E1 and E2, and the three axes where they are seen.
 function floor(size) {
   const group = new THREE.Group();
   const grid = new THREE.GridHelper(size, 10, 0x888888, 0x888888).rotateX(Math.PI / 2);
   Object.assign(grid.material, { transparent: true, opacity: 0.35 });
   group.add(grid);
-  const [c, s] = horizontal; // the corner to the left of the cut, and behind it
-  const sides = [[-1, -1], [-1, 1], [1, -1], [1, 1]];
-  const leftness = ([x, y]) => -(c * x + s * y) + 0.3 * (c * y - s * x);
-  const [left, back] = sides.reduce((best, side) => (leftness(side) > leftness(best) ? side : best));
-  const corner = new THREE.Vector3((left * size) / 2, (back * size) / 2, 0);
+  const [c, s] = horizontal; // behind the stack and to the left of the cut, whatever way that faces
+  const corner = new THREE.Vector3(-c - s, c - s, 0).multiplyScalar(size / 2);
   [["E₁", "#D55E00", [1, 0, 0]], ["E₂", "#009E73", [0, 1, 0]], ["E₃", "#0072B2", [0, 0, 1]]].forEach(([name, colour, way]) => {
     const tip = corner.clone().addScaledVector(new THREE.Vector3(...way), size / 6);
     const axis = lineOf(2, colour, THREE.Line);

@@ -1,0 +1,53 @@
+"""Draw docs/figures/heating.png: `python benchmarks/heating.py` runs examples/heating.toml with and without its law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from drawing import COLOURS, MILLI, drawn, panels, ratio
+
+from msfp_gen import Scene, load_scene, simulate
+from msfp_gen.friction_laws import own_numbers
+from msfp_gen.result import Result
+
+ROOT = Path(__file__).resolve().parents[1]
+FIGURE = ROOT / "docs" / "figures" / "heating.png"
+
+
+def without_law(scene: Scene) -> Scene:
+    """The same scene with constant friction."""
+    plain = scene.bearing.replace(**dict.fromkeys(own_numbers()))
+    return replace(scene, bearing=plain, effects=replace(scene.effects, friction="constant"))
+
+
+def draw(heats: Result, constant: Result) -> None:
+    """Loops of both runs; friction and temperature in the dish."""
+    rows = heats.history
+    assert rows.temperature is not None
+    with drawn(FIGURE, 11.0, 3.6) as figure:
+        loop, warm, drop = panels(figure, "force over load", "temperature of the dish", "its friction, sliding fast")
+        for run, colour, name in ((constant, COLOURS[1], "constant"), (heats, COLOURS[0], "pvt")):
+            loop.plot(run.history.displacement[:, 0] * MILLI, ratio(run)[:, 0], color=colour, lw=0.9, label=name)
+        loop.set(xlabel="displacement [mm]", ylabel="F/N")
+        loop.legend()
+        warm.plot(rows.time, rows.temperature[:, 0], color=COLOURS[0], lw=0.9)
+        warm.set(xlabel="time [s]", ylabel="[°C]")
+        fast = np.hypot(*rows.slip_velocity[:, 0].T) > 0.1
+        drop.plot(rows.time[fast], heats.friction_coefficient[fast, 0], ".", ms=1.5, color=COLOURS[0])
+        drop.set(xlabel="time [s]", ylabel="μ", ylim=(0, None))
+
+
+def main() -> None:
+    """Run both and print what they differ by."""
+    scene = load_scene(ROOT / "examples" / "heating.toml")
+    heats, constant = simulate(scene), simulate(without_law(scene))
+    draw(heats, constant)
+    lost = [run.history.energy["friction_dissipated"][-1] for run in (heats, constant)]
+    print(f"peak temperature {heats.summary['peak_temperature'][0]:.0f} degC, "
+          f"energy lost over that at constant friction {lost[0] / lost[1]:.2f}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
