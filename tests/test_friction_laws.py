@@ -17,8 +17,8 @@ from test_equations import inputs, sensible
 from msfp_gen import Effects, InputError, Layout, Motion, Scene, Solver, simulate
 from msfp_gen.build import runtime_sources
 from msfp_gen.dataset import read_result
-from msfp_gen.friction_laws import BUILT_IN, law_of
 from msfp_gen.generator import generate
+from msfp_gen.generator.friction_laws import BUILT_IN, law_of
 from msfp_gen.generator.heat import HEAT_ERROR, HEAT_KERNEL, HEAT_ONSET, LONGEST, SHORTEST
 from msfp_gen.law_numbers import coefficient
 from msfp_gen.layout import ModelSpec

@@ -21,7 +21,7 @@ from msfp_gen import Effects, InputError, Scene, Surface, load_scene, simulate, 
 from msfp_gen.bounding import bounded_scenes, load_factors
 from msfp_gen.cli import main
 from msfp_gen.fields import Quantity, ruled_fields
-from msfp_gen.friction_laws import BUILT_IN, VARIABLES, own_numbers
+from msfp_gen.generator.friction_laws import BUILT_IN, VARIABLES, own_numbers
 from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.law_text import FUNCTIONS
 from msfp_gen.result import Result
