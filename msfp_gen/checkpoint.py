@@ -31,6 +31,20 @@ EVERY = 60.0  # seconds between two checkpoints
 SHARE = 20  # writing takes at most one part in this many of the time
 
 
+SEGMENTS = 8  # a run takes in each effect at most once
+
+
+def segment_file(path: str | Path, index: int) -> Path:
+    """Where segment `index` (from 0) of a run is kept: each in its own, so that a resumed run switches where it did."""
+    path = Path(path)
+    return path.with_name(f"{path.name}.{index + 1}") if index else path
+
+
+def kept_files(path: str | Path) -> list[Path]:
+    """The files of a run that are there."""
+    return [file for file in (segment_file(path, index) for index in range(SEGMENTS)) if file.is_file()]
+
+
 @dataclass(frozen=True)
 class Identity:
     """What a checkpoint belongs to: the cache key of the build, the scene in words, and the digest of its numbers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msfp_gen.switching import JAMMED
+from msfp_gen.switching import JAMMED, WIDER
 
 if TYPE_CHECKING:
     from msfp_gen.layout import Effects
@@ -53,19 +53,22 @@ def notes_of(scene: Scene, segment: Segment, after: Effects | None) -> list[Note
         trips["uplift"] = (run.time, *run.status[1:])
     if after is not None and segment.status in JAMMED:
         trips["jammed"] = (run.time, *run.status[1:])
-    changed = [] if after is None else _changes(segment.model.effects, after)
+    before = segment.model.effects
     return [
         Note(
             time, kind, surface, value,
             TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=segment.status),
-            ", ".join(changed),
+            ", ".join(_changes(kind, before, after)),
         )
         for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
     ]  # fmt: skip
 
 
-def _changes(before: Effects, after: Effects) -> list[str]:
-    names = ("dimension", "sliders", "rims", "uplift", "friction")
+def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
+    """What a watch that tripped has changed; a run without a way on tries whatever is left."""
+    names = WIDER.get(kind, {**WIDER["inertia"], **WIDER["uplift"]})
     return [
-        f"{name} = {getattr(after, name)}" for name in names if getattr(before, name) != getattr(after, name)
+        f"{name} = {getattr(after, name)}"
+        for name in names
+        if after is not None and getattr(before, name) != getattr(after, name)
     ]

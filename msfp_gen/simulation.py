@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.build import build_model
-from msfp_gen.checkpoint import EVERY, Checkpoint, Identity
+from msfp_gen.checkpoint import EVERY, Checkpoint, Identity, kept_files, segment_file
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Counters
 from msfp_gen.notes import Note, notes_of
@@ -97,14 +97,16 @@ def simulate(
         The run could not go on: the message says when, where and why, `.result` holds what was computed.
 
     """
+    if checkpoint is not None and not resume:
+        _refuse_leftovers(checkpoint)
     given, scene = scene, _settled(scene)
     choice = scene.choice
     effects: Effects | None = choice.effects
     segments: list[Segment] = []
     notes: list[Note] = []
     while effects is not None:
-        keep = None if checkpoint is None else _file(checkpoint, len(segments))
-        again = resume and keep is not None and (not segments or keep.exists())
+        keep = None if checkpoint is None else segment_file(checkpoint, len(segments))
+        again = resume and keep is not None and (keep.exists() or not (segments or kept_files(keep)))
         segment = _segment(scene, effects, segments, progress, (keep, every, again), strict)
         segments.append(segment)
         effects = None if strict else widened(scene, effects, segment)
@@ -130,10 +132,12 @@ def _settled(scene: Scene) -> Scene:
     return replace(scene, initial_state=at_rest(end.tilt_angles[-1], end.friction_state[-1]))
 
 
-def _file(checkpoint: str | Path, index: int) -> Path:
-    """Each segment keeps a file of its own: a resumed run makes its switches again where they were."""
-    path = Path(checkpoint)
-    return path.with_name(f"{path.name}.{index + 1}") if index else path
+def _refuse_leftovers(checkpoint: str | Path) -> None:
+    """A file of a later segment would be met in the middle of the run."""
+    if found := kept_files(checkpoint):
+        raise InputError(
+            f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
+        )
 
 
 def _segment(

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from msfp_gen.checkpoint import kept_files
 from msfp_gen.cli.console import number
 from msfp_gen.errors import InputError, RunError
 
@@ -65,11 +66,12 @@ class Keep:
     def done(self) -> None:
         """Everything that was asked for is written: the checkpoint has served."""
         if self.path is not None:
-            self.path.unlink(missing_ok=True)
+            for file in kept_files(self.path):
+                file.unlink(missing_ok=True)
 
     @property
     def _there(self) -> bool:
-        return self.path is not None and self.path.is_file()
+        return self.path is not None and bool(kept_files(self.path))
 
 
 NOT_KEPT = Keep()

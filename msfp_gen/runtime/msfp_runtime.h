@@ -179,6 +179,7 @@ typedef struct {
     double stop_displacement;     /* 0: none */
     int stop_all_rims;
     int stop_at_knots;            /* the acceleration of the base has a kink at every knot: land on each */
+    int stop_at_loads;            /* the load has a kink at every knot: likewise */
     double start_time;            /* a run that goes on from another, with its origin and its heat */
     const double *origin;         /* [3] r_01 - r_nn at the start of the whole; NULL: where this one starts */
     const double *heat;           /* [NB][MSFP_HEAT]; NULL: none */

@@ -241,18 +241,24 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
 /* Times closer than this are one time: what rounding leaves of a step that was to land there [s]. */
 static double same_time(double t) { return 1e-12 * fmax(1.0, t); }
 
+/* The knot of a history that comes next. */
+static double next_knot(const msfp_history *h, double t)
+{
+    int i = h->last;
+    while (i > 0 && h->knots[i] > t)
+        --i;
+    while (i < h->pieces && h->knots[i] <= t + same_time(t))
+        ++i;
+    return h->knots[i] > t ? h->knots[i] : INFINITY;
+}
+
 static double target(const msfp_run *run)
 {
     double end = run->options.duration;
-    if (run->options.stop_at_knots) {
-        const msfp_history *m = &run->motion;
-        int i = m->last;
-        while (i > 0 && m->knots[i] > run->now.t)
-            --i;
-        while (i < m->pieces && m->knots[i] <= run->now.t + same_time(run->now.t))
-            ++i;
-        end = fmin(end, m->knots[i]);
-    }
+    if (run->options.stop_at_knots)
+        end = fmin(end, next_knot(&run->motion, run->now.t));
+    if (run->options.stop_at_loads)
+        end = fmin(end, next_knot(&run->load, run->now.t));
     if (run->next_jump < run->jump_count)
         end = fmin(end, run->jumps[run->next_jump]);
     return end;
