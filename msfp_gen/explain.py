@@ -39,6 +39,7 @@ BODY_COLUMNS = {
 }
 METHODS = {
     "implicit": "L-stable, states and unknowns solved together",
+    "esdirk4": "L-stable of order 4, for tight tolerances",
     "dopri5": "explicit Dormand-Prince, the report's",
 }
 TOPS = {

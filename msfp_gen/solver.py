@@ -15,13 +15,14 @@ _TIME = Quantity("s", above=0.0)
 class Solver:
     """Settings of the integrator.
 
-    method: "implicit" (L-stable, states and unknowns together) or "dopri5" (the report's Dormand-Prince).
+    method: "implicit" (TR-BDF2, L-stable, order 2), "esdirk4" (the same with order 4, for tight tolerances) or "dopri5"
+    (the report's Dormand-Prince).
     rtol: relative tolerance, below 1. atol_angle: absolute tolerance of angles [rad]; None: a hundredth of rtol.
     max_step, first_step [s]; None: what the motion resolves, and what the method finds. max_steps: give up beyond.
     Raises InputError.
     """
 
-    method: Literal["implicit", "dopri5"] = "implicit"
+    method: Literal["implicit", "esdirk4", "dopri5"] = "implicit"
     rtol: Annotated[float, Quantity("", above=0.0)] = 1e-4
     atol_angle: Annotated[float | None, Quantity("rad", above=0.0)] = None
     max_step: Annotated[float | None, _TIME] = None

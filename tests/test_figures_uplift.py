@@ -107,3 +107,9 @@ def test_report_says_apart_where_a_surface_is_open():
     flags = parted(at_times(hop(), when).history)
     assert flags.any() and not flags.all()
     np.testing.assert_array_equal(state == STATES.index("apart"), flags)
+
+
+def test_characterisation_gives_the_largest_lift_of_a_real_run():
+    found, lift = hop().characterise(), hop().history.lift
+    assert found.maximum_uplift == lift.max() > 0.01
+    assert [use.maximum_uplift for use in found.surfaces] == lift.max(axis=0).tolist()

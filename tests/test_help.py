@@ -10,10 +10,13 @@ import sys
 
 import pytest
 import typer.main
+from synthetic import loops
 
 from msfp_gen import load_scene
 from msfp_gen.cli import app, main
 from msfp_gen.cli.console import Progress, building, scenes
+from msfp_gen.records import ScaleTo, baseline_corrected, bundled, response_spectrum
+from msfp_gen.report import report_html
 
 ROOT = typer.main.get_command(app)
 COMMANDS = sorted(ROOT.commands)
@@ -103,3 +106,18 @@ def test_nothing_is_said_of_a_model_that_is_there(capsys):
     with building():
         pass
     assert capsys.readouterr().err == ""
+
+
+def test_spectra_scales_and_reports_say_how_far_they_are():
+    """What takes seconds is told: every period, every figure, in order to the end."""
+    record = bundled("ridgecrest-2019-ci-clc")
+    told = []
+    response_spectrum(record, [0.5, 1.0], progress=lambda *at: told.append(at))
+    assert told == [(1, 2), (2, 2)]
+    target = ScaleTo.parse("sds=1 g, sd1=0.6 g, between=1:2")
+    told.clear()
+    target.factor(baseline_corrected(record, duration=20.0), lambda *at: told.append(at))
+    assert told == [(k, 100) for k in range(1, 101)]
+    told.clear()
+    report_html(loops(), 2, lambda *at: told.append(at))
+    assert told == [(k, 5) for k in range(1, 6)]

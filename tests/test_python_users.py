@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,9 +15,13 @@ import pytest
 from support import preset_run
 
 from msfp_gen import CompileError, Effects, InputError, Layout, RunError, build_model, load_scene, presets
+from msfp_gen.bounding import load_factors
+from msfp_gen.records import ScaleTo, baseline_corrected, bundled, response_spectrum
 from msfp_gen.scenefile import scene_from_table, scene_text
+from msfp_gen.shape import poses
 
 NAME = "fenz-test1"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 SCENE = load_scene(NAME)
 PARTS = [
     SCENE, SCENE.bearing, SCENE.bearing.surfaces[0], SCENE.bearing.bodies[0], SCENE.motion, SCENE.top, SCENE.effects,
@@ -41,6 +46,21 @@ def test_results_are_pickled_with_and_without_their_dataset():
         assert copy.summary == result.summary
 
 
+def test_what_is_made_of_results_and_records_is_pickled():
+    """A pool of processes sends any of these back."""
+    result, record = preset_run(NAME), bundled("ridgecrest-2019-ci-clc")
+    found, spectrum = result.characterise(), response_spectrum(record, [0.5, 2.0])
+    assert again(found).as_dict() == found.as_dict()
+    np.testing.assert_array_equal(again(spectrum).psa, spectrum.psa)
+    np.testing.assert_array_equal(again(record).acceleration, record.acceleration)
+    corrected = baseline_corrected(record, duration=20.0)
+    np.testing.assert_array_equal(again(corrected).displacement, corrected.displacement)
+    np.testing.assert_array_equal(again(poses(result)).top, poses(result).top)
+    table = load_factors("asce7")
+    assert again(table) == table and again(ScaleTo(pga=4.0)) == ScaleTo(pga=4.0)
+    assert again(load_scene("ridgecrest-clc").motion) == load_scene("ridgecrest-clc").motion
+
+
 def test_errors_keep_what_they_carry():
     failed = again(RunError("t = 3 s", status="newton", result=preset_run(NAME)))
     assert (str(failed), failed.status, failed.result.status) == ("t = 3 s", "newton", "ok")
@@ -62,6 +82,12 @@ def test_a_model_is_pickled_as_what_it_models():
 def test_every_preset_scene_round_trips_to_toml(name):
     scene = presets.scene(name)
     assert scene_from_table(tomllib.loads(scene_text(scene))) == scene
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_example_round_trips_to_toml(path):
+    scene = load_scene(path)
+    assert scene_from_table(tomllib.loads(scene_text(scene))) == scene and again(scene) == scene
 
 
 def test_dataset_is_drawn_by_xarray():

@@ -50,6 +50,15 @@ def test_every_command_is_listed(capsys):
     assert names == set(re.findall(r"^\| `msfp-gen (\w+)", README, flags=re.MULTILINE))
 
 
+def test_every_page_is_linked_and_every_link_leads_somewhere():
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/*.md")]
+    for page in pages:
+        for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert link.startswith("http") or (page.parent / link).exists(), f"{page.name}: {link}"
+    linked = set(re.findall(r"\(docs/(\w+)\.md", README))
+    assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
+
+
 def test_make_targets_exist():
     targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
     pages = README + (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

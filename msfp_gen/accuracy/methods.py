@@ -48,6 +48,7 @@ METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         _native("implicit", "implicit", "the default: TR-BDF2, order 2, L-stable"),
+        _native("esdirk4", "implicit", "ESDIRK4(3), order 4, L-stable: the same condensed equations and Newton steps"),
         _native("dopri5", "dopri5", "the report's: Dormand-Prince 5(4), Newton on all 6(n-1) balances"),
         _library("Radau", "Radau IIA, order 5, L-stable"),
         _library("BDF", "backward differences, orders 1 to 5"),

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from msfp_gen.bounding.runs import Bounds, Case
 
 # The nominal loop is drawn last, on top of the bounds.
-LOOKS: dict[str, dict[str, Any]] = {"lower": {"color": COLOURS[0], "linestyle": "--"}, "upper": {"color": COLOURS[1]},
-         "nominal": {"color": INK}}  # fmt: skip
+# No dashes: cycles on top of each other would fill them.
+LOOKS: dict[str, dict[str, Any]] = {"lower": {"color": COLOURS[0]}, "upper": {"color": COLOURS[1]},
+                                    "nominal": {"color": INK}}  # fmt: skip
 
 
 def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:

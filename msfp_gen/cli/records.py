@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import note, number, show
+from msfp_gen.cli.console import Progress, note, number, show
 from msfp_gen.errors import InputError
 from msfp_gen.output import FIGURE_SUFFIXES, check_output
 
@@ -94,7 +94,8 @@ def _prepared(
     """The record corrected, and its scale."""
     from msfp_gen.records import prepared
 
-    return prepared(raw, 1.0, target, start, duration, correct, 0.05 if corner is None else corner, 1.0)
+    with Progress("scale") as progress:
+        return prepared(raw, 1.0, target, start, duration, correct, 0.05 if corner is None else corner, 1.0, progress)
 
 
 def _write_record(raw: Record, motion: Record | Corrected, path: Path) -> None:
@@ -107,7 +108,8 @@ def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | N
     from msfp_gen.records import response_spectrum
     from msfp_gen.records.spectrum import MEASURES
 
-    found = response_spectrum(motion)
+    with Progress("spectrum") as progress:
+        found = response_spectrum(motion, progress=progress)
     if path.suffix.lower() == ".csv":
         found.to_csv(path)
         return

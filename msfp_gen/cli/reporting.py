@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import note, whole
+from msfp_gen.cli.console import Progress, note, whole
 from msfp_gen.cli.opening import looked_at, opened
 from msfp_gen.errors import InputError, RunError
 
@@ -39,7 +39,8 @@ def report(
         raise InputError(f"--frames = {count}: give 2 to {MOST}")
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
     result, failure = looked_at(opened(source))
-    write_report(result, path, count)
+    with Progress("report") as progress:
+        write_report(result, path, count, progress)
     note(f"wrote {path}")
     if failure is not None:
         raise RunError(f"{failure}; the report of what was computed until then is in {path}", status=failure.status)

@@ -13,7 +13,7 @@ from msfp_gen.fields import Quantity, check_fields, ruled_fields
 from msfp_gen.motion_checks import finite, positive
 from msfp_gen.piecewise import Array
 from msfp_gen.records.correction import Corrected, baseline_corrected, uncorrected
-from msfp_gen.records.spectrum import DAMPING, measure_index, response_spectrum
+from msfp_gen.records.spectrum import DAMPING, Progress, measure_index, response_spectrum
 
 if TYPE_CHECKING:
     from msfp_gen.motion import Motion
@@ -59,8 +59,11 @@ class ScaleTo:
         if self.between is not None and self.between[0] >= self.between[1]:
             raise InputError(f"scale_to.between = {list(self.between)}: give the shorter period first")
 
-    def factor(self, motion: Record | Corrected | Motion) -> float:
-        """What `motion` must be multiplied by to meet the target. Raises InputError for a component that is zero."""
+    def factor(self, motion: Record | Corrected | Motion, progress: Progress | None = None) -> float:
+        """What `motion` must be multiplied by to meet the target; `progress` as of `response_spectrum`.
+
+        Raises InputError for a component that is zero.
+        """
         column = measure_index(self.component)
         if self.pga is not None:
             spectrum = response_spectrum(motion, [1.0])
@@ -71,7 +74,8 @@ class ScaleTo:
         else:
             periods = np.geomspace(*self.between, _POINTS)
             target = asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
-        return self._ratio(target, response_spectrum(motion, periods, damping=self.damping).psa[:, column])
+        found = response_spectrum(motion, periods, damping=self.damping, progress=progress)
+        return self._ratio(target, found.psa[:, column])
 
     def curve(self, period: Array) -> tuple[Array, Array] | None:
         """The target to draw beside a spectrum: periods [s] and ordinates [m/s^2]; None for a peak acceleration."""
@@ -133,8 +137,12 @@ def prepared(
     correct: bool,
     corner: float,
     taper: float,
+    progress: Progress | None = None,
 ) -> tuple[Corrected, float]:
-    """The record ready to drive a bearing, and its scale: the arguments of `Motion.from_record`."""
+    """The record ready to drive a bearing, and its scale: the arguments of `Motion.from_record`.
+
+    progress: of a scale that has to be found, as of `response_spectrum`.
+    """
     if correct:
         ready = baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
     else:
@@ -143,7 +151,7 @@ def prepared(
         return ready, positive("scale", scale)
     if scale != 1:
         raise InputError(f"scale = {scale!r}: scale_to is given too; give one of them")
-    return replace(ready, metadata={**ready.metadata, "scaled_to": str(scale_to)}), scale_to.factor(ready)
+    return replace(ready, metadata={**ready.metadata, "scaled_to": str(scale_to)}), scale_to.factor(ready, progress)
 
 
 def asce7_spectrum(period: ArrayLike, sds: float, sd1: float, long_period: float = 8.0) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 MEASURES = (*COMPONENTS, "geomean", "rotd50", "rotd100")
 DAMPING = 0.05
+Progress = Callable[[float, float], None]
 _RESOLUTION = 50  # points a period: a peak between two of them is missed by less than 1 - cos(pi/50), 0.2 %
 _ANGLES = np.radians(np.arange(180.0))  # of RotDnn, Boore (2010)
 
@@ -67,7 +69,11 @@ class Spectrum:
 
 
 def response_spectrum(
-    source: Record | Corrected | Motion, periods: ArrayLike | None = None, *, damping: float = DAMPING
+    source: Record | Corrected | Motion,
+    periods: ArrayLike | None = None,
+    *,
+    damping: float = DAMPING,
+    progress: Progress | None = None,
 ) -> Spectrum:
     """The response spectrum of a motion, whose acceleration is taken as linear between its samples.
 
@@ -80,6 +86,7 @@ def response_spectrum(
         source: a record (its mean acceleration is removed), a corrected record, or a motion.
         periods: shape (p,), [s]; None: 100 from 0.05 s to 10 s.
         damping: ratio to the critical one, in (0, 1).
+        progress: takes periods done and periods in all.
 
     Raises:
         InputError: a period is not positive, or the damping is not in (0, 1).
@@ -90,7 +97,11 @@ def response_spectrum(
     if not 0 < damping < 1:
         raise InputError(f"damping = {damping!r}: give a ratio above 0 and below 1")
     step, acceleration = _sampled(source)
-    sd = [_measured(_displacements(acceleration, step, period, damping)) for period in wanted]
+    sd = []
+    for period in wanted:
+        sd.append(_measured(_displacements(acceleration, step, period, damping)))
+        if progress is not None:
+            progress(len(sd), len(wanted))
     return Spectrum(wanted, damping, np.array(sd), _measured(acceleration))
 
 

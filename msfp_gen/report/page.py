@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +19,7 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.result import Result
 
+Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
 SCRIPTS = ("three.min.js", "data.js", "chart.js", "section.js", "scene.js", "page.js")
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
@@ -39,17 +40,18 @@ EXPLANATION = (
 )
 
 
-def write_report(result: Result, path: str | Path, frames: int = FRAMES) -> Path:
+def write_report(result: Result, path: str | Path, frames: int = FRAMES, progress: Progress | None = None) -> Path:
     """Write `report_html` to `path`, whole or not at all. Raises InputError for a path that cannot be."""
     path = check_output(path, REPORT_SUFFIXES)
-    write_bytes(path, [report_html(result, frames).encode()])
+    write_bytes(path, [report_html(result, frames, progress).encode()])
     return path
 
 
-def report_html(result: Result, frames: int = FRAMES) -> str:
+def report_html(result: Result, frames: int = FRAMES, progress: Progress | None = None) -> str:
     """The report of a run as the text of one HTML file that asks for no other.
 
     frames: at most about so many instants in the interactive view; the tables and figures are of all rows.
+    progress: takes figures done and figures in all, which is where the time goes.
     """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -70,7 +72,7 @@ def report_html(result: Result, frames: int = FRAMES) -> str:
         settings=settings_page(result),
         provenance=provenance_table(result),
         scene=recipe(result.scene),
-        figures=list(_pictures(result)),
+        figures=list(_pictures(result, progress)),
         speeds=SPEEDS,
         explanation=explanation,
         style=Markup(_asset("page.css")),
@@ -87,13 +89,15 @@ def _lead(result: Result) -> str:
     )
 
 
-def _pictures(result: Result) -> Iterator[dict[str, Any]]:
+def _pictures(result: Result, progress: Progress | None) -> Iterator[dict[str, Any]]:
     """The figures of a run as PNG."""
     from msfp_gen.figures import FIGURES as DRAWN
 
-    for name, title in FIGURES.items():
+    for done, (name, title) in enumerate(FIGURES.items(), start=1):
         picture = BytesIO()
         DRAWN[name](result, None).savefig(picture, format="png", dpi=RESOLUTION)
+        if progress is not None:
+            progress(done, len(FIGURES))
         yield {"title": title, "png": base64.b64encode(picture.getvalue()).decode("ascii")}
 
 

@@ -95,7 +95,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     slope k[STAGES];
     msfp_point at;
     double dq[NB][NQ] = { { 0 } }, dv[NB][NQ] = { { 0 } }, df[NB][2] = { { 0 } };
-    run->middle.share = 0.0;
+    run->middles = 0;
     memset(&at, 0, sizeof at);
     msfp_heat_begin(run);
     memcpy(k[0].v, run->now.v, sizeof k[0].v);

@@ -65,7 +65,7 @@ void msfp_heat_stage(msfp_run *run, int i, double beta)
     msfp_heat_rates(run->step.heat, flux, run->step.rates[i]);
 }
 
-void msfp_heat_middle(msfp_run *run) { memcpy(run->middle.heat, run->step.heat, sizeof run->middle.heat); }
+void msfp_heat_middle(msfp_run *run, msfp_middle *m) { memcpy(m->heat, run->step.heat, sizeof m->heat); }
 
 void msfp_heat_finish(msfp_run *run)
 {

@@ -14,7 +14,7 @@ void msfp_heat_settle(msfp_run *run);
 void msfp_heat_begin(msfp_run *run);
 void msfp_heat_prepare(msfp_run *run, const double *weights, int i, double h, double beta, msfp_point *at);
 void msfp_heat_stage(msfp_run *run, int i, double beta);
-void msfp_heat_middle(msfp_run *run); /* this stage is the one of the dense output */
+void msfp_heat_middle(msfp_run *run, msfp_middle *m); /* this stage serves the dense output */
 void msfp_heat_finish(msfp_run *run);
 /* Largest error of a temperature over its tolerance; weights: of the method less embedded ones. */
 double msfp_heat_error(const msfp_run *run, const double *weights, int stages, double h, double beta);
@@ -24,7 +24,7 @@ double msfp_heat_error(const msfp_run *run, const double *weights, int stages, d
 #define msfp_heat_begin(run) ((void)0)
 #define msfp_heat_prepare(run, weights, i, h, beta, at) ((void)0)
 #define msfp_heat_stage(run, i, beta) ((void)0)
-#define msfp_heat_middle(run) ((void)0)
+#define msfp_heat_middle(run, m) ((void)0)
 #define msfp_heat_finish(run) ((void)0)
 #define msfp_heat_error(run, weights, stages, h, beta) 0.0
 #endif

@@ -7,37 +7,19 @@
 #include <string.h>
 #include "msfp_model.h"
 #include "heat.h"
+#include "tableau.h"
 
 #define DOF MSFP_DOF
 #define NB MSFP_NB
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
-#define STAGES 3
-typedef struct {
-    double gamma;
-    double a[STAGES][STAGES]; /* strictly lower part; the diagonal is gamma but for the explicit first stage */
-    double c[STAGES];
-    double e[STAGES];         /* weights less embedded weights */
-    double order;             /* exponent of the step controller: order of the error estimate + 1 */
-} tableau;
-
-#define ROOT2 1.41421356237309504880
-#define W (ROOT2 / 4.0)
-#define D (1.0 - ROOT2 / 2.0)
-
-/* TR-BDF2 with the embedded third-order estimate of Hosea and Shampine (1996). */
-static const tableau method = {
-    D,
-    { { 0, 0, 0 }, { D, 0, 0 }, { W, W, 0 } },
-    { 0.0, 2.0 - ROOT2, 1.0 },
-    { W - (1.0 - W) / 3.0, W - (3.0 * W + 1.0) / 3.0, D - D / 3.0 },
-    3.0
-};
+#define STAGES MSFP_STAGES
 
 static const int unknown[ND] = MSFP_FREE;
 
 typedef struct {
+    const msfp_tableau *method;
     double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
     double Q[NB][NQ], V[NB][NQ];
     double beta;
@@ -55,14 +37,14 @@ static void prepare(const msfp_run *run, stages *s, int i, double h)
             s->Q[k][d] = now->q[k][d];
             s->V[k][d] = now->v[k][d];
             for (int j = 0; j < i; ++j) {
-                s->Q[k][d] += h * method.a[i][j] * s->v[j][k][d];
-                s->V[k][d] += h * method.a[i][j] * s->a[j][k][d];
+                s->Q[k][d] += h * s->method->a[i][j] * s->v[j][k][d];
+                s->V[k][d] += h * s->method->a[i][j] * s->a[j][k][d];
             }
         }
         for (int d = 0; d < 2; ++d) {
             s->seed.fp[k][d] = now->f[k][d];
             for (int j = 0; j < i; ++j)
-                s->seed.fp[k][d] += h * method.a[i][j] * s->df[j][k][d];
+                s->seed.fp[k][d] += h * s->method->a[i][j] * s->df[j][k][d];
         }
     }
 }
@@ -218,22 +200,26 @@ static int solve_stage(msfp_run *run, stages *s)
 
 static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
 {
+    const double *c = s->method->c;
     memcpy(s->at.v, run->now.v, sizeof s->at.v);
     memcpy(s->f, i > 1 ? s->f : run->now.f, sizeof s->f);
     if (extrapolate)
         for (int k = 0; k < NB; ++k)
             for (int d = 0; d < ND; ++d) {
                 const int j = unknown[d];
-                const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / method.c[1] : h * run->now.a[k][j];
-                s->at.v[k][j] += method.c[i] * slope;
+                const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / c[1] : h * run->now.a[k][j];
+                s->at.v[k][j] += c[i] * slope;
+                if (i > 2) /* as curved as the last stage says */
+                    s->at.v[k][j] += c[i] * (c[i] - c[1]) / (c[i - 1] * (c[i - 1] - c[1]))
+                                     * (s->v[i - 1][k][j] - s->v[0][k][j] - c[i - 1] * slope);
             }
 }
 
 static int stage(msfp_run *run, stages *s, int i, double h)
 {
     prepare(run, s, i, h);
-    msfp_point_at(run, run->now.t + method.c[i] * h, &s->at);
-    msfp_heat_prepare(run, method.a[i], i, h, s->beta, &s->at);
+    msfp_point_at(run, run->now.t + s->method->c[i] * h, &s->at);
+    msfp_heat_prepare(run, s->method->a[i], i, h, s->beta, &s->at);
     int status = MSFP_E_NEWTON;
     for (int attempt = 0; attempt < 2 && status == MSFP_E_NEWTON; ++attempt) {
         guess(run, s, i, h, (run->restart ? 1 : 0) == attempt);
@@ -245,12 +231,13 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     memcpy(s->v[i], s->at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->at.a, sizeof s->a[i]);
     msfp_heat_stage(run, i, s->beta);
-    if (i == 1) {
-        run->middle.share = method.c[i];
-        msfp_heat_middle(run);
-        memcpy(run->middle.q, s->at.q, sizeof run->middle.q);
-        memcpy(run->middle.v, s->at.v, sizeof run->middle.v);
-        memcpy(run->middle.f, s->f, sizeof run->middle.f);
+    if (run->middles < MSFP_MIDDLES && i == s->method->middle[run->middles]) {
+        msfp_middle *m = &run->middle[run->middles++];
+        m->share = s->method->c[i];
+        msfp_heat_middle(run, m);
+        memcpy(m->q, s->at.q, sizeof m->q);
+        memcpy(m->v, s->at.v, sizeof m->v);
+        memcpy(m->f, s->f, sizeof m->f);
     }
     msfp_friction_rates(&run->work, s->df[i]);
     msfp_powers(&run->parameters, &s->at, s->f, &run->work, s->power[i]);
@@ -307,7 +294,10 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     double dq[NB][NQ] = { { 0 } }, dv[NB][NQ] = { { 0 } }, df[NB][2] = { { 0 } };
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
-    s.beta = method.gamma * h;
+    const msfp_tableau *method = s.method = msfp_tableau_of(run->options.method);
+    const int last = method->stages - 1;
+    run->middles = 0;
+    s.beta = method->gamma * h;
     s.seed.cq = s.beta;
     s.seed.cv = 1.0;
     s.seed.ca = 1.0 / s.beta;
@@ -320,7 +310,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(s.power[0], now->power, sizeof s.power[0]);
     msfp_heat_begin(run);
     double disc = 0.0;
-    for (int i = 1; i < STAGES; ++i) {
+    for (int i = 1; i <= last; ++i) {
         const int status = stage(run, &s, i, h);
         if (status)
             return status;
@@ -332,23 +322,23 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->v, s.at.v, sizeof next->v);
     memcpy(next->a, s.at.a, sizeof next->a);
     memcpy(next->f, s.f, sizeof next->f);
-    memcpy(next->df, s.df[STAGES - 1], sizeof next->df);
-    memcpy(next->power, s.power[STAGES - 1], sizeof next->power);
+    memcpy(next->df, s.df[last], sizeof next->df);
+    memcpy(next->power, s.power[last], sizeof next->power);
     for (int e = 0; e < MSFP_WORKS; ++e) {
-        next->work[e] = now->work[e] + h * method.gamma * s.power[STAGES - 1][e];
-        for (int i = 0; i < STAGES - 1; ++i)
-            next->work[e] += h * method.a[STAGES - 1][i] * s.power[i][e];
+        next->work[e] = now->work[e] + h * method->gamma * s.power[last][e];
+        for (int i = 0; i < last; ++i)
+            next->work[e] += h * method->a[last][i] * s.power[i][e];
     }
     for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < STAGES; ++i) {
+        for (int i = 0; i <= last; ++i) {
             for (int d = 0; d < NQ; ++d) {
-                dq[k][d] += h * method.e[i] * s.v[i][k][d];
-                dv[k][d] += h * method.e[i] * s.a[i][k][d];
+                dq[k][d] += h * method->e[i] * s.v[i][k][d];
+                dv[k][d] += h * method->e[i] * s.a[i][k][d];
             }
             for (int d = 0; d < 2; ++d)
-                df[k][d] += h * method.e[i] * s.df[i][k][d];
+                df[k][d] += h * method->e[i] * s.df[i][k][d];
         }
-    disc = fmax(disc, msfp_heat_error(run, method.e, STAGES, h, s.beta));
+    disc = fmax(disc, msfp_heat_error(run, method->e, last + 1, h, s.beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
     if (*error > 1.0) {
         const msfp_work converged = run->work;

@@ -167,7 +167,7 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
 /* ---- runs ----------------------------------------------------------------------------------- */
 
-enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1 };
+enum { MSFP_IMPLICIT = 0, MSFP_DOPRI5 = 1, MSFP_ESDIRK4 = 2 };
 #define MSFP_STAGES 7 /* at most */
 
 typedef struct {
@@ -244,14 +244,15 @@ typedef struct {
 #endif
 } msfp_state;
 
-/* Values inside the last step, for dense output. share 0: none, the ends and their rates must do. */
+/* Values at a share of the last step, for dense output. */
 typedef struct {
-    double share; /* of the step */
+    double share;
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif
 } msfp_middle;
+#define MSFP_MIDDLES 3 /* at most */
 
 typedef struct {
     msfp_parameters parameters;
@@ -265,7 +266,8 @@ typedef struct {
     /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
     int next_jump;
     msfp_state now, next;
-    msfp_middle middle;
+    msfp_middle middle[MSFP_MIDDLES]; /* between the ends of the last step */
+    int middles;                      /* 0: none, the ends and their rates must do */
     msfp_work work;
 #if MSFP_HEAT
     struct { /* of the step in progress: what the stages before leave, the stage itself, and all their rates */
@@ -326,6 +328,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */
 double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], const double dv[MSFP_NB][MSFP_NQ], const double df[MSFP_NB][2]);
+/* Order of a method's error estimate, plus one: the exponent of its step control. */
+double msfp_order(int method);
 /* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
 int msfp_step_implicit(msfp_run *run, double h, double *error);
 int msfp_step_dopri5(msfp_run *run, double h, double *error);

@@ -13,29 +13,55 @@ static double hermite(double y0, double d0, double y1, double d1, double h, doub
     return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
 }
 
-/* A value inside the step: through the stage in its middle where the method has one (the rates at the ends of a stiff
- * step carry ringing that the values do not), else cubic through values and rates. */
-static double inside(double y0, double d0, double middle, double y1, double d1, double h, double c, double s)
+/* Weights of the start of the step, its middles and its end in the polynomial through all of them, at the share s. */
+typedef struct {
+    double of[MSFP_MIDDLES + 2];
+    int count;
+} weights;
+
+static weights weights_at(const msfp_run *run, double s)
 {
-    if (c > 0.0)
-        return (s - c) * (s - 1.0) / c * y0 + s * (s - 1.0) / (c * (c - 1.0)) * middle + s * (s - c) / (1.0 - c) * y1;
-    return hermite(y0, d0, y1, d1, h, s);
+    double nodes[MSFP_MIDDLES + 2] = { 0.0 };
+    weights w = { { 0.0 }, run->middles + 2 };
+    for (int i = 0; i < run->middles; ++i)
+        nodes[i + 1] = run->middle[i].share;
+    nodes[run->middles + 1] = 1.0;
+    for (int i = 0; i < w.count; ++i) {
+        w.of[i] = 1.0;
+        for (int j = 0; j < w.count; ++j)
+            w.of[i] *= j == i ? 1.0 : (s - nodes[j]) / (nodes[i] - nodes[j]);
+    }
+    return w;
+}
+
+/* A value inside the step: through the stages in its middle where the method has some (the rates at the ends of a stiff
+ * step carry ringing that the values do not), else cubic through values and rates. `middle` is the value in the first
+ * middle; in the others it lies as far on as they do. */
+static double inside(const weights *w, double y0, double d0, const double *middle, double y1, double d1, double h, double s)
+{
+    if (w->count == 2)
+        return hermite(y0, d0, y1, d1, h, s);
+    double y = w->of[0] * y0 + w->of[w->count - 1] * y1;
+    for (int i = 1; i < w->count - 1; ++i)
+        y += w->of[i] * middle[(size_t)(i - 1) * (sizeof(msfp_middle) / sizeof(double))];
+    return y;
 }
 
 void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
 {
     const msfp_state *a = &run->now, *b = &run->next;
-    const msfp_middle *m = &run->middle;
+    const msfp_middle *m = run->middle;
+    const weights w = weights_at(run, s);
     const double h = b->t - a->t;
     out->t = a->t + s * h;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < MSFP_NQ; ++d) {
-            out->q[k][d] = inside(a->q[k][d], a->v[k][d], m->q[k][d], b->q[k][d], b->v[k][d], h, m->share, s);
-            out->v[k][d] = inside(a->v[k][d], a->a[k][d], m->v[k][d], b->v[k][d], b->a[k][d], h, m->share, s);
+            out->q[k][d] = inside(&w, a->q[k][d], a->v[k][d], &m->q[k][d], b->q[k][d], b->v[k][d], h, s);
+            out->v[k][d] = inside(&w, a->v[k][d], a->a[k][d], &m->v[k][d], b->v[k][d], b->a[k][d], h, s);
             out->a[k][d] = (1.0 - s) * a->a[k][d] + s * b->a[k][d];
         }
         for (int d = 0; d < 2; ++d)
-            out->f[k][d] = inside(a->f[k][d], a->df[k][d], m->f[k][d], b->f[k][d], b->df[k][d], h, m->share, s);
+            out->f[k][d] = inside(&w, a->f[k][d], a->df[k][d], &m->f[k][d], b->f[k][d], b->df[k][d], h, s);
     }
 #if MSFP_HEAT
     double da[NB][MSFP_HEAT], db[NB][MSFP_HEAT];
@@ -44,7 +70,7 @@ void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
     for (int k = 0; k < NB; ++k) {
         out->flux[k] = (1.0 - s) * a->flux[k] + s * b->flux[k];
         for (int i = 0; i < MSFP_HEAT; ++i)
-            out->heat[k][i] = inside(a->heat[k][i], da[k][i], m->heat[k][i], b->heat[k][i], db[k][i], h, m->share, s);
+            out->heat[k][i] = inside(&w, a->heat[k][i], da[k][i], &m->heat[k][i], b->heat[k][i], db[k][i], h, s);
     }
 #endif
     for (int i = 0; i < MSFP_WORKS; ++i)
@@ -100,14 +126,16 @@ int msfp_write_row(msfp_run *run, const msfp_state *s)
     return MSFP_OK;
 }
 
-/* A recorded row inside a step of an implicit method: quadratic through what is recorded of its ends and its middle.
+/* A recorded row inside a step of an implicit method: polynomial through what is recorded of its ends and middles.
  * Forces are interpolated as they are: made from interpolated angles they would carry a stiff spring's error. */
-static void blend(const msfp_row *start, const msfp_row *middle, const msfp_row *end, double c, double s, msfp_row *out)
+static void blend(const msfp_row *rows, const weights *w, msfp_row *out)
 {
-    const double *a = (const double *)start, *m = (const double *)middle, *b = (const double *)end;
     double *values = (double *)out;
-    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i)
-        values[i] = inside(a[i], 0.0, m[i], b[i], 0.0, 0.0, c, s);
+    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i) {
+        values[i] = 0.0;
+        for (int r = 0; r < w->count; ++r)
+            values[i] += w->of[r] * ((const double *)&rows[r])[i];
+    }
 }
 
 /* Sliding is a distance, with a kink at the centre: made from the angles of its own row. */
@@ -136,22 +164,25 @@ int msfp_write_now(msfp_run *run)
 
 static int write_between(msfp_run *run, double last)
 {
-    msfp_row start, middle, end, *row;
+    msfp_row rows[MSFP_MIDDLES + 2], *row;
     msfp_state s;
-    const double c = run->middle.share, h = run->next.t - run->now.t;
-    if (c > 0.0) {
-        msfp_observe_state(run, &run->now, &start);
-        msfp_interpolate(run, c, &s);
-        msfp_observe_state(run, &s, &middle);
-        msfp_observe_state(run, &run->next, &end);
+    const double h = run->next.t - run->now.t;
+    if (run->middles) {
+        msfp_observe_state(run, &run->now, &rows[0]);
+        for (int i = 0; i < run->middles; ++i) {
+            msfp_interpolate(run, run->middle[i].share, &s);
+            msfp_observe_state(run, &s, &rows[i + 1]);
+        }
+        msfp_observe_state(run, &run->next, &rows[run->middles + 1]);
     }
     for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
         const double share = fmin(1.0, (run->output_time - run->now.t) / h);
         if (!(row = new_row(run)))
             return MSFP_E_MEMORY;
         msfp_interpolate(run, share, &s);
-        if (c > 0.0) {
-            blend(&start, &middle, &end, c, share, row);
+        if (run->middles) {
+            const weights w = weights_at(run, share);
+            blend(rows, &w, row);
             measure(run, row);
         } else
             msfp_observe_state(run, &s, row);

@@ -177,7 +177,7 @@ static int settle(msfp_run *run)
         const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
         if (status)
             return status;
-        if (solution.iterations && run->options.method == MSFP_IMPLICIT && run->determinant == 0)
+        if (solution.iterations && run->options.method != MSFP_DOPRI5 && run->determinant == 0)
             run->determinant = solution.determinant;
     }
     memcpy(seed.fp, at.f, sizeof seed.fp);
@@ -276,7 +276,7 @@ static int try_step(msfp_run *run, double h, double *error)
 
 static double controlled(const msfp_run *run, double error)
 {
-    const double order = run->options.method == MSFP_DOPRI5 ? 5.0 : 3.0;
+    const double order = msfp_order(run->options.method);
     const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
     return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
 }
@@ -338,7 +338,7 @@ static int one_step(msfp_run *run)
         }
         if (error > 1.0) {
             ++run->counts[MSFP_COUNT_REJECTED];
-            return !shrink(run, h, fmax(0.1, 0.9 * pow(error, run->options.method == MSFP_DOPRI5 ? -0.2 : -1.0 / 3.0)), MSFP_E_STEP);
+            return !shrink(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_order(run->options.method))), MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);
         event_values(run, &run->next, after);
