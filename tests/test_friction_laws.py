@@ -382,5 +382,13 @@ def test_other_refusals() -> None:
 
 
 def test_laws_are_found_by_their_word() -> None:
-    assert law_of("constant") is None and set(BUILT_IN) == {"velocity", "pvt"}
-    assert not BUILT_IN["velocity"].heats and BUILT_IN["pvt"].heats
+    assert law_of("constant") is None and set(BUILT_IN) == {"velocity", "pv", "pvt"}
+    assert [law.word for law in BUILT_IN.values() if law.heats] == ["pvt"]
+
+
+def test_without_heat_the_law_is_that_of_the_start() -> None:
+    given = {**BUILT_IN["pvt"].takes, "reference_pressure": 15e6, "start_temperature": 80.0, "mu": 0.1}
+    at = {**{name: value for name, value in given.items() if value is not None}, "v": 0.02, "p": 40e6}
+    cold = coefficient(BUILT_IN["pv"], at)[0]
+    assert cold == pytest.approx(float(coefficient(BUILT_IN["pvt"], {**at, "T": 80.0})[0]), rel=1e-14)
+    assert cold == pytest.approx(0.1 * reference.kp(40e6, 15e6) * reference.kv(0.02) * reference.kt(80.0), rel=1e-3)

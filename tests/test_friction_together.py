@@ -207,7 +207,8 @@ def test_blocks_of_the_page_run() -> None:
     rig = {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "damping": 5.0}
     motion = {"kind": "harmonic", "amplitude": 0.02, "frequency": 0.5}
     scene = scene_from_table({**tomllib.loads(blocks["toml"]), "motion": motion, "top": rig})
-    assert scene.effects.law is not None and scene.effects.law.word == "custom" and not scene.effects.law.heats
+    law = scene.modelled.law
+    assert law is not None and law.word == "custom" and not law.heats
     assert [surface.c3 for surface in scene.bearing.surfaces] == [2e-8, 1e-8, 1e-8, 2e-8]
     names: dict[str, Any] = {}
     exec(compile(blocks["python"], str(PAGE), "exec"), names)  # a block of our own documentation
