@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from math import log, pi, sqrt
+from math import pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.errors import InputError
-from msfp_gen.generator.friction_laws import BUILT_IN, HEAT, VARIABLES, Law, own_numbers
+from msfp_gen.generator.friction_laws import BUILT_IN, VARIABLES, Law, own_numbers
 from msfp_gen.law_text import Operations, fold, names_in
 
 if TYPE_CHECKING:
@@ -108,10 +108,10 @@ def numbers(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
                 f"bearing.surfaces[{index}].{name} is missing (surface {index + 1}): "
                 f"effects.friction = {law.word!r} needs it{more}"
             )
-    return {name: float(value) for name, value in {**found, **_derived(found)}.items() if value is not None}
+    return {name: float(value) for name, value in {**found, **derived(found)}.items() if value is not None}
 
 
-def _derived(found: Mapping[str, float | None]) -> dict[str, float]:
+def derived(found: Mapping[str, float | None]) -> dict[str, float]:
     """Area of the patch pi r^2; half the side of the square of that area, within which the patch covers the centre
     (Kumar et al. 2015); and sqrt(D/pi)/k.
     """
@@ -161,38 +161,3 @@ def _flaw(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
             return (f"gives {what} = {found[where]:.4g} at {place or 'every point'}; give a law and numbers with which "
                     f"it is {remedy}")  # fmt: skip
     return None
-
-
-def friction_of(bearing: Bearing, text: str | None) -> str:
-    """The law whose numbers the surfaces carry; of pressure and velocity before temperature, which a watch takes in."""
-    if text is not None:
-        return "custom"
-    words = {"pv": "reference_pressure", "velocity": "friction_slow"}
-    carried = (w for w, name in words.items() if any(getattr(s, name) is not None for s in bearing.surfaces))
-    return next(carried, "constant")
-
-
-def softening_of(law: Law | None, bearing: Bearing) -> float:
-    """Largest relative change of the friction coefficient for each kelvin, by the law with temperature [1/K]; near the
-    start, where it is steepest.
-    """
-    slopes = []
-    for index, surface in enumerate(bearing.surfaces):
-        found = {} if law is None else numbers(law, bearing, index)
-        ratio, start = found.get("temperature_ratio", 0.7), found.get("start_temperature", 20.0)
-        power = ratio ** (start / 50.0)
-        slopes.append(abs(log(ratio)) / 50.0 * power / (power + 0.4) if surface.friction > 0 else 0.0)
-    return max(slopes)
-
-
-def heating_of(bearing: Bearing) -> list[float]:
-    """sqrt(D/pi)/k over the area of contact of every surface [K s^1/2/J], with the defaults of `HEAT`; 0 where no area
-    is known.
-    """
-    out = []
-    for index, surface in enumerate(bearing.surfaces):
-        radius = surface.patch_radius or bearing.slider_rim_radius(index)
-        given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
-        numbers = _derived({**given, "patch_radius": radius or None})
-        out.append(numbers["heating"] / numbers["area"] if radius else 0.0)
-    return out

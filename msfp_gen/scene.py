@@ -11,7 +11,8 @@ from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
 from msfp_gen.generator.friction_laws import HEAT_TIMES, Law, law_of
-from msfp_gen.law_numbers import check_bearing, friction_of
+from msfp_gen.law_choice import friction_of
+from msfp_gen.law_numbers import check_bearing
 from msfp_gen.layout import Auto, Effects, ModelSpec
 from msfp_gen.motion import Motion
 from msfp_gen.prescribed import Load, Rotation

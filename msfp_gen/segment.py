@@ -11,7 +11,7 @@ from msfp_gen.choice import UNLOADED, Choice, answer_time, inertia_limit, restin
 from msfp_gen.drive import plane_of
 from msfp_gen.errors import InputError
 from msfp_gen.history import Array
-from msfp_gen.law_numbers import heating_of, softening_of
+from msfp_gen.law_choice import heating_of, softening_of
 from msfp_gen.packing import load_values, seated
 from msfp_gen.piecewise import ORDER
 from msfp_gen.plane import (

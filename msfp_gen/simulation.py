@@ -134,7 +134,7 @@ def _settled(scene: Scene) -> Scene:
 
 def _refuse_leftovers(checkpoint: str | Path) -> None:
     """A file of a later segment would be met in the middle of the run."""
-    if found := kept_files(checkpoint):
+    if found := [file for file in kept_files(checkpoint) if file != Path(checkpoint)]:
         raise InputError(
             f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
         )

@@ -116,7 +116,7 @@ def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None)
 
 def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`."""
-    lambdas, law = _lambdas(scene.bearing, table), scene.modelled.law
+    lambdas, law = _lambdas(scene.bearing, table), scene.law[1]
     if "friction" in lambdas and law is not None and not proportional(law, scene.bearing):
         raise InputError(
             f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, which this law does not follow "

@@ -1,0 +1,147 @@
+"""What effects cost, and that leaving them out is right: `python benchmarks/effects.py` prints the tables of
+docs/effects.md.
+
+The first changes one effect of the full model at a time, on one scene. The second holds a run with all that
+the report models (and, where bodies part, uplift) against the run with the effects that the scene calls for: the time of either, the largest difference and the RMS of the
+difference of the top force over its peak. Runs are repeated in turns and the fastest counts; the ratio comes last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, load_scene, presets, simulate
+from msfp_gen.generator import generate
+from msfp_gen.layout import ModelSpec
+from msfp_gen.result import Result
+
+SCENE, REPEATS = "fenz-test2", 15
+FULL = Effects()
+ALL = Effects(uplift=True)
+VARIANTS: dict[str, Effects] = {
+    "spatial, inertial, rims": FULL,
+    "planar": Effects(dimension="planar"),
+    "massless sliders": Effects(sliders="massless"),
+    "no rims": Effects(rims=False),
+    "isotropic friction": Effects(bouc_wen="isotropic"),
+    "spin over a patch": Effects(spin="patch"),
+    "free spin": Effects(spin="free"),
+    "uplift": ALL,
+    "friction of velocity": Effects(friction="velocity"),
+    "friction of pressure and velocity": Effects(friction="pv"),
+    "friction of pressure, velocity, temperature": Effects(friction="pvt"),
+    "planar, massless, no rims": Effects(dimension="planar", sliders="massless", rims=False),
+}
+
+
+def with_effects(scene: Scene, effects: Effects) -> Scene:
+    """The scene with other effects, its surfaces carrying what a law of friction needs."""
+    surfaces = scene.bearing.surfaces
+    numbers = {
+        "velocity": {"friction_slow": [surface.friction / 2 for surface in surfaces], "velocity_rate": 100.0},
+        "pv": {"reference_pressure": 15e6},
+        "pvt": {"reference_pressure": 15e6},
+    }.get(effects.friction, {})
+    return replace(scene, effects=effects, bearing=scene.bearing.replace(**numbers))
+
+
+def fastest(scenes: list[Scene], repeats: int = REPEATS) -> list[Result]:
+    """The fastest of several runs of each, taken in turns."""
+    best: list[Result | None] = [None] * len(scenes)
+    for _ in range(repeats):
+        for index, scene in enumerate(scenes):
+            result, known = simulate(scene), best[index]
+            if known is None or result.counters.wall_time < known.counters.wall_time:
+                best[index] = result
+    return [result for result in best if result is not None]
+
+
+def costs() -> None:
+    """One effect at a time."""
+    scene = load_scene(SCENE)
+    results = fastest([with_effects(scene, effects) for effects in VARIANTS.values()])
+    first = results[0].counters
+    print(f"Over `{SCENE}`, {first.wall_time * 1e3:.2f} ms, {first.steps} steps.\n")
+    print("| model | unknowns | friction, heat | operations | steps | run | iteration |\n|" + "---|" * 7)
+    for (name, effects), result in zip(VARIANTS.items(), results, strict=True):
+        unknowns, states = sizes(scene, effects)
+        counters = result.counters
+        each = counters.wall_time / counters.newton_iterations * first.newton_iterations / first.wall_time
+        operations = generate(ModelSpec(scene.bearing.layout, effects), "model").operations
+        print(f"| {name} | {unknowns} | {states} | {operations} | {counters.steps} | "
+              f"{counters.wall_time / first.wall_time:.2f} | {each:.2f} |")  # fmt: skip
+
+
+def sizes(scene: Scene, effects: Effects) -> tuple[int, int]:
+    """Unknowns of a step of all surfaces together, and states of friction and heat, which are local."""
+    surfaces, planar = scene.bearing.layout.surfaces, effects.dimension == "planar"
+    angles = 1 if planar else 2 if effects.spin == "locked" else 3
+    apart = (2 if planar else 3) if effects.uplift else 0
+    law = effects.law
+    local = (1 if planar else 2) + (law is not None) + (12 if law is not None and law.heats else 0)
+    return surfaces * (angles + apart), surfaces * local
+
+
+def proofs() -> Iterator[tuple[str, Scene, Scene]]:
+    """Name, scene with everything, scene with what it calls for."""
+    for name in ("fenz-test1", "fenz-test2", "fenz-test3", "fenz-test4", "fenz-test5"):
+        scene = replace(load_scene(name), output_step=0.02)
+        yield name, replace(scene, effects=FULL), replace(scene, effects=Auto())
+    orbit = replace(load_scene("becker-circle-50"), output_step=0.02)
+    yield "becker-circle-50", replace(orbit, effects=FULL), replace(orbit, effects=Auto())
+    strong = replace(load_scene("ridgecrest-clc"), output_step=0.02)
+    for share in (0.3, 1.0):
+        record = replace(strong.motion, coefficients=share * strong.motion.coefficients)
+        scene = replace(strong, motion=record, motion_table=None)
+        yield f"ridgecrest-clc, {share:.0%}", replace(scene, effects=FULL), replace(scene, effects=Auto())
+    yield "jerk that lifts a mass", *_lifted()
+
+
+def _lifted() -> tuple[Scene, Scene]:
+    weight = 11e3 * 9.80665
+    load = Load.from_arrays([0, 1, 1.05, 1.15, 1.2, 4], np.outer([0, 0, 1, 1, 0, 0], [0.0, 0.0, 1.5 * weight]))
+    top = Top.mass(11e3, 4e3, 0.3, rotational_stiffness=1e7, rotational_damping=1e4)
+    still = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, 6)))
+    scene = Scene(presets.bearing("double-fp"), still, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
+    return replace(scene, effects=ALL), scene
+
+
+def differences(one: Result, other: Result) -> tuple[float, float]:
+    """Largest difference and RMS difference of the top force, over its peak."""
+    apart = np.linalg.norm(one.history.top_force - other.history.top_force, axis=1)
+    peak = np.linalg.norm(other.history.top_force[:, :2], axis=1).max() or np.abs(other.history.top_force).max()
+    return float(apart.max() / peak), float(np.sqrt(np.mean(apart**2)) / peak)
+
+
+def proof() -> None:
+    """Everything against what the scene calls for."""
+    print("\n| scene | modelled | everything [ms] | chosen [ms] | ratio | largest | RMS |\n|" + "---|" * 7)
+    for name, everything, chosen in proofs():
+        full, fewer = fastest([everything, chosen], 5)
+        largest, rms = differences(fewer, full)
+        words = ", then ".join(_short(key) for key in fewer.provenance["model"].split(", then "))
+        times = [result.counters.wall_time for result in (full, fewer)]
+        print(f"| {name} | {words} | {times[0] * 1e3:.1f} | {times[1] * 1e3:.2f} | {times[0] / times[1]:.1f} | "
+              f"{largest:.1%} | {rms:.2%} |", flush=True)  # fmt: skip
+
+
+def _short(key: str) -> str:
+    words = key.split("-")
+    return " ".join([*words[1:2], words[3], *(word for word in ("norims", "uplift") if word in words)])
+
+
+def main() -> None:
+    """Print both tables, and the ratio of the smallest model to the full one."""
+    costs()
+    proof()
+    scene = load_scene(SCENE)
+    full, small = fastest([replace(scene, effects=FULL), replace(scene, effects=Auto())])
+    ratio = full.counters.wall_time / small.counters.wall_time
+    print(f"\n{SCENE}: spatial and inertial over what it calls for, {_short(small.provenance['model'])}: {ratio:.1f}")
+
+
+if __name__ == "__main__":
+    main()
