@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.checkpoint import kept_files
 from msfp_gen.cli.console import number
 from msfp_gen.errors import InputError, RunError
 
@@ -65,13 +64,17 @@ class Keep:
 
     def done(self) -> None:
         """Everything that was asked for is written: the checkpoint has served."""
-        if self.path is not None:
-            for file in kept_files(self.path):
-                file.unlink(missing_ok=True)
+        for file in self._files():
+            file.unlink(missing_ok=True)
 
     @property
     def _there(self) -> bool:
-        return self.path is not None and bool(kept_files(self.path))
+        return bool(self._files())
+
+    def _files(self) -> list[Path]:
+        from msfp_gen.checkpoint import kept_files
+
+        return [] if self.path is None else kept_files(self.path)
 
 
 NOT_KEPT = Keep()
