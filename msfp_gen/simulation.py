@@ -196,7 +196,9 @@ def _advance(run: Any, end: float, progress: Progress | None, kept: Checkpoint |
 
 
 # What the number beside a failure is.
-QUANTITIES = {"newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]", "parted": "aside [m]"}
+QUANTITIES = {
+    "newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]", "parted": "aside [m]",
+}  # fmt: skip
 
 
 def _message(scene: Scene, segment: Segment) -> str:
