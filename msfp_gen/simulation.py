@@ -45,6 +45,8 @@ FAILURES = {
     "finite": "a value is not finite",
     "memory": "no memory for more rows; give output_step",
     "interrupted": "interrupted",
+    "parted": "a body is beside its place by more than the radius of its slider: the stack has come apart; reduce the "
+    "motion or raise the load",
     "guard": "what the model leaves out would matter from here on",
 }
 
@@ -194,7 +196,9 @@ def _advance(run: Any, end: float, progress: Progress | None, kept: Checkpoint |
 
 
 # What the number beside a failure is.
-QUANTITIES = {"newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]"}
+QUANTITIES = {
+    "newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]", "parted": "aside [m]",
+}  # fmt: skip
 
 
 def _message(scene: Scene, segment: Segment) -> str:

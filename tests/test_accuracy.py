@@ -68,9 +68,15 @@ def test_the_reference_is_of_two_families_that_agree():
     assert found.floor.force_max == pytest.approx(1e-4, rel=1e-2)
 
 
-def test_one_family_alone_confirms_nothing():
-    found = best_reference([trial("a", 1e-6), trial("c", 1e-9)], FAMILIES)
+def test_one_family_alone_confirms_little():
+    found = best_reference([trial("a", 1e-6, 1e-3), trial("c", 1e-9)], FAMILIES)
+    assert (found.trial.method, found.second.method, found.independent) == ("c", "a", False)
+    assert found.floor.force_max == pytest.approx(1e-3, rel=1e-2) and "own kind alone" in study.doubts(found)[0]
+    found = best_reference([trial("a", 1e-6), trial("a", 1e-4, 1e-2), trial("a", 1e-5, 1e-3)], FAMILIES)
+    assert (found.second.rtol, found.independent) == (1e-5, False)
+    found = best_reference([trial("a")], FAMILIES)
     assert found.second is None and "nothing confirms" in study.doubts(found)[0]
+    assert not is_wrong(trial(wave=0.5), errors(trial(wave=0.5), trial()), found)  # nothing is known to be wrong
     with pytest.raises(RunError, match="raise the limit"):
         best_reference([trial(status=CUT_OFF)], FAMILIES)
 
@@ -86,6 +92,8 @@ def test_a_success_far_above_its_tolerance_is_wrong():
     for wave, wrong in ((0.1, True), (0.01, False)):
         run = trial(rtol=1e-3, wave=wave)
         assert is_wrong(run, errors(run, sure.trial), sure) is wrong
+    loose = trial(rtol=0.1, wave=0.3)
+    assert is_wrong(loose, errors(loose, sure.trial), sure)  # no tolerance makes a fifth of the peak right
     failed = trial(rtol=1e-3, wave=0.5, status="failed")
     assert not is_wrong(failed, errors(failed, sure.trial), sure)
     vague = replace(sure, floor=errors(trial(wave=0.09), trial()))
@@ -115,7 +123,9 @@ def test_what_would_end_soon_is_taken_to_its_end():
     scene = short(duration=0.02)
     nearly = METHODS["DOP853"].attempt(scene, 1e-4, 10.0)
     stopped = replace(nearly, status=CUT_OFF, seconds=1.0, reached=0.01)
-    assert [t.status for t in affordable(scene, [stopped], 1.0, lambda line: None)] == [OK]
+    ended = affordable(scene, [stopped], 1.0, lambda line: None)
+    assert [t.status for t in ended] == [OK]
+    assert [t.status for t in study.completed([stopped, trial()], ended)] == [OK, OK]
     assert not affordable(scene, [replace(stopped, reached=1e-4)], 1.0, lambda line: None)
 
 
@@ -210,7 +220,7 @@ def test_command_writes_and_prints(tmp_path, capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert len(json.loads(out)["points"]) == 4 and "implicit at 0.01: ok" in err and err.count("wrote ") == 5
     assert main([*words[:5], "--tolerances", "1e-2", "--methods", "implicit"]) == 0
-    assert "confirmed by nothing" in capsys.readouterr().out
+    assert "own kind alone" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("words", [["--tolerances", "tight"], ["--methods", "euler"], ["--limit", "-1"]])

@@ -102,7 +102,7 @@ def test_a_run_starts_where_slow_turning_of_its_plates_leaves_it() -> None:
 def test_a_constant_load_is_an_axial_load() -> None:
     whole = simulate(double())
     parts = double(top=replace(RIG, axial_load=0.4 * WEIGHT), load=Load.constant((0.0, 0.0, -0.6 * WEIGHT)))
-    np.testing.assert_allclose(simulate(parts).history.top_force, whole.history.top_force, atol=1e-6 * WEIGHT)
+    np.testing.assert_allclose(simulate(parts).history.top_force, whole.history.top_force, atol=2e-4 * WEIGHT)
 
 
 def test_the_normal_force_follows_a_varying_load_and_its_jumps() -> None:

@@ -47,14 +47,16 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The run that errors are measured against, the independent one that confirms it, and how far they are apart.
+    """The run that errors are measured against, the one that confirms it, and how far they are apart.
 
-    Without a second run nothing confirms the first: `second` and `floor` are None.
+    Without a second run nothing confirms the first: `second` and `floor` are None. independent: the two are of
+    different families of methods.
     """
 
     trial: Trial
     second: Trial | None
     floor: Errors | None
+    independent: bool = True
 
 
 def errors(trial: Trial, reference: Trial) -> Errors | None:
@@ -89,21 +91,22 @@ def _rms(values: Array) -> Array:
 
 
 def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Reference:
-    """Of the tightest finished run of every family, the two that agree best; the tighter one is the reference.
+    """Of the tightest finished run of every method, the two of different families that agree best; the tighter leads.
 
-    families: method -> family. Raises RunError where no run finished.
+    families: method -> family. Without two families two methods of one must do, or two tolerances of one method: then
+    the floor is a lower bound, and `Reference.independent` is false. Raises RunError where no run finished.
     """
-    tightest: dict[str, Trial] = {}
-    for trial in sorted((t for t in trials if t.finished), key=lambda t: -t.rtol):
-        tightest[families[trial.method]] = trial
-    if not tightest:
+    finished = sorted((t for t in trials if t.finished), key=lambda t: t.rtol)
+    if not finished:
         raise RunError("no run reached the end in the time given: raise the limit or shorten the scene", status="limit")
-    pairs = [sorted(pair, key=lambda t: t.rtol) for pair in combinations(tightest.values(), 2)]
-    if not pairs:
-        return Reference(next(iter(tightest.values())), None, None)
-    apart = [(_apart(first, second), first, second) for first, second in pairs]
-    floor, first, second = min(apart, key=lambda item: item[0].worst_rms)
-    return Reference(first, second, floor)
+    tightest = list({trial.method: trial for trial in reversed(finished)}.values())
+    pairs = list(combinations(sorted(tightest, key=lambda t: t.rtol), 2))
+    apart = [pair for pair in pairs if families[pair[0].method] != families[pair[1].method]]
+    chosen = apart or pairs or [(finished[0], second) for second in finished[1:2]]
+    if not chosen:
+        return Reference(finished[0], None, None, independent=False)
+    floor, first, second = min(((_apart(*pair), *pair) for pair in chosen), key=lambda item: item[0].worst_rms)
+    return Reference(first, second, floor, independent=bool(apart))
 
 
 def _apart(first: Trial, second: Trial) -> Errors:

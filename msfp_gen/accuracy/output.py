@@ -128,7 +128,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     """CSV, JSON, Markdown and the figure as SVG and PNG, in `folder`; the paths written. Raises InputError."""
     make_folder(folder, "--output")
     base = folder / study.kind
-    written = [_write_csv(study, base.with_suffix(".csv"))]
+    written = [write_csv(study, base.with_suffix(".csv"))]
     for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
         with replacing(base.with_suffix(suffix)) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -139,7 +139,8 @@ def write(study: Study, folder: Path) -> list[Path]:
     return written
 
 
-def _write_csv(study: Study, path: Path) -> Path:
+def write_csv(study: Study, path: Path) -> Path:
+    """One row a run, by the names of `COLUMNS`; whole or not at all."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()

@@ -19,7 +19,7 @@ TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 LIMIT = 10.0  # [s] of wall time a run
 MORE = 4.0  # times the limit that a run may take which is to confirm the reference
 TIGHTEST = 1e-11  # what a reference is asked for at most
-WRONG = 30.0  # a success whose RMS error exceeds so many tolerances is a wrong one
+WRONG, WRONG_ANYWAY = 30.0, 0.1  # a success is wrong whose RMS error exceeds so many tolerances, or this at any
 Say = Callable[[str], None]
 
 
@@ -74,8 +74,8 @@ def work_precision(
         found, left_out = ladder(method, scene, sorted(tolerances, reverse=True), limit, say)
         trials += found
         notes += left_out
-    extra = [*tighter(scene, trials, limit, say), *affordable(scene, trials, limit, say)]
-    reference = best_reference([*trials, *extra], families())
+    trials = completed(trials, affordable(scene, trials, limit, say))
+    reference = best_reference([*trials, *tighter(scene, trials, limit, say)], families())
     return Study(scene, "work-precision", points_of(trials, reference), reference, (*notes, *doubts(reference)))
 
 
@@ -150,6 +150,12 @@ def affordable(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) ->
     return found
 
 
+def completed(trials: Sequence[Trial], ended: Sequence[Trial]) -> list[Trial]:
+    """`trials` with those that were taken to their end after all in place of what was cut off."""
+    known = {(trial.method, trial.rtol): trial for trial in ended}
+    return [known.get((trial.method, trial.rtol), trial) for trial in trials]
+
+
 def points_of(trials: Sequence[Trial], reference: Reference) -> tuple[Point, ...]:
     """Trials with their errors; the reference itself has none."""
     return tuple(point_of(trial.method, trial, reference) for trial in trials)
@@ -163,14 +169,18 @@ def point_of(series: str, trial: Trial, reference: Reference) -> Point:
 
 def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
     """Whether a run claimed success and its RMS error is far above its tolerance, and above what is known."""
-    known = 0.0 if reference.floor is None else 3 * reference.floor.worst_rms
-    return trial.finished and found.worst_rms > max(WRONG * trial.rtol, known)
+    if reference.floor is None:
+        return False
+    known = 3 * reference.floor.worst_rms
+    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, WRONG_ANYWAY), known)
 
 
 def doubts(reference: Reference) -> list[str]:
     """What a reader should know of the reference."""
     if reference.second is None or reference.floor is None:
-        return ["only one family of methods reached the end: nothing confirms the reference"]
+        return ["only one run reached the end: nothing confirms the reference"]
+    if not reference.independent:
+        return ["only one family of methods reached the end: the reference is confirmed by its own kind alone"]
     if reference.floor.worst_rms > 1e-2:
         return [f"the two references differ by {reference.floor.worst_rms:.1%} RMS: no error below that means anything"]
     return []

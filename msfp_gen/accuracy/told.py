@@ -16,6 +16,7 @@ def within_tables(found: Within) -> list[Table]:
     rows = [
         ("asked for", share(found.target)),
         ("estimated error of this run", f"{share(chosen.estimate)}: {_parts(chosen)}"),
+        *([("not in it", found.left_out)] if found.left_out else []),
         ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
         ("its cost", f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search "
                      f"{_seconds(found.seconds)}"),

@@ -50,7 +50,8 @@ class Within:
     """A result with the error that it was asked for, the one it is estimated to have, and what more would cost.
 
     chosen: the rung of `result`; next_step: the one above, None at the top. attempts: all that was tried, in order.
-    seconds: what everything took, the search included. reasons: why these settings, in words.
+    seconds: what everything took, the search included. left_out: what no estimate holds, in words, or nothing.
+    reasons: why these settings, in words.
     """
 
     result: Result
@@ -59,6 +60,7 @@ class Within:
     next_step: Attempt | None
     attempts: tuple[Attempt, ...]
     seconds: float
+    left_out: str
     reasons: tuple[str, ...]
     explained: bool
 
@@ -77,6 +79,7 @@ class Within:
             "chosen": asdict(self.chosen),
             "next_step": None if self.next_step is None else asdict(self.next_step),
             "seconds": self.seconds,
+            "left_out": self.left_out,
             "attempts": [asdict(attempt) for attempt in self.attempts],
             "reasons": list(self.reasons),
         }
@@ -104,7 +107,7 @@ def simulate_within(
     rung = search.cheapest(search.rung())
     result = simulate(replace(scene, solver=search.solver(rung)), progress=progress)
     chosen = replace(search.attempt(rung), seconds=result.counters.wall_time)
-    reasons = (why, *search.reasons(rung), *_rims(result), *(_report_method(scene) if explain else ()))
+    reasons = (why, *search.reasons(rung), *(_report_method(scene) if explain else ()))
     provenance = {"error_target": f"{error:g}", "error_estimate": f"{chosen.estimate:.3g}"}
     return Within(
         result=replace(result, provenance=result.provenance | provenance),
@@ -113,6 +116,7 @@ def simulate_within(
         next_step=search.next_step(rung),
         attempts=tuple(search.attempt(tried) for tried in sorted(search.trials)),
         seconds=time.perf_counter() - begin,
+        left_out=_left_out(result),
         reasons=reasons,
         explained=explain,
     )
@@ -207,12 +211,12 @@ def worst(found: Errors) -> float:
     return max(found.force_rms, found.sliding_rms, found.force_peak, found.sliding_peak)
 
 
-def _rims(result: Result) -> tuple[str, ...]:
+def _left_out(result: Result) -> str:
     """What an impact leaves out of every estimate."""
-    if not any(event.kind == "rim_contact" for event in result.events):
-        return ()
-    return ("rims were met: where the ringing after an impact was resolved on purpose it shifted sliding by up to 1 % "
-            "(docs/accuracy.md); no estimate here holds that",)  # fmt: skip
+    if not any(event.kind in ("rim_contact", "landing") for event in result.events):
+        return ""
+    return ("the ringing after impacts, which is filtered: resolved on purpose it shifted sliding by up to 1 % in "
+            "other scenes (docs/accuracy.md)")  # fmt: skip
 
 
 def _report_method(scene: Scene) -> tuple[str, ...]:

@@ -64,15 +64,17 @@ class Keep:
 
     def done(self) -> None:
         """Everything that was asked for is written: the checkpoint has served."""
-        for file in self._files():
+        for file in self._files:
             file.unlink(missing_ok=True)
 
     @property
     def _there(self) -> bool:
-        return bool(self._files())
+        return bool(self._files)
 
+    @property
     def _files(self) -> list[Path]:
-        from msfp_gen.checkpoint import kept_files
+        """One for each model that the run went through."""
+        from msfp_gen.checkpoint import kept_files  # numpy is not for --help
 
         return [] if self.path is None else kept_files(self.path)
 

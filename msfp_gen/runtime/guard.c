@@ -7,6 +7,37 @@
 #include <string.h>
 #include "run.h"
 
+int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
+{
+    for (int j = 0; j < NB; ++j) {
+        double p[3];
+        msfp_local_p_get(w->local[j], p);
+        if (!(fabs(s->q[j][0]) + fabs(s->q[j][1]) + fabs(s->q[j][2]) < INFINITY) || !(fabs(p[2]) < INFINITY)) {
+            run->status_surface = j + 1;
+            return MSFP_E_FINITE;
+        }
+        if (p[2] <= 0.0 && !MSFP_UPLIFT) {
+            run->status_surface = j + 1;
+            run->status_value = p[2];
+            return MSFP_E_UPLIFT;
+        }
+#if MSFP_UPLIFT
+        const double apart = hypot(s->q[j][3], s->q[j][4]), face = run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_RS];
+        if (face > 0.0 && apart > face) { /* beside its place by more than its face: it will not land on it */
+            run->status_surface = j + 1;
+            run->status_value = apart;
+            return MSFP_E_PARTED;
+        }
+#endif
+        if (fabs(s->q[j][1]) > 1.5 || fabs(s->q[j][0]) > 1.5) {
+            run->status_surface = j + 1;
+            run->status_value = fabs(s->q[j][1]) > 1.5 ? s->q[j][1] : s->q[j][0];
+            return MSFP_E_ANGLE;
+        }
+    }
+    return MSFP_OK;
+}
+
 const char *msfp_guard_name(int guard)
 {
     static const char *const names[MSFP_GUARDS] = { "rims", "uplift", "inertia", "heat" };

@@ -95,7 +95,8 @@ enum {
     MSFP_E_STEPS,         /* the allowed number of steps is used up */
     MSFP_E_FINITE,        /* a value is not finite */
     MSFP_E_MEMORY,
-    MSFP_E_GUARD          /* what the model leaves out would matter from here on: see run->guard */
+    MSFP_E_GUARD,         /* what the model leaves out would matter from here on: see run->guard */
+    MSFP_E_PARTED         /* a body is beside its place by more than its slider is wide: it has left the stack */
 };
 
 /* The condensed equations: angular balances with interface forces summed from the top and contact in

@@ -12,7 +12,7 @@ static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
-    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard" };
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard", "parted" };
     return names[status];
 }
 
@@ -53,29 +53,6 @@ double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], c
             worst = fmax(worst, fabs(df[k][d]) / (10.0 * rtol));
     }
     return worst;
-}
-
-int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
-{
-    for (int j = 0; j < NB; ++j) {
-        double p[3];
-        msfp_local_p_get(w->local[j], p);
-        if (!(fabs(s->q[j][0]) + fabs(s->q[j][1]) + fabs(s->q[j][2]) < INFINITY) || !(fabs(p[2]) < INFINITY)) {
-            run->status_surface = j + 1;
-            return MSFP_E_FINITE;
-        }
-        if (p[2] <= 0.0 && !MSFP_UPLIFT) {
-            run->status_surface = j + 1;
-            run->status_value = p[2];
-            return MSFP_E_UPLIFT;
-        }
-        if (fabs(s->q[j][1]) > 1.5 || fabs(s->q[j][0]) > 1.5) {
-            run->status_surface = j + 1;
-            run->status_value = fabs(s->q[j][1]) > 1.5 ? s->q[j][1] : s->q[j][0];
-            return MSFP_E_ANGLE;
-        }
-    }
-    return MSFP_OK;
 }
 
 /* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
