@@ -162,4 +162,8 @@ class Counters:
     factorisations: int = 0
     newton_failures: int = 0
     events: int = 0
+    halved_newton_steps: int = 0
+    fresh_tangents: int = 0
+    other_starts: int = 0
+    quasistatic_starts: int = 0
     wall_time: float = 0.0

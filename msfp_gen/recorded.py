@@ -34,7 +34,7 @@ def history_of(model: Model, rows: Array, azimuth: float) -> History:
         "friction_stored": work[:, 1],
         "friction_dissipated": work[:, 2],
         "rim_stored": f["rim_stored"] - f["rim_stored"][0],
-        "rim_dissipated": work[:, 3] - (f["rim_stored"] - f["rim_stored"][0]),
+        "rim_dissipated": work[:, 3],
         "top_dissipated": work[:, 4],
         "seat_stored": f["seat_stored"] - f["seat_stored"][0],
         "seat_dissipated": work[:, 5],

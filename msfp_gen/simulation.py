@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen import failures
 from msfp_gen.build import build_model
 from msfp_gen.checkpoint import EVERY, Checkpoint, Identity, kept_files, segment_file
 from msfp_gen.errors import InputError, RunError
@@ -31,24 +32,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, float], None]
 CHUNK = 4000  # steps between two looks at Ctrl-C and at the progress
-
-FAILURES = {
-    "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
-    "lower the friction or the motion",
-    "step": "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
-    "irregular": "the equations lost regularity (the determinant changed sign): "
-    "friction is too high for a unique motion here",
-    "uplift": "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion, "
-    "or give effects.uplift = true",
-    "angle": "a tilt nears 90 degrees, where the Euler angles are singular; check the capacity and the rims",
-    "steps": "the allowed number of steps is used up; raise solver.max_steps",
-    "finite": "a value is not finite",
-    "memory": "no memory for more rows; give output_step",
-    "interrupted": "interrupted",
-    "parted": "a body is beside its place by more than the radius of its slider: the stack has come apart; reduce the "
-    "motion or raise the load",
-    "guard": "what the model leaves out would matter from here on",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,28 +178,11 @@ def _advance(run: Any, end: float, progress: Progress | None, kept: Checkpoint |
     return status
 
 
-# What the number beside a failure is.
-QUANTITIES = {
-    "newton": "residual", "irregular": "residual", "uplift": "P.t3 [N]", "angle": "angle [rad]", "parted": "aside [m]",
-}  # fmt: skip
-
-
 def _message(scene: Scene, segment: Segment) -> str:
-    """One line: when, where, why, and the quantity."""
-    status, run = segment.status, segment.run
-    _, surface, value = run.status
-    known = surface and status in QUANTITIES
-    where = (
-        f", surface {surface}, {QUANTITIES[status]} = {value:.4g}"
-        if known
-        else f", surface {surface}"
-        if surface
-        else ""
-    )
-    why = FAILURES.get(status, status)
-    if status == "guard":
-        why = "; ".join(note.text for note in notes_of(scene, segment, None))
-    return f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {why}"
+    """Why it could not go on, in one line."""
+    told = segment.status == "guard"
+    why = "; ".join(note.text for note in notes_of(scene, segment, None)) if told else None
+    return failures.message(scene, segment.model, segment.run, segment.status, why)
 
 
 def _result(scene: Scene, segments: list[Segment], notes: tuple[Note, ...]) -> Result:

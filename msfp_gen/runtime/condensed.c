@@ -105,7 +105,8 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 #else
         const double met = 0.0;
 #endif
-        const double pressed = w->contact[k][MSFP_CONTACT_N] + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        /* Rates far off make N, and what is measured by it, a number without a meaning. */
+        const double pressed = fmin(w->contact[k][MSFP_CONTACT_N], 1e3 * w->reference) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
         const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
             scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
@@ -150,8 +151,8 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
             out->residual = fmax(out->residual, fabs(residual[i]) / scale[i]);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
-        /* Converged, or at the floor that rounding leaves. */
-        if (out->residual <= 1e-13 || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
+        /* Converged, or at the floor that rounding leaves; a step is taken all the same, for the determinant. */
+        if ((out->iterations && out->residual <= 1e-13) || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
             return MSFP_OK;
         last = out->residual;
         out->determinant = msfp_lu(tangent, DOF, pivots);

@@ -98,6 +98,14 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     run->middles = 0;
     memset(&at, 0, sizeof at);
     msfp_heat_begin(run);
+    if (run->determinant == 0) { /* the sign to keep is that of the start, not of a first step that may be too long */
+        msfp_point_at(run, run->now.t, &at);
+        msfp_heat_point(&run->now, &at);
+        combine(&run->now, k, a[0], 0, h, &at);
+        const int status = slope_at(run, &at, &k[0]);
+        if (status)
+            return status;
+    }
     memcpy(k[0].v, run->now.v, sizeof k[0].v);
     memcpy(k[0].a, run->now.a, sizeof k[0].a);
     memcpy(k[0].f, run->now.df, sizeof k[0].f);

@@ -69,6 +69,7 @@ typedef struct {
     double contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB];
+    double rim_sum[MSFP_NB]; /* k gap + c dgap/dt where a gap has closed, pull or push */
 #if MSFP_LAW
     double coefficient[MSFP_NB][MSFP_COEFFICIENT_SIZE]; /* mu: what Newton starts from; 0 does */
 #endif
@@ -192,7 +193,8 @@ typedef struct {
 } msfp_options;
 
 enum { MSFP_COUNT_STEPS, MSFP_COUNT_REJECTED, MSFP_COUNT_NEWTON, MSFP_COUNT_EVALUATIONS, MSFP_COUNT_FACTORISATIONS,
-       MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNTS };
+       MSFP_COUNT_NEWTON_FAILURES, MSFP_COUNT_EVENTS, MSFP_COUNT_HALVED_STEPS, MSFP_COUNT_FRESH_TANGENTS,
+       MSFP_COUNT_OTHER_STARTS, MSFP_COUNT_QUASISTATIC_STARTS, MSFP_COUNTS };
 
 /* Watches over what a model leaves out: guard.c. */
 enum { MSFP_GUARD_RIMS, MSFP_GUARD_UPLIFT, MSFP_GUARD_INERTIA, MSFP_GUARD_HEAT, MSFP_GUARDS };
@@ -286,6 +288,7 @@ typedef struct {
     } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
+    int shortened; /* the step at hand is a shorter one after Newton failed */
     long counts[MSFP_COUNTS];
     int status, status_surface, worst_surface;
     double status_value;

@@ -71,12 +71,24 @@ static double seat_power(const msfp_work *w)
     return lost;
 }
 
-static double rim_power(const msfp_work *w, int j)
+/* The force acts at R - p from the centre, the gap is measured at R (3.20), (3.25). */
+static double rim_lever(const double *par)
 {
-    double moment[3], turning[3];
-    msfp_rim_M_get(w->rim[j], moment);
-    msfp_local_dw_get(w->local[j], turning);
-    return -dot3(moment, turning);
+    return 1.0 - par[MSFP_SURFACE_PARAMETERS_PR] / par[MSFP_SURFACE_PARAMETERS_R];
+}
+
+/* What the damper of a rim takes, never less than nothing: c (dg/dt)^2; and where it would pull and so lets go, what the
+ * spring gives it. */
+static double rim_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, int j)
+{
+    double sliding[NB][MSFP_GAP_SIZE];
+    const double *par = p->surface[j];
+    msfp_gaps(p, at->q, sliding);
+    const double gap = sliding[j][MSFP_GAP_G], spring = par[MSFP_SURFACE_PARAMETERS_KC] * gap;
+    const double damper = w->rim_sum[j] - spring;
+    if (gap >= 0.0 || par[MSFP_SURFACE_PARAMETERS_CC] == 0.0)
+        return 0.0;
+    return (fmin(w->rim_sum[j], 0.0) - spring) * damper / par[MSFP_SURFACE_PARAMETERS_CC] * rim_lever(par);
 }
 
 #if MSFP_TURNED
@@ -147,8 +159,8 @@ void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[
     power[MSFP_WORK_SEAT] = seat_power(w);
     for (int j = 0; j < NB; ++j) {
         msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
-        if (w->rim_active[j])
-            power[MSFP_WORK_RIM] += rim_power(w, j);
+        if (w->rim_sum[j] != 0.0)
+            power[MSFP_WORK_RIM] += rim_power(p, at, w, j);
     }
 }
 
@@ -172,15 +184,12 @@ static double restraint_energy(const msfp_parameters *p, const msfp_point *at, c
     return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean;
 }
 
-static double rim_energy(const msfp_parameters *p, const msfp_work *w, const double *gap)
+static double rim_energy(const msfp_parameters *p, const double *gap)
 {
     double total = 0.0;
-    for (int j = 0; j < NB; ++j)
-        if (w->rim_active[j]) {
-            const double *par = p->surface[j], g = gap[j];
-            /* the force acts at R - p from the centre, the gap is measured at R (3.20), (3.25) */
-            total += 0.5 * par[MSFP_SURFACE_PARAMETERS_KC] * g * g * (1.0 - par[MSFP_SURFACE_PARAMETERS_PR] / par[MSFP_SURFACE_PARAMETERS_R]);
-        }
+    for (int j = 0; j < NB && MSFP_RIMS; ++j)
+        if (gap[j] < 0.0)
+            total += 0.5 * p->surface[j][MSFP_SURFACE_PARAMETERS_KC] * gap[j] * gap[j] * rim_lever(p->surface[j]);
     return total;
 }
 
@@ -232,7 +241,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     row->kinetic = total[0];
     row->potential = total[1];
     row->restraint = restraint_energy(p, at, w);
-    row->rim_stored = rim_energy(p, w, row->gap);
+    row->rim_stored = rim_energy(p, row->gap);
     row->seat_stored = 0.0;
 #if MSFP_UPLIFT
     for (int j = 0; j < NB; ++j) {

@@ -227,7 +227,7 @@ int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, do
         out->residual = report_size(p, unknowns, residual);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
-        if (out->residual <= 1e-13 || (out->residual <= 1e-10 && out->residual >= 0.5 * last)) {
+        if (((warm || out->iterations) && out->residual <= 1e-13) || (out->residual <= 1e-10 && out->residual >= 0.5 * last)) {
             double contact[NB][MSFP_UNKNOWNS_SIZE];
             spread(unknowns, at, contact);
             return MSFP_OK;

@@ -8,6 +8,7 @@
 #define SMALLEST_STEP 1e-9     /* [s], far below any period of a bearing */
 #define SHORTEST_TO_EVENT 1e-6 /* [s]; an event nearer than this is stepped over: rounding would drown a step to it */
 
+
 static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
@@ -154,7 +155,7 @@ static int settle(msfp_run *run)
         const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
         if (status)
             return status;
-        if (solution.iterations && run->options.method != MSFP_DOPRI5 && run->determinant == 0)
+        if (run->options.method != MSFP_DOPRI5 && run->determinant == 0)
             run->determinant = solution.determinant;
     }
     memcpy(seed.fp, at.f, sizeof seed.fp);
@@ -243,6 +244,8 @@ static double target(const msfp_run *run)
 
 static int try_step(msfp_run *run, double h, double *error)
 {
+    run->status_surface = 0;
+    run->status_value = 0.0;
     const int status = run->options.method == MSFP_DOPRI5 ? msfp_step_dopri5(run, h, error) : msfp_step_implicit(run, h, error);
     if (status)
         return status;
@@ -264,7 +267,7 @@ static int shrink(msfp_run *run, double h, double factor, int status)
     run->h = h * factor;
     if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
         return 0;
-    run->status = status;
+    run->status = msfp_parting(run) ? MSFP_E_UPLIFT : status;
     return 1;
 }
 
@@ -276,7 +279,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     const int cut = h < 0.9 * run->h && error < 0.5;
     run->h = fmax(h * controlled(run, error), cut ? run->h : 0.0);
     run->previous_error = error;
-    run->restart = 0;
+    run->restart = run->shortened = 0;
     const int stop = record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);
@@ -310,6 +313,7 @@ static int one_step(msfp_run *run)
         const int status = try_step(run, h, &error);
         if (status) {
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
+            run->shortened |= status == MSFP_E_NEWTON;
             ++run->counts[MSFP_COUNT_REJECTED];
             return !shrink(run, h, 0.25, status);
         }

@@ -17,6 +17,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 {
     memset(w->rim[j], 0, sizeof w->rim[j]);
     w->rim_active[j] = 0;
+    w->rim_sum[j] = 0.0;
 #if MSFP_RIMS
     /* t_3 . t_3' against the cosine at capacity: no arc cosine while the rim is away */
     if (msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j])
@@ -30,6 +31,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
         msfp_rim_tangent(p->surface[j], x, out, seed, drim);
     } else
         msfp_rim(p->surface[j], x, out);
+    w->rim_sum[j] = out[MSFP_RIM_FC];
     if (out[MSFP_RIM_FC] < 0.0) { /* compression only: docs/model.md, choice 4 */
         memcpy(w->rim[j], out, sizeof out);
         w->rim_active[j] = 1;

@@ -1,0 +1,76 @@
+/* failure.c: what a run that cannot go on died of, where steps shrink towards that moment without reaching it. */
+#include "run.h"
+
+#define PARTING 0.02 /* of weight and load: an interface that carries less is about to part */
+
+#if !MSFP_UPLIFT
+static int named(msfp_run *run, int surface, double value)
+{
+    run->status_surface = surface;
+    run->status_value = value;
+    return surface;
+}
+
+/* The surface that carries hardly anything any more; 0: none. */
+static int unloaded(msfp_run *run, const msfp_work *w)
+{
+    int surface = 0;
+    double least = PARTING * w->reference;
+    for (int j = 0; j < NB; ++j)
+        if (w->contact[j][MSFP_CONTACT_N] < least) {
+            least = w->contact[j][MSFP_CONTACT_N];
+            surface = j + 1;
+        }
+    return surface ? named(run, surface, least) : 0;
+}
+
+/* The state a moment later, on its present course. */
+static void moved(msfp_run *run, double moment, msfp_point *at)
+{
+    msfp_to_point(run, &run->now, at);
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < MSFP_NQ; ++d) {
+            at->q[k][d] += moment * (at->v[k][d] + 0.5 * moment * at->a[k][d]);
+            at->v[k][d] += moment * at->a[k][d];
+        }
+        for (int d = 0; d < 2; ++d)
+            at->f[k][d] += moment * run->now.df[k][d];
+    }
+}
+
+static int rim_met(const msfp_work *w)
+{
+    int met = 0;
+    for (int j = 0; j < NB; ++j)
+        met = met || w->rim_active[j];
+    return met;
+}
+
+int msfp_parting(msfp_run *run)
+{
+    msfp_point at;
+    msfp_work w;
+    msfp_row row;
+    msfp_solution solution;
+    msfp_to_point(run, &run->now, &at);
+    msfp_observe(&run->parameters, &at, &w, &row);
+    if (unloaded(run, &w))
+        return 1;
+    for (double moment = 1e-8; moment < 1e-4 && !MSFP_MASSLESS; moment *= 10.0) { /* a rim that is met acts at once */
+        moved(run, moment, &at);
+        if (msfp_accelerations(&run->parameters, &at, &w, &solution) == MSFP_OK && rim_met(&w) && msfp_pulling(&w)) {
+            const int surface = msfp_pulling(&w);
+            double p[3];
+            msfp_local_p_get(w.local[surface - 1], p);
+            return named(run, surface, p[2]);
+        }
+    }
+    return 0;
+}
+#else
+int msfp_parting(msfp_run *run)
+{
+    (void)run;
+    return 0;
+}
+#endif

@@ -1,0 +1,194 @@
+/* newton.c: Newton's method on the equations of one stage. The ladder it is part of is in docs/stability.md. */
+#include <math.h>
+#include <string.h>
+#include "newton.h"
+
+#define DOF MSFP_DOF
+#define NB MSFP_NB
+#define ND MSFP_ND
+#define NQ MSFP_NQ
+
+static const int unknown[ND] = MSFP_FREE;
+
+static void place(msfp_stage *s)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < NQ; ++d)
+            s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i)
+            s->at.a[k][unknown[i]] = s->inertia * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]) / s->beta;
+}
+
+/* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that
+ * nearly vanishes, and a heavy top makes N itself depend strongly on the rates. Dividing removes that product. */
+static void over_normal(const msfp_work *w, double *residual)
+{
+    if (MSFP_UPLIFT) /* N follows from the seat, not from the rates, and may vanish */
+        return;
+    for (int k = 0; k < NB; ++k)
+        for (int i = k * ND; i < (k + 1) * ND; ++i)
+            residual[i] /= w->contact[k][MSFP_CONTACT_N];
+}
+
+static void tangent_over_normal(const msfp_work *w, const double *residual, double *tangent)
+{
+    if (MSFP_UPLIFT)
+        return;
+    for (int k = 0; k < NB; ++k) {
+        const double inverse = 1.0 / w->contact[k][MSFP_CONTACT_N];
+        for (int i = k * ND; i < (k + 1) * ND; ++i)
+            for (int c = 0; c < DOF; ++c)
+                tangent[i * DOF + c] = inverse * (tangent[i * DOF + c] - residual[i] * w->dnormal[k][c]);
+    }
+}
+
+double msfp_stage_residual(msfp_run *run, msfp_stage *s, double *residual)
+{
+    double scale[DOF], size = 0.0;
+    place(s);
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    if (msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, NULL))
+        return INFINITY;
+    msfp_residual_scale(&run->parameters, &run->work, scale);
+    for (int i = 0; i < DOF; ++i)
+        if (!(fabs(residual[i]) / scale[i] <= size)) {
+            size = fabs(residual[i]) / scale[i];
+            run->worst_surface = i / ND + 1;
+        }
+    over_normal(&run->work, residual);
+    return size < INFINITY ? size : INFINITY;
+}
+
+void msfp_stage_move(msfp_stage *s, const double *step, double factor)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i)
+            s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
+}
+
+/* Factors of the tangent at the present rates. */
+static int factorise(msfp_run *run, msfp_stage *s)
+{
+    double residual[DOF];
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    ++run->counts[MSFP_COUNT_FACTORISATIONS];
+    run->factored_beta = 0.0;
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, run->factors);
+    if (status)
+        return status;
+    over_normal(&run->work, residual);
+    tangent_over_normal(&run->work, residual, run->factors);
+    run->work_sign = msfp_lu(run->factors, DOF, run->pivots);
+    if (run->work_sign == 0)
+        return MSFP_E_IRREGULAR;
+    run->factored_beta = s->beta;
+    return MSFP_OK;
+}
+
+/* Newton step from the residual at hand (scaled in place). Where a full step does not reduce the residual, halve it. */
+static double take_step(msfp_run *run, msfp_stage *s, double *residual, double size, int fresh)
+{
+    double step[DOF], factor = 1.0;
+    memcpy(step, residual, sizeof step);
+    msfp_lu_solve(run->factors, DOF, run->pivots, step);
+    msfp_stage_move(s, step, 1.0);
+    double next = msfp_stage_residual(run, s, residual);
+    while (fresh && next > size && factor > 0.05) {
+        ++run->counts[MSFP_COUNT_HALVED_STEPS];
+        msfp_stage_move(s, step, -0.5 * factor);
+        factor *= 0.5;
+        next = msfp_stage_residual(run, s, residual);
+    }
+    if (!fresh && !(next < size)) { /* old factors mislead: back to where they were */
+        msfp_stage_move(s, step, -1.0);
+        next = msfp_stage_residual(run, s, residual);
+    }
+    return next;
+}
+
+void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
+{
+    double residual[DOF];
+    const double with_inertia = s->seed.ca;
+    s->inertia = s->seed.ca = 0.0;
+    double size = msfp_stage_residual(run, s, residual);
+    for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
+        if (factorise(run, s))
+            break;
+        size = take_step(run, s, residual, size, 1);
+    }
+    s->inertia = 1.0;
+    s->seed.ca = with_inertia;
+    run->factored_beta = 0.0;
+}
+
+/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
+static double rounding(const msfp_stage *s)
+{
+    double speed = 0.0;
+    for (int k = 0; k < NB; ++k)
+        for (int d = 3; d < NQ; ++d)
+            speed = fmax(speed, fabs(s->at.v[k][d]));
+    return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
+/* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
+ * down through slopes alone: that inertia is of the order of the tilt squared, friction gives it either sign, and steps
+ * of any use are longer than what it does. */
+static int watched(const msfp_run *run)
+{
+    return !MSFP_MASSLESS || run->parameters.top[MSFP_TOP_PARAMETERS_M] == 0.0;
+}
+
+static int failed(msfp_run *run, int status, double size)
+{
+    run->status_surface = run->worst_surface;
+    run->status_value = size;
+    return status;
+}
+
+/* The sign of the determinant at the solution is that of the run. */
+static int regular(msfp_run *run, msfp_stage *s, double size)
+{
+    if (!watched(run))
+        return MSFP_OK;
+    if (run->work_sign && run->determinant == 0)
+        run->determinant = run->work_sign;
+    if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
+        const int status = factorise(run, s);
+        if (status)
+            return failed(run, status, size);
+    }
+    if (!run->work_sign || run->work_sign == run->determinant)
+        return MSFP_OK;
+    return failed(run, MSFP_E_IRREGULAR, size);
+}
+
+/* Factors serve as long as they reduce the residual tenfold: other stages, other steps of like size. The switches of
+ * friction and rims make Newton semi-smooth. The sign of the determinant is looked at with every factorisation; while
+ * old factors contract the residual the tangent has theirs. */
+int msfp_solve_stage(msfp_run *run, msfp_stage *s)
+{
+    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
+    double residual[DOF];
+    int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+    double size = msfp_stage_residual(run, s, residual);
+    run->work_sign = 0;
+    for (int i = 0; size > goal; ++i) {
+        if (i == 30 || !(size < INFINITY))
+            return failed(run, MSFP_E_NEWTON, size);
+        ++run->counts[MSFP_COUNT_NEWTON];
+        const int fresh = !good;
+        if (fresh) {
+            run->counts[MSFP_COUNT_FRESH_TANGENTS] += i > 0;
+            const int status = factorise(run, s);
+            if (status)
+                return failed(run, status, size);
+        }
+        const double before = size;
+        size = take_step(run, s, residual, size, fresh);
+        good = size < 0.1 * before;
+    }
+    return regular(run, s, size);
+}

@@ -1,0 +1,27 @@
+/* newton.h: the equations of one stage of an implicit step, and what solves them. Private to the runtime. */
+#ifndef MSFP_NEWTON_H
+#define MSFP_NEWTON_H
+#include "msfp_model.h"
+
+/* Unknowns are the rates at.v; q = Q + beta v and a = inertia (v - V)/beta follow, Y and Z from the seed. */
+typedef struct {
+    double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
+    double beta;
+    double inertia; /* 1; 0 leaves all inertia out */
+    msfp_seed seed;
+    msfp_point at;
+    double f[MSFP_NB][2];
+} msfp_stage;
+
+/* Where Newton starts, in the order in which starts are tried. */
+enum { MSFP_START_PREDICTED, MSFP_START_PLAIN, MSFP_START_QUASISTATIC, MSFP_STARTS };
+
+/* Residual over N at the present rates, and its largest entry relative to its natural size; infinite where it cannot be
+ * formed. */
+double msfp_stage_residual(msfp_run *run, msfp_stage *s, double *residual);
+void msfp_stage_move(msfp_stage *s, const double *step, double factor);
+/* Rates that balance all forces but inertia: where rates from before lead nowhere, Newton starts from them. */
+void msfp_quasistatic_start(msfp_run *run, msfp_stage *s);
+int msfp_solve_stage(msfp_run *run, msfp_stage *s);
+
+#endif
