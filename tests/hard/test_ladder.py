@@ -48,7 +48,7 @@ def test_an_easy_run_stays_on_the_lowest_rungs() -> None:
     "solver", [{}, {"rtol": 1e-7}, {"method": "dopri5"}, {"method": "dopri5", "rtol": 1e-7}], ids=str
 )
 def test_a_stack_that_falls_says_so_whatever_solves_it(solver: dict[str, float]) -> None:
-    """All four used to differ: newton, newton, irregular, irregular. N goes to nothing within microseconds of 103.2 ms."""
+    """All four used to differ: newton, newton, irregular, irregular. N goes to nothing at 103.2 ms."""
     error = failure_of(replace(fallen(), solver=Solver(**solver)))  # type: ignore[arg-type]
     assert error.status == "uplift"
     assert float(re.findall(r"t = (\S+) s", str(error))[0]) == pytest.approx(0.1032, abs=2e-4)
@@ -83,7 +83,7 @@ def test_the_last_word_has_time_surface_state_and_remedy(scene: Scene, status: s
 
 
 def thrown(method: str = "implicit") -> Scene:
-    """Ten tonnes on a triple pendulum, led to half as much again as its reach: the rims are struck and the mass lifts."""
+    """Ten tonnes on a triple pendulum, led beyond its reach: the rims are struck and the mass lifts."""
     bearing = a_stack(TFP, [1.0, 0.5, 0.5, 1.0], capacity=[0.1, 0.04, 0.04, 0.1], rim_stiffness=1e7,
                       yield_displacement=1e-3, body={"mass": 2.0})  # fmt: skip
     top = Top.mass(1e4, 500.0, 0.5, 1e7, 1e5)
