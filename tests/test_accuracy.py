@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support import scene_of
 
-from msfp_gen import InputError, Motion, RunError, Solver, Stop, load_scene
+from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
 from msfp_gen.accuracy import output, study, work_precision
 from msfp_gen.accuracy.measure import ERRORS, Reference, best_reference, errors
 from msfp_gen.accuracy.methods import METHODS, methods_named
@@ -244,3 +244,10 @@ def test_a_jump_of_the_motion_starts_the_libraries_anew():
     found = METHODS["Radau"].attempt(scene, 1e-5, 30.0)
     assert found.finished
     assert errors(found, METHODS["implicit"].attempt(scene, 1e-9, 20.0)).worst_rms < 1e-4
+
+
+def test_effects_are_fixed_for_all_runs():
+    scene = replace(load_scene("fenz-test1"), effects=Auto(), duration=0.3)
+    found = work_precision(scene, methods=["implicit", "Radau"], tolerances=[1e-2], limit=20.0)
+    assert isinstance(found.scene.effects, Effects) and found.scene.effects.sliders == "inertial"
+    assert {point.trial.status for point in found.points} == {OK}

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from msfp_gen.accuracy.effects import full
 from msfp_gen.accuracy.measure import Errors, Reference, best_reference, errors
 from msfp_gen.accuracy.methods import METHODS, Method, methods_named
 from msfp_gen.accuracy.trial import CUT_OFF, REFUSED, Trial
@@ -96,7 +97,11 @@ def families() -> dict[str, str]:
 
 
 def without_stop(scene: Scene) -> Scene:
-    """The scene up to where its stop would end it: SciPy's integrators know nothing of stops."""
+    """The scene up to where its stop would end it: SciPy's integrators know nothing of stops.
+
+    Effects that would be chosen are all modelled, so that no run changes them on its way and every method can take it.
+    """
+    scene = full(scene)
     if scene.stop is None:
         return scene
     end = float(simulate(replace(scene, output_step=None)).history.time[-1])
