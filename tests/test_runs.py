@@ -12,7 +12,18 @@ from reference.quasi_static import follow
 from support import Array, preset_run, scene_of
 
 from msfp_gen import (
-    Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, load_scene, presets, simulate,
+    Bearing,
+    Body,
+    Effects,
+    Layout,
+    Motion,
+    Scene,
+    Solver,
+    Surface,
+    Top,
+    load_scene,
+    presets,
+    simulate,
 )  # fmt: skip
 from msfp_gen.result import Result
 from msfp_gen.scene import InitialState, Stop
