@@ -92,6 +92,8 @@ def test_a_success_far_above_its_tolerance_is_wrong():
     for wave, wrong in ((0.1, True), (0.01, False)):
         run = trial(rtol=1e-3, wave=wave)
         assert is_wrong(run, errors(run, sure.trial), sure) is wrong
+    tight = trial(rtol=1e-7, wave=1e-3)
+    assert not is_wrong(tight, errors(tight, sure.trial), sure)  # nobody is misled by less than 0.1 %
     loose = trial(rtol=0.1, wave=0.3)
     assert is_wrong(loose, errors(loose, sure.trial), sure)  # no tolerance makes a fifth of the peak right
     failed = trial(rtol=1e-3, wave=0.5, status="failed")

@@ -20,7 +20,8 @@ TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 LIMIT = 10.0  # [s] of wall time a run
 MORE = 4.0  # times the limit that a run may take which is to confirm the reference
 TIGHTEST = 1e-11  # what a reference is asked for at most
-WRONG, WRONG_ANYWAY = 30.0, 0.1  # a success is wrong whose RMS error exceeds so many tolerances, or this at any
+WRONG = 30.0  # a success is wrong whose RMS error exceeds so many tolerances,
+NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # below the one never, above the other at any tolerance
 Say = Callable[[str], None]
 
 
@@ -177,7 +178,7 @@ def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
     if reference.floor is None:
         return False
     known = 3 * reference.floor.worst_rms
-    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, WRONG_ANYWAY), known)
+    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, ALWAYS_WRONG), NEVER_WRONG, known)
 
 
 def doubts(reference: Reference) -> list[str]:
