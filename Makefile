@@ -10,7 +10,7 @@ demo: $(STAMP)
 	$(BIN)/msfp-gen demo -o out
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
 
 slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow
