@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test slow lint types figures docs clean
+.PHONY: demo test slow lint types fuzz figures docs clean
 
 demo: $(STAMP)
 	$(BIN)/msfp-gen demo -o out
@@ -20,6 +20,10 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+# Random scenes against each other: half an hour. See docs/stability.md.
+fuzz: $(STAMP)
+	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
