@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 LIMIT = 10.0  # [s] of wall time a run
-MORE = 4.0  # times the limit that a run may take which is to confirm the reference
+MORE, CONFIRMING = 6.0, 2  # times the limit that a run may take which is to confirm the reference; how many may
 TIGHTEST = 1e-11  # what a reference is asked for at most
 WRONG = 30.0  # a success is wrong whose RMS error exceeds so many tolerances,
 NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # below the one never, above the other at any tolerance
@@ -146,11 +146,11 @@ def tighter(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name:
 
 
 def affordable(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
-    """Runs that were cut off and would end soon, taken to their end: of every method the tightest, for a reference."""
+    """Runs that were cut off, taken to their end for a reference: of the methods that would end first the tightest."""
     soon = [t for t in trials if t.status == CUT_OFF and 1.3 * t.expected_seconds < MORE * limit]
     tightest = {t.method: t for t in sorted(soon, key=lambda t: -t.rtol)}
     found = []
-    for trial in tightest.values():
+    for trial in sorted(tightest.values(), key=lambda t: t.expected_seconds)[:CONFIRMING]:
         found.append(METHODS[trial.method].attempt(scene, trial.rtol, MORE * limit))
         say(f"reference: {told(found[-1])}")
     return found
