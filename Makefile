@@ -4,13 +4,13 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test slow lint types figures docs clean
+.PHONY: demo test slow lint types fuzz figures docs clean
 
 demo: $(STAMP)
 	$(BIN)/msfp-gen demo -o out
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
 
 slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m slow
@@ -20,6 +20,10 @@ lint: $(STAMP)
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+# Random scenes against each other: half an hour. See docs/stability.md.
+fuzz: $(STAMP)
+	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py

@@ -9,7 +9,7 @@ import numpy as np
 from drawing import COLOURS, MILLI, drawn, panels, ratio
 
 from msfp_gen import Scene, load_scene, simulate
-from msfp_gen.friction_laws import own_numbers
+from msfp_gen.generator.friction_laws import own_numbers
 from msfp_gen.result import Result
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -10,11 +10,10 @@ from typing import Any
 
 import sympy as sp
 
-from msfp_gen import friction_laws
-
-from . import laws
+from . import friction_laws, laws
 from .blocks import Blocks
 from .functions import ArcTan2, Modulus, Step
+from .hysteresis import HYSTERESIS
 from .program import Program, Vector
 from .vectors import add, dot, scale
 
@@ -51,15 +50,12 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
 
 
 def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
-    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the isotropic law has one switch on f . v.
+    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the law of `hysteresis` has the switches.
 
     YY, YZ, ZY, ZZ are their derivatives at constant slip velocity: what solves a stage for Y and Z.
     """
     yu, zv = p.let(Y * u), p.let(Z * v)
-    if law.bouc_wen == "report":
-        a, b = p.let(Step(yu)), p.let(Step(zv))
-    else:
-        a = b = p.let(Step(p.let(yu + zv)))
+    a, b = HYSTERESIS[law.bouc_wen].switches(yu, zv, lambda x: p.let(Step(p.let(x))))
     drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
     return {
         "dY": p.let((u - Y * drive) / dy, "dY"),

@@ -9,7 +9,7 @@ negative, and with the exact integral over [0, SHORTEST]. `benchmarks/heat_kerne
 
 from __future__ import annotations
 
-from msfp_gen.friction_laws import HEAT_TIMES
+from .friction_laws import HEAT_TIMES
 
 SHORTEST, LONGEST = HEAT_TIMES
 """Times between which the sum is a fit [s]; after the last of them heat is forgotten."""

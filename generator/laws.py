@@ -13,10 +13,10 @@ from typing import Any
 
 import sympy as sp
 
-from msfp_gen.friction_laws import COEFFICIENTS, Law
 from msfp_gen.law_text import fold
 
 from .blocks import Blocks
+from .friction_laws import NUMBERS, Law
 from .functions import Modulus, Step
 from .program import Block, Field, Program
 
@@ -25,19 +25,6 @@ Sliding = tuple[sp.Expr, sp.Expr, sp.Expr]
 EDGE = sp.Rational(1, 10)
 """The patch leaves the centre while (x/reach)^2 goes from 1 - EDGE to 1 + EDGE: 5 % of the way on either side."""
 
-NUMBERS: dict[str, tuple[str, str]] = {
-    "friction_slow": ("-", "friction coefficient at rest"),
-    "velocity_rate": ("s/m", "a, how fast friction rises with the slip velocity"),
-    "velocity_drop": ("-", "share of friction that is missing at rest"),
-    "reference_pressure": ("Pa", "pressure at which mu is given"),
-    "pressure_ratio": ("-", "factor on friction for 50 MPa more"),
-    "temperature_ratio": ("-", "0.7 in Kumar et al. (2015); 1: temperature does not matter"),
-    "area": ("m^2", "of the contact patch"),
-    "reach": ("m", "how far from the centre of the surface the patch still covers it"),
-    "heating": ("K s^1/2 m^2/J", "sqrt(D/pi)/k of the half-space that is heated"),
-    "start_temperature": ("degC", "temperature at the start"),
-    **dict.fromkeys(COEFFICIENTS, ("SI", "parameter of the law")),
-}
 UNKNOWN = [
     Field("mu", "-", "friction coefficient, solved for with Y and Z"),
     Field("rise", "K", "temperature above the start, less what the flux of this stage adds"),

@@ -3,47 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.bearing import Surface
-from msfp_gen.fields import Quantity, ruled_fields
+from msfp_gen.fields import Choice, Quantity, ruled_fields
 from msfp_gen.law_numbers import numbers
+from msfp_gen.layout import Effects
 from msfp_gen.tables import Table, vector, yes
 
 if TYPE_CHECKING:
     from msfp_gen.bearing import Bearing
-    from msfp_gen.layout import Effects
     from msfp_gen.motion import Motion
     from msfp_gen.prescribed import Prescribed
     from msfp_gen.scene import Scene
     from msfp_gen.solver import Solver
     from msfp_gen.top import Top
 
-MEANINGS: dict[tuple[str, object], str] = {
-    ("dimension", "spatial"): "three translations and rotations of every body",
-    ("dimension", "planar"): "motion in one vertical plane",
-    ("spin", "locked"): "bodies do not turn about their own axis",
-    ("spin", "patch"): "a drilling moment over the contact patch resists spin",
-    ("spin", "free"): "nothing but friction at a point resists spin, the literal report",
-    ("sliders", "inertial"): "mass and rotary inertia of every body count",
-    ("sliders", "massless"): "quasi-static: weights count, inertia of the sliders does not",
-    ("rims", True): "sliders meet the rims of the surfaces (2.99)-(2.109)",
-    ("rims", False): "surfaces have no rims: sliders may pass their capacity",
-    ("bouc_wen", "report"): "switches for each axis (2.94)-(2.98)",
-    ("bouc_wen", "isotropic"): "one switch along the slip, the same in every direction",
-    ("uplift", False): "bodies never part; a run in which they would stops with a named error",
-    ("uplift", True): "bodies may part, fly and land at every surface",
-    ("top_rotation", False): "what holds the top plate stays level",
-    ("top_rotation", True): "what holds the top plate turns as given",
-    ("friction", "constant"): "the friction coefficient does not change",
-    ("friction", "velocity"): "it rises with the sliding velocity, exponentially from friction_slow to friction",
-    ("friction", "pv"): "it follows pressure and velocity (Kumar et al. 2015), at the temperature of the start",
-    ("friction", "pvt"): "it follows pressure, velocity and temperature (Kumar et al. 2015)",
-    ("friction", "custom"): "it follows the formula below",
-}
 SURFACE_COLUMNS = {
     "R [mm]": ("radius", 1e3),
     "capacity [mm]": ("capacity", 1e3),
@@ -131,9 +108,11 @@ def _effects(scene: Scene) -> Table:
     effects: Effects = scene.modelled
     reasons = {reason.effect: reason for reason in scene.choice.reasons}
     rows = []
-    for name in (field.name for field in fields(effects) if field.name != "friction_law"):
+    for name, rule, _ in ruled_fields(Effects):
+        if not isinstance(rule, Choice):  # friction_law, below
+            continue
         value = getattr(effects, name)
-        rows.append((name, _value(value), MEANINGS[name, value]))
+        rows.append((name, _value(value), rule.meanings[value]))
         if name in reasons and (because := reasons[name].because) != "asked for":
             rows.append(("", "because", because))
             rows += [("", "saves", saves)] if (saves := reasons[name].saves) else []

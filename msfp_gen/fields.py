@@ -7,7 +7,7 @@ scene reader builds its tables from the same annotations.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
@@ -70,11 +70,16 @@ class Quantity:
         return head + limit + (f" [{self.unit}]" if self.unit else "")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Choice:
-    """One of a few words, or of True and False."""
+    """One of a few words, or of True and False; as a mapping, each with what it means."""
 
-    words: tuple[object, ...]
+    words: Collection[Any]
+
+    @property
+    def meanings(self) -> Mapping[Any, str]:
+        """Word -> what it means, "" where nothing is said."""
+        return self.words if isinstance(self.words, Mapping) else dict.fromkeys(self.words, "")
 
     def parse(self, value: object, *, text: bool = False) -> Any:
         """`value` itself if it is one of the words; raises ValueError with the remedy alone."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log
 from typing import TYPE_CHECKING
 
-from msfp_gen.friction_laws import HEAT, Law
+from msfp_gen.generator.friction_laws import HEAT, Law
 from msfp_gen.law_numbers import derived, numbers
 
 if TYPE_CHECKING:

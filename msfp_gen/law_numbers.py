@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.errors import InputError
-from msfp_gen.friction_laws import BUILT_IN, VARIABLES, Law, own_numbers
+from msfp_gen.generator.friction_laws import BUILT_IN, VARIABLES, Law, own_numbers
 from msfp_gen.law_text import Operations, fold, names_in
 
 if TYPE_CHECKING:

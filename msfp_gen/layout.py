@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Choice, Quantity, check_fields
-from msfp_gen.friction_laws import Law, law_of
+from msfp_gen.generator.friction_laws import FRICTION, Law, law_of
+from msfp_gen.generator.hysteresis import HYSTERESIS
 
 _COUNT = Quantity("", least=0, whole=True)
 
@@ -65,28 +66,40 @@ class Layout:
 
 @dataclass(frozen=True)
 class Effects:
-    """What the equations take into account; every field is one of a few words.
+    """What the equations take into account; every field is one of a few words, each with what it means.
 
-    dimension: three translations and rotations, or motion in one vertical plane.
-    spin: whether bodies turn about their own axis: locked (they do not), resisted over a patch, or free (the report).
-    sliders: with their inertia, or massless (quasi-static).
-    rims: whether sliders meet the rims of the surfaces (2.99)-(2.109).
-    bouc_wen: the report's switches per axis (2.94)-(2.98), or one switch on the direction of slip.
-    friction: the law of the friction coefficient: constant, of velocity, of pressure and velocity ("pv"), of
-    temperature too ("pvt"), or custom: the formula in friction_law (docs/friction.md).
-    uplift: whether bodies may part, fly and land (docs/uplift.md).
-    top_rotation: whether what holds the top plate turns (docs/loads.md).
+    Explanations, options of the command line, scene files and names of models follow from these fields. More about
+    friction, uplift and top_rotation: docs/friction.md, docs/uplift.md, docs/loads.md.
     """
 
-    dimension: Literal["spatial", "planar"] = "spatial"
-    spin: Literal["locked", "patch", "free"] = "locked"
-    sliders: Literal["inertial", "massless"] = "inertial"
-    rims: bool = True
-    bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Literal["constant", "velocity", "pv", "pvt", "custom"] = "constant"
+    dimension: Annotated[Literal["spatial", "planar"], Choice({
+        "spatial": "three translations and rotations of every body",
+        "planar": "motion in one vertical plane",
+    })] = "spatial"
+    spin: Annotated[Literal["locked", "patch", "free"], Choice({
+        "locked": "bodies do not turn about their own axis",
+        "patch": "a drilling moment over the contact patch resists spin",
+        "free": "nothing but friction at a point resists spin, the literal report",
+    })] = "locked"
+    sliders: Annotated[Literal["inertial", "massless"], Choice({
+        "inertial": "mass and rotary inertia of every body count",
+        "massless": "quasi-static: weights count, inertia of the sliders does not",
+    })] = "inertial"
+    rims: Annotated[bool, Choice({
+        True: "sliders meet the rims of the surfaces (2.99)-(2.109)",
+        False: "surfaces have no rims: sliders may pass their capacity",
+    })] = True
+    bouc_wen: Annotated[str, Choice({word: law.meaning for word, law in HYSTERESIS.items()})] = "report"
+    friction: Annotated[str, Choice(FRICTION)] = "constant"
     friction_law: str | None = None
-    uplift: bool = False
-    top_rotation: bool = False
+    uplift: Annotated[bool, Choice({
+        False: "bodies never part; a run in which they would stops with a named error",
+        True: "bodies may part, fly and land at every surface",
+    })] = False
+    top_rotation: Annotated[bool, Choice({
+        False: "what holds the top plate stays level",
+        True: "what holds the top plate turns as given",
+    })] = False
 
     def __post_init__(self) -> None:
         check_fields(self, "effects")
@@ -111,9 +124,6 @@ class Effects:
         return law_of(self.friction, self.friction_law)
 
 
-LAWS = ("constant", "velocity", "pv", "pvt", "custom")
-
-
 @dataclass(frozen=True)
 class Auto:
     """Effects of which those left None are chosen from the scene: the smallest set that can matter (docs/effects.md).
@@ -128,8 +138,8 @@ class Auto:
     rims: Annotated[bool | None, Choice((True, False))] = None
     uplift: Annotated[bool | None, Choice((True, False))] = None
     spin: Literal["locked", "patch", "free"] = "locked"
-    bouc_wen: Literal["report", "isotropic"] = "report"
-    friction: Annotated[str | None, Choice(LAWS)] = None
+    bouc_wen: Annotated[str, Choice(HYSTERESIS)] = "report"
+    friction: Annotated[str | None, Choice(FRICTION)] = None
     friction_law: str | None = None
     error: Annotated[float, Quantity("", above=0.0)] = 0.005
 
@@ -164,9 +174,13 @@ class ModelSpec:
     @property
     def key(self) -> str:
         """A stable name, such as `5_2_2-spatial-locked-inertial-rims-report-constant`."""
-        effects = self.effects
-        rims = "rims" if effects.rims else "norims"
-        friction = effects.friction + (f"[{effects.friction_law.replace(' ', '')}]" if effects.friction_law else "")
-        words = (effects.dimension, effects.spin, effects.sliders, rims, effects.bouc_wen, friction)
-        more = (word for word in ("uplift", "top_rotation") if getattr(effects, word))
-        return "-".join((self.layout.name, *words, *more))
+        name = self.layout.name
+        for field in fields(Effects):
+            value = getattr(self.effects, field.name)
+            if isinstance(value, bool):  # said where it is on, and where it is off against the default
+                name += f"-{field.name}" if value else f"-no{field.name}" if field.default else ""
+            elif field.name != "friction_law":
+                name += f"-{value}"
+            elif value is not None:
+                name += f"[{value.replace(' ', '')}]"
+        return name

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msfp_gen.bearing import Bearing
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Quantity, check_fields, require_type
-from msfp_gen.friction_laws import HEAT_TIMES, Law, law_of
+from msfp_gen.generator.friction_laws import HEAT_TIMES, Law, law_of
 from msfp_gen.law_choice import friction_of
 from msfp_gen.law_numbers import check_bearing
 from msfp_gen.layout import Auto, Effects, ModelSpec

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support import scene_of
 
-from msfp_gen import InputError, Motion, RunError, Solver, Stop, load_scene
+from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
 from msfp_gen.accuracy import output, study, work_precision
 from msfp_gen.accuracy.measure import ERRORS, Reference, best_reference, errors
 from msfp_gen.accuracy.methods import METHODS, methods_named
@@ -92,6 +92,8 @@ def test_a_success_far_above_its_tolerance_is_wrong():
     for wave, wrong in ((0.1, True), (0.01, False)):
         run = trial(rtol=1e-3, wave=wave)
         assert is_wrong(run, errors(run, sure.trial), sure) is wrong
+    tight = trial(rtol=1e-7, wave=1e-3)
+    assert not is_wrong(tight, errors(tight, sure.trial), sure)  # nobody is misled by less than 0.1 %
     loose = trial(rtol=0.1, wave=0.3)
     assert is_wrong(loose, errors(loose, sure.trial), sure)  # no tolerance makes a fifth of the peak right
     failed = trial(rtol=1e-3, wave=0.5, status="failed")
@@ -244,3 +246,10 @@ def test_a_jump_of_the_motion_starts_the_libraries_anew():
     found = METHODS["Radau"].attempt(scene, 1e-5, 30.0)
     assert found.finished
     assert errors(found, METHODS["implicit"].attempt(scene, 1e-9, 20.0)).worst_rms < 1e-4
+
+
+def test_effects_are_fixed_for_all_runs():
+    scene = replace(load_scene("fenz-test1"), effects=Auto(), duration=0.3)
+    found = work_precision(scene, methods=["implicit", "Radau"], tolerances=[1e-2], limit=20.0)
+    assert isinstance(found.scene.effects, Effects) and found.scene.effects.sliders == "inertial"
+    assert {point.trial.status for point in found.points} == {OK}

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from msfp_gen import InputError, RunError, Solver, Top, load_scene, simulate
+from msfp_gen import Auto, Effects, InputError, RunError, Solver, Top, load_scene, simulate
 from msfp_gen.accuracy import simulate_within, within
+from msfp_gen.accuracy.effects import full
 from msfp_gen.accuracy.measure import errors
 from msfp_gen.accuracy.trial import CUT_OFF, run_native
 from msfp_gen.accuracy.within import LADDER, worst
@@ -160,3 +161,42 @@ def test_command_refuses(words, why, capsys):
     assert main(["run", "fenz-test1", *words]) == 2
     err = capsys.readouterr().err
     assert why in err and err.count("\n") == 1
+
+
+def chosen(name="fenz-test2", **changes):
+    return replace(load_scene(name), effects=Auto(**changes), duration=10.0)
+
+
+def test_chosen_effects_are_judged_by_all_of_them():
+    """Planar and massless for half the error; the estimate holds what that leaves out."""
+    found = simulate_within(chosen(), 0.01)
+    assert found.result.scene.modelled.dimension == "planar" and found.result.scene.modelled.sliders == "massless"
+    assert found.chosen.estimate <= 0.01 and any("with every effect" in reason for reason in found.reasons)
+    tight = run_native("implicit", replace(chosen(), effects=Effects()), 1e-8, 60.0, repeats=0)
+    mine = run_native("implicit", found.result.scene, found.chosen.rtol, 60.0, repeats=0)
+    assert worst(errors(mine, tight)) < 0.01
+
+
+def test_effects_that_cannot_meet_the_target_are_given_up(monkeypatch):
+    """An axis of the orbit alone, said to be enough: the full model tells otherwise."""
+    scene = replace(load_scene("fenz-test5"), effects=Auto(rims=None), output_step=None)
+    real = within.effects_for
+    monkeypatch.setattr(within, "effects_for", lambda s, e: (replace(s.effects, rims=None), real(s, e)[1]))
+    monkeypatch.setattr(within, "full", full_with_other_friction)
+    found = simulate_within(scene, 0.01)
+    assert isinstance(found.result.scene.effects, Effects) and "they leave" in " ".join(found.reasons)
+
+
+def full_with_other_friction(scene):
+    """A judge that differs whatever the tolerance."""
+    if isinstance(scene.effects, Effects):
+        return scene
+    surfaces = [replace(s, friction=1.2 * s.friction) for s in scene.bearing.surfaces]
+    return replace(scene, effects=Effects(), bearing=replace(scene.bearing, surfaces=surfaces))
+
+
+def test_a_bearing_without_rims_is_judged_without_them():
+    scene = load_scene("fenz-test2")
+    bodies = [replace(body, rim_radius=0.0) for body in scene.bearing.bodies]
+    bare = replace(scene, bearing=replace(scene.bearing, bodies=bodies), effects=Auto(rims=False))
+    assert full(bare).effects.rims is False and full(scene) is scene

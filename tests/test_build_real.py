@@ -17,7 +17,7 @@ WARM = """
 import json, sys
 from msfp_gen import Layout, build_model
 info = build_model(Layout.dfp()).info
-tools = sorted({"sympy", "Cython", "jinja2", "filelock", "msfp_gen.generator"} & set(sys.modules))
+tools = sorted({"sympy", "Cython", "jinja2", "filelock", "msfp_gen.generator.derive"} & set(sys.modules))
 print(json.dumps([info.cached, str(info.path), tools]))
 """
 

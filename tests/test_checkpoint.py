@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import preset_run, scene_of
+from test_uplift import shaken
 
 from msfp_gen import InputError, Motion, RunError, Scene, checkpoint, simulate, simulation
 from msfp_gen.cli import main
@@ -34,8 +35,10 @@ SCENES = {
     "massless": ("fenz-test5", {"sliders": "massless"}, {}, {"duration": 100.0}),
     "planar, rims met": ("fenz-test5", {"dimension": "planar"}, {}, {"duration": 100.0}),
     "a record, step by step": ("ridgecrest-clc", {}, {}, {"duration": 15.0, "output_step": 0.02}),
+    "seats, where bodies may part": ("fenz-test2", {"uplift": True, "dimension": "planar"}, {}, {"duration": 20.0}),
     "a stop": ("fenz-test5", {}, {}, {"stop": Stop(displacement=0.06)}),
 }
+FLIGHT = "bodies part, fly and land"
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +48,8 @@ def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def scene_for(case: str) -> Scene:
+    if case == FLIGHT:
+        return shaken(1.4, sideways=0.03)
     name, effects, solver, changes = SCENES[case]
     return scene_of(name, effects, solver, **changes)
 
@@ -78,7 +83,7 @@ def assert_same(one: Result, two: Result) -> None:
     assert (one.status, one.message) == (two.status, two.message)
 
 
-@pytest.mark.parametrize("case", SCENES)
+@pytest.mark.parametrize("case", [*SCENES, FLIGHT])
 def test_a_run_stopped_twice_gives_the_same_rows(case: str, tmp_path: Path) -> None:
     scene, path = scene_for(case), tmp_path / "run.ck"
     whole = simulate(scene)

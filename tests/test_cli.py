@@ -245,17 +245,17 @@ def test_explain_names_every_number_and_choice(capsys):
 def test_explain_has_a_meaning_for_every_choice():
     from typing import get_args, get_type_hints
 
-    from msfp_gen.explain import MEANINGS, METHODS, TOPS
+    from msfp_gen.explain import METHODS, TOPS
+    from msfp_gen.fields import Choice, ruled_fields
     from msfp_gen.layout import Effects
     from msfp_gen.scenefile import _TOPS
     from msfp_gen.solver import Solver
 
-    choices = {
-        (name, word)
-        for name, hint in get_type_hints(Effects).items() if name != "friction_law"  # a text, shown as it is
-        for word in get_args(hint) or (True, False)
-    }  # fmt: skip
-    assert set(MEANINGS) == choices
+    hints = get_type_hints(Effects)
+    for name, rule, default in ruled_fields(Effects):
+        if name != "friction_law":  # a text, shown as it is
+            assert isinstance(rule, Choice) and default in rule.words and all(rule.meanings.values())
+            assert set(get_args(hints[name])) in ({*rule.words}, set()), "types say what is checked"
     assert set(METHODS) == set(get_args(get_type_hints(Solver)["method"]))
     assert set(TOPS) == set(_TOPS)
 

@@ -17,11 +17,11 @@ from test_checkpoint import assert_same, interrupted
 from test_friction_laws import FORMULA, LAWS, P_REF, VALUES, heated, lawful
 from test_uplift import shaken
 
-from msfp_gen import Effects, InputError, Scene, Surface, load_scene, simulate, simulation
+from msfp_gen import Auto, Effects, InputError, Scene, Surface, load_scene, simulate, simulation
 from msfp_gen.bounding import bounded_scenes, load_factors
 from msfp_gen.cli import main
 from msfp_gen.fields import Quantity, ruled_fields
-from msfp_gen.friction_laws import BUILT_IN, VARIABLES, own_numbers
+from msfp_gen.generator.friction_laws import BUILT_IN, VARIABLES, own_numbers
 from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.law_text import FUNCTIONS
 from msfp_gen.result import Result
@@ -95,6 +95,19 @@ def test_a_run_that_heats_goes_on_from_its_checkpoint(
     part = interrupted(scene, tmp_path / "run.ck", 4.0)
     assert part.history.temperature is not None and part.history.temperature.max() > 20.2
     assert_same(whole, simulate(scene, checkpoint=tmp_path / "run.ck", resume=True))
+
+
+def test_heat_is_taken_in_on_the_way() -> None:
+    """Left to be chosen, the run begins with pv and goes on with pvt once heat matters: the same temperatures."""
+    scene = replace(load_scene(EXAMPLE), duration=5.0)
+    given, chosen = simulate(scene), simulate(replace(scene, effects=Auto(dimension="planar")))
+    assert [(note.kind, note.action) for note in chosen.notes] == [("heat", "friction = pvt")]
+    assert chosen.notes[0].time < 0.2
+    a, b = given.history, chosen.history
+    assert a.temperature is not None and b.temperature is not None
+    rise = np.interp(a.time, b.time, b.temperature[:, 0]) - a.temperature[:, 0]
+    assert np.abs(rise).max() < 0.005 * np.ptp(a.temperature[:, 0])
+    assert chosen.summary["energy"]["closure_error"] < 1e-3
 
 
 # ---- what reads a run -----------------------------------------------------------------------------------------------
@@ -207,7 +220,8 @@ def test_blocks_of_the_page_run() -> None:
     rig = {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "damping": 5.0}
     motion = {"kind": "harmonic", "amplitude": 0.02, "frequency": 0.5}
     scene = scene_from_table({**tomllib.loads(blocks["toml"]), "motion": motion, "top": rig})
-    assert scene.effects.law is not None and scene.effects.law.word == "custom" and not scene.effects.law.heats
+    law = scene.modelled.law
+    assert law is not None and law.word == "custom" and not law.heats
     assert [surface.c3 for surface in scene.bearing.surfaces] == [2e-8, 1e-8, 1e-8, 2e-8]
     names: dict[str, Any] = {}
     exec(compile(blocks["python"], str(PAGE), "exec"), names)  # a block of our own documentation

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from support import Array
 
-from msfp_gen import Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
+from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
 from msfp_gen.compiler import FLAGS, find_compiler
 from msfp_gen.piecewise import hermite5
 
@@ -135,7 +135,7 @@ def test_program_runs_as_python_does(printed: dict[str, Array]) -> None:
     rows[:, :, 0] = amplitude * np.array([1 - np.cos(w * knots), w * np.sin(w * knots), w**2 * np.cos(w * knots)])
     motion = Motion(knots=knots, coefficients=hermite5(knots, *rows))
     scene = Scene(presets.bearing("fenz-tfp"), motion, Top.rig(LOAD, 1e8, 5.0, 1e6, 5.0), solver=Solver(rtol=1e-5),
-                  output_step=0.02)  # fmt: skip
+                  effects=Effects(), output_step=0.02)  # fmt: skip
     run = simulate(scene)
     assert printed["time"][:, 0] == pytest.approx(run.history.time, abs=1e-12) and len(printed["time"]) == 101
     assert printed["steps"][0, 0] == run.counters.steps

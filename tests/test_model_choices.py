@@ -49,7 +49,7 @@ def test_rig_springs_are_anchored_where_the_run_starts():
     away = np.zeros((1, 6, 6))
     away[0, :2, 0] = 0.3, -0.2
     motion = Motion(knots=[0.0, 0.1], coefficients=away)
-    history = simulate(Scene(presets.bearing("fenz-tfp"), motion, Top.rig(112e3, 1e8, 5.0, 1e6))).history
+    history = simulate(Scene(presets.bearing("fenz-tfp"), motion, Top.rig(112e3, 1e8, 5.0, 1e6), Effects())).history
     assert np.abs(history.top_force[:, :2]).max() < 1e-6 and np.abs(history.displacement).max() < 1e-12
 
 
@@ -75,7 +75,7 @@ def test_massless_sliders_keep_their_weight():
 def test_pulling_apart_stops_the_run_with_a_name():
     t = np.linspace(0.0, 2.0, 201)
     drop = Motion.from_acceleration(t, np.outer(np.sin(np.pi * t), [0.0, 0.0, -12.0]))
-    scene = Scene(presets.bearing("fenz-tfp"), drop, Top.mass(11e3, 300.0, 0.5, 1e7, 1e4))
+    scene = Scene(presets.bearing("fenz-tfp"), drop, Top.mass(11e3, 300.0, 0.5, 1e7, 1e4), Effects())
     with pytest.raises(RunError, match="uplift is not modelled") as error:
         simulate(scene)
     time = error.value.result.history.time[-1]

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import Array, differences, model_of
 
-from msfp_gen import InputError, Motion, RunError, Scene, Solver, Top, presets, simulate
+from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, presets, simulate
 
 TFP = (5, 2, 2)
 RIG = Top.rig(112e3, 1e8, 5.0, 1e6, 5.0)
@@ -57,7 +57,7 @@ def test_jacobian_against_differences(effects: dict[str, Any], top: Top) -> None
 @pytest.mark.parametrize("effects", [{}, {"dimension": "planar"}], ids=str)
 def test_radau_goes_where_simulate_goes(effects: dict[str, Any]) -> None:
     """From rest into sliding. Explicitly stated Jacobian; planar models are stiff in the same way."""
-    scene = Scene(presets.bearing("fenz-tfp"), wave(0.05), RIG, solver=Solver(rtol=1e-6), output_step=0.01)
+    scene = Scene(presets.bearing("fenz-tfp"), wave(0.05), RIG, Effects(), solver=Solver(rtol=1e-6), output_step=0.01)
     scene = replace(scene, effects=replace(scene.effects, **effects))
     run = simulate(scene).history
     fun, jac, y0 = model_of(TFP, **effects).as_ode(scene.bearing, scene.motion, scene.top)

@@ -11,7 +11,20 @@ from reference.parameters import fenz
 from reference.quasi_static import follow
 from support import Array, preset_run, scene_of
 
-from msfp_gen import Bearing, Body, Layout, Motion, Scene, Solver, Surface, Top, load_scene, presets, simulate
+from msfp_gen import (
+    Bearing,
+    Body,
+    Effects,
+    Layout,
+    Motion,
+    Scene,
+    Solver,
+    Surface,
+    Top,
+    load_scene,
+    presets,
+    simulate,
+)  # fmt: skip
 from msfp_gen.result import Result
 from msfp_gen.scene import InitialState, Stop
 
@@ -227,7 +240,7 @@ def test_run_begins_in_its_initial_state() -> None:
     start = InitialState(first.tilt_angles[-1], first.tilt_rates[-1], first.friction_state[-1])
     still = Motion(knots=[0.0, 0.5], coefficients=np.zeros((1, 6, 6)))
     mass = Top.mass(LOAD / 9.8, 300.0, 0.5, 1e7, 1e4)
-    held = simulate(Scene(presets.bearing("fenz-tfp"), still, mass, initial_state=start)).history
+    held = simulate(Scene(presets.bearing("fenz-tfp"), still, mass, Effects(), initial_state=start)).history
     for name in ("tilt_angles", "tilt_rates", "friction_state"):
         assert np.array_equal(getattr(held, name)[0], getattr(first, name)[-1]), name
     assert held.sliding[-1, 0] < held.sliding[0, 0]
@@ -241,7 +254,7 @@ def test_declared_jump_of_acceleration_restarts_the_integrator() -> None:
     coefficients[0, 0, 2] = 0.25  # 0.5 m/s^2 for 0.1 s, then the speed reached
     coefficients[1, 0, :2] = 0.25 * 0.1**2, 0.5 * 0.1
     motion = Motion(knots=[0.0, 0.1, 0.3], coefficients=coefficients, jumps=[0.1])
-    scene = Scene(presets.bearing("fenz-tfp"), motion, Top.rig(LOAD, 1e8, 5.0, ROTATIONAL_STIFFNESS))
+    scene = Scene(presets.bearing("fenz-tfp"), motion, Top.rig(LOAD, 1e8, 5.0, ROTATIONAL_STIFFNESS), Effects())
     run = simulate(scene).history
     row = int(np.flatnonzero(run.time == 0.1)[0])
     assert run.time[row + 1] - run.time[row] < 2e-4  # it starts anew, with a small step
@@ -260,6 +273,7 @@ def test_moments_that_lock_the_spin_do_work() -> None:
         bodies=[Body(0.04, 0.02, 10.0, (0.2, 0.3), 0.03, 0.002)],
     )
     motion = Motion.circle(0.2, 2.0, cycles=1.0, lead_in=3.0)
-    scene = Scene(bearing=bearing, motion=motion, top=Top.rig(1e5, 1e8, 5.0, 1e6, 5.0), solver=Solver(rtol=1e-5))
+    top = Top.rig(1e5, 1e8, 5.0, 1e6, 5.0)
+    scene = Scene(bearing=bearing, motion=motion, top=top, effects=Effects(), solver=Solver(rtol=1e-5))
     closure = simulate(scene).summary["energy"]["closure_error"]
     assert closure < 1e-3, closure

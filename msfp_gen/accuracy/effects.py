@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from msfp_gen.errors import InputError
 from msfp_gen.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -22,3 +23,17 @@ def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
     asked = replace(asked, error=min(asked.error, error / 2))
     reasons = replace(scene, effects=asked).choice.reasons
     return asked, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
+
+
+def full(scene: Scene) -> Scene:
+    """The scene with everything modelled that a choice may have left out: it judges what that choice costs.
+
+    A scene whose effects are given is its own judge: they are what was asked for.
+    """
+    if isinstance(scene.effects, Effects):
+        return scene
+    effects = replace(scene.modelled, dimension="spatial", sliders="inertial", rims=True)
+    try:
+        return replace(scene, effects=effects)
+    except InputError:  # the bearing gives no rims
+        return replace(scene, effects=replace(effects, rims=False))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from msfp_gen.accuracy.effects import full
 from msfp_gen.accuracy.measure import Errors, Reference, best_reference, errors
 from msfp_gen.accuracy.methods import METHODS, Method, methods_named
 from msfp_gen.accuracy.trial import CUT_OFF, REFUSED, Trial
@@ -17,9 +18,10 @@ if TYPE_CHECKING:
 
 TOLERANCES = tuple(10.0**-k for k in range(2, 10))
 LIMIT = 10.0  # [s] of wall time a run
-MORE = 4.0  # times the limit that a run may take which is to confirm the reference
+MORE, CONFIRMING = 6.0, 2  # times the limit that a run may take which is to confirm the reference; how many may
 TIGHTEST = 1e-11  # what a reference is asked for at most
-WRONG, WRONG_ANYWAY = 30.0, 0.1  # a success is wrong whose RMS error exceeds so many tolerances, or this at any
+WRONG = 30.0  # a success is wrong whose RMS error exceeds so many tolerances,
+NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # below the one never, above the other at any tolerance
 Say = Callable[[str], None]
 
 
@@ -96,7 +98,11 @@ def families() -> dict[str, str]:
 
 
 def without_stop(scene: Scene) -> Scene:
-    """The scene up to where its stop would end it: SciPy's integrators know nothing of stops."""
+    """The scene up to where its stop would end it: SciPy's integrators know nothing of stops.
+
+    Effects that would be chosen are all modelled, so that no run changes them on its way and every method can take it.
+    """
+    scene = full(scene)
     if scene.stop is None:
         return scene
     end = float(simulate(replace(scene, output_step=None)).history.time[-1])
@@ -140,11 +146,11 @@ def tighter(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name:
 
 
 def affordable(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
-    """Runs that were cut off and would end soon, taken to their end: of every method the tightest, for a reference."""
+    """Runs that were cut off, taken to their end for a reference: of the methods that would end first the tightest."""
     soon = [t for t in trials if t.status == CUT_OFF and 1.3 * t.expected_seconds < MORE * limit]
     tightest = {t.method: t for t in sorted(soon, key=lambda t: -t.rtol)}
     found = []
-    for trial in tightest.values():
+    for trial in sorted(tightest.values(), key=lambda t: t.expected_seconds)[:CONFIRMING]:
         found.append(METHODS[trial.method].attempt(scene, trial.rtol, MORE * limit))
         say(f"reference: {told(found[-1])}")
     return found
@@ -172,7 +178,7 @@ def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
     if reference.floor is None:
         return False
     known = 3 * reference.floor.worst_rms
-    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, WRONG_ANYWAY), known)
+    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, ALWAYS_WRONG), NEVER_WRONG, known)
 
 
 def doubts(reference: Reference) -> list[str]:

@@ -10,7 +10,7 @@ import time
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
-from msfp_gen.accuracy.effects import effects_for
+from msfp_gen.accuracy.effects import effects_for, full
 from msfp_gen.accuracy.measure import Errors, errors
 from msfp_gen.accuracy.trial import CUT_OFF, Trial, run_native
 from msfp_gen.errors import InputError, RunError
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 LADDER = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
 AHEAD = 2  # rungs between a run and the one that judges it: a tenth of the tolerance
 SAFETY = 1.5
+STALLED = 0.7  # an estimate that falls by less than this over two rungs is not one of the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
 METHODS_BY_TARGET: tuple[tuple[float, str], ...] = ((0.0, "implicit"),)  # least target of each, first that fits
 
@@ -104,7 +105,13 @@ def simulate_within(
     scene = replace(scene, effects=effects)
     method = next(name for least, name in METHODS_BY_TARGET if error >= least)
     search = _Search(scene, method, error, begin + budget)
-    rung = search.cheapest(search.rung())
+    try:
+        rung = search.rung()
+    except _ModelTooSmallError as small:
+        scene, why = full(scene), f"all effects: {why}; but {small}"
+        search = _Search(scene, method, error, begin + budget)
+        rung = search.rung()
+    rung = search.cheapest(rung)
     result = simulate(replace(scene, solver=search.solver(rung)), progress=progress)
     chosen = replace(search.attempt(rung), seconds=result.counters.wall_time)
     reasons = (why, *search.reasons(rung), *(_report_method(scene) if explain else ()))
@@ -122,37 +129,53 @@ def simulate_within(
     )
 
 
+class _ModelTooSmallError(Exception):
+    """No tolerance brings the effects that were chosen to the target."""
+
+
 class _Search:
-    """The rungs that were run, and what they tell of each other."""
+    """The rungs that were run, and what they tell of each other; where effects were chosen, fuller runs judge."""
 
     def __init__(self, scene: Scene, method: str, target: float, deadline: float) -> None:
         self.scene, self.method, self.target, self.deadline = scene, method, target, deadline
         self.trials: dict[int, Trial] = {}
+        self.judge = full(scene)
+        self.judges: dict[int, Trial] = self.trials if self.judge is scene else {}
 
     def solver(self, rung: int) -> Solver:
         return replace(self.scene.solver, method=cast(Any, self.method), rtol=LADDER[rung], atol_angle=None)
 
-    def trial(self, rung: int) -> Trial:
-        """The run of a rung. RunError where the budget is spent."""
-        if rung not in self.trials:
+    def trial(self, rung: int, judging: bool = False) -> Trial:
+        """The run of a rung, or of what judges there. RunError where the budget is spent."""
+        scene, runs = (self.judge, self.judges) if judging else (self.scene, self.trials)
+        if rung not in runs:
             left = self.deadline - time.perf_counter()
-            found = run_native(self.method, self.scene, LADDER[rung], max(left, 0.05), repeats=0)
+            found = run_native(self.method, scene, LADDER[rung], max(left, 0.05), repeats=0)
             if found.status == CUT_OFF:
                 raise RunError(self._spent(), status="accuracy")
-            self.trials[rung] = found
-        return self.trials[rung]
+            runs[rung] = found
+        return runs[rung]
 
     def rung(self) -> int:
         """The loosest rung that meets the target. RunError where none does, or two in a row fail."""
         first = next(k for k, rtol in enumerate(LADDER) if rtol <= 10 * self.target or rtol == LADDER[-1 - AHEAD])
         for rung in range(first, len(LADDER) - AHEAD):
-            pair = self.trial(rung), self.trial(rung + AHEAD)
+            pair = self.trial(rung), self.trial(rung + AHEAD, judging=True)
             if not any(trial.finished for trial in pair):
                 raise RunError(pair[1].message, status=pair[1].status)
             estimate = self.attempt(rung).estimate
             if estimate is not None and estimate <= self.target:
                 return rung
+            self._look_at_model(rung, first)
         raise RunError(self._spent(), status="accuracy")
+
+    def _look_at_model(self, rung: int, first: int) -> None:
+        """_ModelTooSmallError where two rungs in a row brought chosen effects no nearer to the full ones."""
+        known = [self.attempt(k).estimate for k in range(max(first, rung - AHEAD), rung + 1)]
+        if self.judge is self.scene or len(known) <= AHEAD or None in known:
+            return
+        if (known[-1] or 0.0) > STALLED * (known[0] or 0.0):
+            raise _ModelTooSmallError(f"they leave {known[-1]:.2g} at any tolerance")
 
     def cheapest(self, rung: int) -> int:
         """`rung`, or one above that meets the target too for less work: a looser tolerance may cost rejected steps."""
@@ -165,12 +188,12 @@ class _Search:
     def attempt(self, rung: int) -> Attempt:
         """What is known of a rung: judged by the tightest run within AHEAD of it."""
         trial, found, estimate = self.trials[rung], None, None
-        judge = next((self.trials[k] for k in (rung + 2, rung + 1) if k in self.trials), None)
+        judge = next((self.judges[k] for k in (rung + 2, rung + 1) if k in self.judges), None)
         if trial.finished and judge is not None and judge.finished:
             found = errors(trial, judge)
         if found is not None:
             # One rung ahead is a third of the tolerance, which leaves more of the error unseen.
-            estimate = (SAFETY if rung + AHEAD in self.trials else 2 * SAFETY) * worst(found)
+            estimate = (SAFETY if rung + AHEAD in self.judges else 2 * SAFETY) * worst(found)
         return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, found, trial.status)
 
     def next_step(self, rung: int) -> Attempt | None:
@@ -187,8 +210,10 @@ class _Search:
         said = [f"{self.method}: L-stable, so that stuck sliders, which ring at hundreds to thousands of hertz, do not "
                 "dictate its steps; that ringing is filtered, not resolved, and then esdirk4, of order 4, takes more "
                 "Newton iterations for the same error (docs/accuracy.md)"]  # fmt: skip
-        judged = next(k for k in (rung + 2, rung + 1) if k in self.trials)
+        judged = next(k for k in (rung + 2, rung + 1) if k in self.judges)
         judge = f"at rtol {LADDER[rung]:g} the run was judged by one at {LADDER[judged]:g}"
+        if self.judge is not self.scene:
+            judge += " with every effect"
         if looser and (self.attempt(looser[-1]).estimate or 0.0) <= self.target:
             return (*said, f"{judge}; looser ones meet the target too and take more work, by steps that are rejected")
         if not looser:

@@ -42,6 +42,7 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
     speed = np.where(parted(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
+    parts = result.scene.modelled.uplift or bool(history.lift.any())  # given, chosen, or taken in on the way
     found = []
     for i, surface in enumerate(bearing.surfaces):
         left, area = float(history.gap[rows, i].min()), _contact_area(result, i)
@@ -50,7 +51,7 @@ def surface_use(result: Result, rows: slice) -> tuple[SurfaceUse, ...]:
             float(power[:, i].max()) / area if area else None,
             float(heat[i]) / area if area else None,
             area,
-            float(history.lift[rows, i].max()) if result.scene.effects.uplift else None,
+            float(history.lift[rows, i].max()) if parts else None,
         ))  # fmt: skip
     return tuple(found)
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, building, show, whole, words
+from msfp_gen.cli.console import SceneName, building, show, whole, with_effects
 from msfp_gen.layout import Effects, Layout, ModelSpec
 
 app = typer.Typer()
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen generate 5 2 2 -o models   # then: import msfp_5_2_2")
+@with_effects
 def generate(
     n: Annotated[int, typer.Argument(parser=whole, metavar="N", help="Bodies, base and top plate included.")],
     m: Annotated[int, typer.Argument(parser=whole, metavar="M", help="Surfaces that are concave up; they lie below.")],
@@ -21,22 +22,11 @@ def generate(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put sources and module here.")
     ] = None,
-    dimension: Annotated[str | None, typer.Option(metavar=words(Effects, "dimension"))] = None,
-    spin: Annotated[str | None, typer.Option(metavar=words(Effects, "spin"))] = None,
-    sliders: Annotated[str | None, typer.Option(metavar=words(Effects, "sliders"))] = None,
-    rims: Annotated[bool | None, typer.Option("--rims/--no-rims", help="Whether sliders meet rims.")] = None,
-    bouc_wen: Annotated[str | None, typer.Option(metavar=words(Effects, "bouc_wen"))] = None,
-    friction: Annotated[str | None, typer.Option(metavar=words(Effects, "friction"))] = None,
-    friction_law: Annotated[
-        str | None, typer.Option(metavar="FORMULA", help="Of custom friction: mu * (1 - c1 * exp(-c2 * v)).")
-    ] = None,
-    uplift: Annotated[bool | None, typer.Option("--uplift/--no-uplift", help="Whether bodies may part.")] = None,
+    *,
+    effects: Effects,
 ) -> None:
     """Derive, emit and compile the equations of a layout."""
-    given = {"dimension": dimension, "spin": spin, "sliders": sliders, "rims": rims, "bouc_wen": bouc_wen,
-             "friction": friction, "friction_law": friction_law, "uplift": uplift}  # fmt: skip
-    effects: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    spec = ModelSpec(Layout(n, m, p), Effects(**effects))
+    spec = ModelSpec(Layout(n, m, p), effects)
     from msfp_gen.build import generate_to, prepare
     from msfp_gen.tables import build_table
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
@@ -13,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 import typer
 
 from msfp_gen.errors import printable
+from msfp_gen.fields import Choice, Rule, ruled_fields
+from msfp_gen.layout import Effects
 
 if TYPE_CHECKING:
     from msfp_gen.tables import Table
@@ -33,6 +37,37 @@ def read_as(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
 def words(owner: type, field: str) -> str:
     """The choices of a field, as help shows them."""
     return "|".join(get_args(get_type_hints(owner)[field]))
+
+
+def with_effects(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command an option for every effect; it is called with those that were given, as `effects`."""
+    options = {name: _option(name, rule) for name, rule, _ in ruled_fields(Effects)}
+
+    @wraps(command)
+    def called(**given: Any) -> None:
+        chosen = {name: value for name in options if (value := given.pop(name)) is not None}
+        command(**given, effects=Effects(**chosen))
+
+    signature = inspect.signature(command, eval_str=True)
+    kept = [parameter for name, parameter in signature.parameters.items() if name != "effects"]
+    added = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+             for name, option in options.items()]  # fmt: skip
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in (*kept, *added)}
+    setattr(called, "__signature__", signature.replace(parameters=[*kept, *added]))  # noqa: B010
+    return called
+
+
+def _option(name: str, rule: Rule) -> Any:
+    """A switch for an effect that is on or off, else an option of a word or a text; the help says what they mean."""
+    flag = name.replace("_", "-")
+    if not isinstance(rule, Choice):
+        text = "Of custom friction: mu * (1 - c1 * exp(-c2 * v))."
+        return Annotated[str | None, typer.Option(f"--{flag}", metavar="FORMULA", help=text)]
+    said = "; ".join(f"{word}: {meaning}" for word, meaning in rule.meanings.items())
+    if True in rule.words:
+        said = f"{rule.meanings[True]}. Off: {rule.meanings[False]}."
+        return Annotated[bool | None, typer.Option(f"--{flag}/--no-{flag}", help=said[0].upper() + said[1:])]
+    return Annotated[str | None, typer.Option(f"--{flag}", metavar="|".join(rule.words), help=f"{said}.")]
 
 
 whole, number = read_as(int, "whole number"), read_as(float, "number")

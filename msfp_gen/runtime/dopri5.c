@@ -42,8 +42,10 @@ static int slope_at(msfp_run *run, msfp_point *at, slope *s)
     if (solution.iterations) {
         if (run->determinant == 0)
             run->determinant = solution.determinant;
-        if (solution.determinant != run->determinant)
+        if (solution.determinant != run->determinant) {
+            run->have_unknowns = 0; /* of another root: a shorter step must not start there */
             return MSFP_E_IRREGULAR;
+        }
     }
     memcpy(s->v, at->v, sizeof s->v);
     memcpy(s->a, at->a, sizeof s->a);

@@ -88,7 +88,7 @@ def test_a_tilt_near_ninety_degrees_is_named_before_the_singularity(dimension: s
 def test_a_start_beyond_the_angle_is_refused_by_name(azimuth: float) -> None:
     still = Motion(knots=[0.0, 1.0], coefficients=np.zeros((1, 6, 6)))
     start = InitialState([[1.55 * np.sin(azimuth), 1.55 * np.cos(azimuth), 0.0]], [[0.0] * 3], [[0.0] * 2])
-    scene = Scene(hemisphere(), still, Top.prescribed((0.0, 0.0, -1e4)), initial_state=start)
+    scene = Scene(hemisphere(), still, Top.prescribed((0.0, 0.0, -1e4)), Effects(), initial_state=start)
     assert failure_of(scene).status == "angle"
 
 

@@ -22,15 +22,31 @@ PATCH: dict[str, float | None] = {"patch_radius": None}
 HEAT_TIMES = (1e-3, 1e3)  # times over which the heat of friction is followed [s]
 HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
 
+NUMBERS: dict[str, tuple[str, str]] = {
+    "friction_slow": ("-", "friction coefficient at rest"),
+    "velocity_rate": ("s/m", "a, how fast friction rises with the slip velocity"),
+    "velocity_drop": ("-", "share of friction that is missing at rest"),
+    "reference_pressure": ("Pa", "pressure at which mu is given"),
+    "pressure_ratio": ("-", "factor on friction for 50 MPa more"),
+    "temperature_ratio": ("-", "0.7 in Kumar et al. (2015); 1: temperature does not matter"),
+    "area": ("m^2", "of the contact patch"),
+    "reach": ("m", "how far from the centre of the surface the patch still covers it"),
+    "heating": ("K s^1/2 m^2/J", "sqrt(D/pi)/k of the half-space that is heated"),
+    "start_temperature": ("degC", "temperature at the start"),
+    **dict.fromkeys(COEFFICIENTS, ("SI", "parameter of the law")),
+}
+"""Unit and meaning of every number that a law takes or makes of them."""
+
 
 @dataclass(frozen=True)
 class Law:
-    """A law: its formula, and the numbers of a surface in it with their defaults (None: must be given).
+    """A law: what it means, its formula, and the numbers of a surface in it with their defaults (None: must be given).
 
     beside: numbers that a surface may carry all the same, for a wider law that may follow (docs/effects.md).
     """
 
     word: str
+    meaning: str
     text: str
     values: tuple[tuple[str, float | None], ...]
     beside: tuple[str, ...] = ()
@@ -69,11 +85,20 @@ _NUMBERS: tuple[tuple[str, float | None], ...] = (
     ("reference_pressure", None), ("pressure_ratio", 0.7), ("velocity_drop", 0.5), ("velocity_rate", 100.0),
     ("temperature_ratio", 0.7),
 )  # fmt: skip
-BUILT_IN: dict[str, Law] = {
-    "velocity": Law("velocity", _VELOCITY, (("friction_slow", None), ("velocity_rate", None))),
-    "pv": Law("pv", _AT_START, (*_NUMBERS, ("start_temperature", HEAT["start_temperature"])), tuple(HEAT)),
-    "pvt": Law("pvt", _PVT, _NUMBERS),
+_LAWS = (
+    Law("velocity", "it rises with the sliding velocity, exponentially from friction_slow to friction",
+        _VELOCITY, (("friction_slow", None), ("velocity_rate", None))),
+    Law("pv", "it follows pressure and velocity (Kumar et al. 2015), at the temperature of the start",
+        _AT_START, (*_NUMBERS, ("start_temperature", HEAT["start_temperature"])), tuple(HEAT)),
+    Law("pvt", "it follows pressure, velocity and temperature (Kumar et al. 2015)", _PVT, _NUMBERS),
+)  # fmt: skip
+BUILT_IN = {law.word: law for law in _LAWS}
+FRICTION = {
+    "constant": "the friction coefficient does not change",
+    **{law.word: law.meaning for law in _LAWS},
+    "custom": "it follows the formula below",
 }
+"""The words of `Effects.friction` and what they mean."""
 
 
 @lru_cache(maxsize=32)
@@ -94,7 +119,8 @@ def law_of(word: str, text: str | None = None) -> Law | None:
         units_of(tree, COEFFICIENTS)
     except ValueError as error:
         raise InputError(f"effects.friction_law = {text!r}: {error}") from None
-    return Law("custom", ast.unparse(tree), tuple((c, None) for c in COEFFICIENTS if c in names_in(tree)))
+    values = tuple((name, None) for name in COEFFICIENTS if name in names_in(tree))
+    return Law("custom", FRICTION["custom"], ast.unparse(tree), values)
 
 
 def own_numbers() -> tuple[str, ...]:

@@ -1,0 +1,163 @@
+"""The fuzz campaign of docs/stability.md: random valid scenes, each in a process that may be killed.
+
+    python benchmarks/fuzz.py --scenes 10000 --seed 1
+
+Every run must end right or as a named failure: no number that is none, no crash, no hang, no success that energy, the
+friction disc or a second method (fuzz_second.py) contradicts. Exit code 1 otherwise, or if a thousandth of the
+sensible scenes fails. With --output the table goes to a JSON file; fuzz_page.py puts it into the page.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fuzz_scenes import SHORT, SPECS
+from rich.progress import track
+
+from msfp_gen import Effects, Layout, build_model
+
+HERE = Path(__file__).parent
+LIMIT = 120.0  # [s] for one scene, a hundred times what most take and ten times the longest
+SAVED = 100  # scenes between two writings of the table
+ALLOWED = 1e-3  # share of sensible scenes that may fail
+Row = dict[str, Any]
+
+
+class Worker:
+    """A process that runs scenes by their number; killed where it hangs, started again where it died."""
+
+    def __init__(self, seed: int, limit: float, short: bool = False) -> None:
+        self.seed, self.limit, self.words = seed, limit, "short" if short else "all"
+        self.process: subprocess.Popen[str] | None = None
+
+    def ask(self, task: str, number: int) -> Row:
+        """What became of `task` ("run" or "check") for one scene; status "hang" or "crash" if the process did."""
+        if self.process is None:
+            command = [sys.executable, str(HERE / "fuzz_worker.py"), str(self.seed), self.words]
+            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write(f"{task} {number}\n")
+        self.process.stdin.flush()
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            if not selector.select(self.limit):
+                self.stop()
+                return {"number": number, "status": "hang", "message": f"no answer in {self.limit:g} s"}
+        line = self.process.stdout.readline()
+        if line:
+            row: Row = json.loads(line)
+            return row
+        code = self.process.wait()
+        self.process = None
+        reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return {"number": number, "status": "crash", "message": reason}
+
+    def stop(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+            self.process = None
+
+
+def build_all(specs: list[Any]) -> None:
+    """Every model before the clock of a scene runs."""
+    for layout, words in track(specs, "building models", disable=not sys.stderr.isatty()):
+        build_model(Layout(*layout), Effects(**words))
+
+
+def campaign(worker: Worker, scenes: int, wanted: int) -> Iterator[tuple[Row, Row | None]]:
+    """Run scenes; hold a success against the second method whenever verdicts are behind what is wanted by then."""
+    verdicts = 0
+    for number in range(scenes):
+        row, found = worker.ask("run", number), None
+        if row["status"] == "ok" and row["checkable"] and verdicts < wanted * (number + 1) / scenes:
+            found = worker.ask("check", number)
+            verdicts += "agrees" in found
+        yield row, found
+
+
+def faults(rows: list[Row], checks: list[Row]) -> list[str]:
+    """What must not be, one line each."""
+    out = [f"{r['number']}: {r['status']}: {r['message']}" for r in rows
+           if r["status"] in ("hang", "crash", "refused") or r["status"].startswith("unnamed")]  # fmt: skip
+    out += [f"{r['number']}: not finite: {', '.join(r['not_finite'])}" for r in rows if r.get("not_finite")]
+    out += [f"{r['number']}: success with {', '.join(r['wrong'])}" for r in rows if r.get("wrong")]
+    out += [
+        f"{c['number']}: success contradicted by the second method: {c}" for c in checks if not c.get("agrees", True)
+    ]
+    return out
+
+
+def table(rows: list[Row], checks: list[Row]) -> Row:
+    """The campaign in numbers."""
+    sensible = [r for r in rows if r.get("sensible")]
+    failed = [r for r in sensible if r["status"] not in ("ok", "stopped")]
+    counts: Counter[str] = Counter()
+    used: Counter[str] = Counter()
+    for row in rows:
+        counts.update(row.get("counts", {}))
+        used.update(name for name, value in row.get("counts", {}).items() if value)
+    verdicts = [c for c in checks if "agrees" in c]
+    return {
+        "scenes": len(rows), "models": len({r["spec"] for r in rows if "spec" in r}),
+        "ends": dict(Counter(r["status"] for r in rows).most_common()),
+        "sensible": len(sensible), "sensible_ends": dict(Counter(r["status"] for r in sensible).most_common()),
+        "sensible_failures": [f"{r['number']} {r['spec']}: {r['message']}" for r in failed],
+        "faults": faults(rows, checks),
+        "longest": round(max(r.get("wall", 0.0) for r in rows), 1),
+        "checked": len(verdicts), "no_verdict": len(checks) - len(verdicts),
+        "largest_deviation": max((c["deviation"] for c in verdicts), default=None),
+        "counts": dict(counts), "scenes_with": dict(used),
+    }  # fmt: skip
+
+
+def save(found: Row, path: Path | None) -> None:
+    """Write what there is, so that a campaign that is stopped leaves its part."""
+    if path is not None:
+        path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run, print the table, say by the exit code whether it is as it must be."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--check", type=int, default=500, help="successes to hold against the second method")
+    parser.add_argument("--limit", type=float, default=LIMIT, help="seconds for one scene")
+    parser.add_argument("--output", type=Path, help="JSON file for the table")
+    parser.add_argument("--short", action="store_true", help="a few of the models")
+    given = parser.parse_args(words)
+    specs = SHORT if given.short else SPECS
+    build_all(specs)
+    begin, worker = time.perf_counter(), Worker(given.seed, given.limit, given.short)
+    rows: list[Row] = []
+    checks: list[Row] = []
+    found: Row = {}
+    tasks = campaign(worker, given.scenes, given.check)
+    try:
+        for row, check in track(tasks, "running", given.scenes, disable=not sys.stderr.isatty()):
+            rows.append(row)
+            checks += [check] if check is not None else []
+            if len(rows) % SAVED == 0 or len(rows) == given.scenes:
+                wall = round(time.perf_counter() - begin)
+                found = {"seed": given.seed, "wall": wall, **table(rows, checks)}
+                save(found, given.output)
+    finally:
+        worker.stop()
+    print(json.dumps(found, indent=1))
+    failures = found["sensible"] - sum(found["sensible_ends"].get(end, 0) for end in ("ok", "stopped"))
+    return int(bool(found["faults"]) or failures >= ALLOWED * max(found["sensible"], 1) > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

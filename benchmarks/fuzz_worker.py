@@ -1,0 +1,134 @@
+"""One worker of the fuzz campaign: reads lines "run NUMBER" or "check NUMBER", answers each with a line of JSON.
+
+Started by fuzz.py, which kills it where it hangs.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+from fuzz_scenes import case, sensible
+from fuzz_second import Second
+
+from msfp_gen import InputError, RunError, Scene, simulate
+from msfp_gen.result import Result
+
+MEMORY = 4 << 30  # [bytes] a run that asks for more ends as a named failure, not as a machine without memory
+ROWS = 8  # of a run that the second method goes over
+NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard")
+
+
+def not_finite(result: Result) -> list[str]:
+    """Names of what holds a number that is none."""
+    arrays = {**vars(result.history), **result.history.energy}
+    return [name for name, values in arrays.items() if isinstance(values, np.ndarray) and not np.isfinite(values).all()]
+
+
+def wrong(result: Result) -> list[str]:
+    """What cannot be of a run that claims to be right, whatever the scene."""
+    history, energy, rtol = result.history, result.history.energy, result.scene.solver.rtol
+    peak = max(float(np.abs(energy["input"]).max()), 1e-12)
+    surfaces = result.scene.bearing.surfaces
+    unresolved = 3 * float(history.normal_force.max()) * result.scene.solver.angle_tolerance * max(
+        s.friction * s.radius for s in surfaces)  # fmt: skip
+    found = []
+    closure = float(np.abs(energy["numerical"]).max())
+    if closure > max(0.02, 30 * rtol) * peak + unresolved:
+        found.append(f"energy {closure / peak:.2g}")
+    disc = float(np.linalg.norm(history.friction_state, axis=2).max()) - 1
+    if disc > max(20 * rtol, 1e-9):
+        found.append(f"disc {disc / rtol:.3g} rtol")
+    if history.rim_force.min() < 0 or history.rim_force[history.gap > 0].any():
+        found.append("rim")
+    if history.normal_force.min() < 0 or (history.normal_force.min() == 0 and not result.scene.effects.uplift):
+        found.append("normal")
+    rest = (result.scene.output_step or 0.0) * (1 + 1e-9)
+    if result.status == "ok" and abs(history.time[-1] - result.scene.end) > rest + 1e-9:
+        found.append("end")
+    return found
+
+
+def run(scene: Scene) -> dict[str, Any]:
+    """One scene: how it ended and what is wrong with it."""
+    begin = time.perf_counter()
+    result, message = None, ""
+    try:
+        result = simulate(scene)
+        status = result.status
+    except RunError as error:
+        status, message = error.status, str(error)
+        result = error.result if isinstance(error.result, Result) else None
+        if status not in NAMES or "stopped at t = " not in message:
+            status = f"unnamed {status}"
+    except InputError as error:
+        status, message = "refused", str(error)
+    out: dict[str, Any] = {"status": status, "message": message, "wall": time.perf_counter() - begin}
+    if result is not None:
+        out["counts"] = {k: v for k, v in asdict(result.counters).items() if k != "wall_time"}
+        out["not_finite"] = not_finite(result)
+        if result.succeeded:
+            out["wrong"] = wrong(result)
+    return out
+
+
+def describe(scene: Scene) -> dict[str, Any]:
+    """What it is, and whether the second method knows all of it."""
+    effects = scene.effects
+    return {"spec": scene.spec.key, "top": scene.top.kind, "method": scene.solver.method, "sensible": sensible(scene),
+            "checkable": effects.friction == "constant" and not effects.uplift}  # fmt: skip
+
+
+def check(seed: int, number: int, short: bool) -> dict[str, Any]:
+    """Go over a few rows of a run by the second method, from a row drawn at random.
+
+    deviation: largest difference over what is allowed, 1 at most where they agree. Allowed are the tolerances of the
+    run, one a row, and thrice what halved steps change in the second method.
+    """
+    run = simulate(replace(case(seed, number, short).scene, output_step=None))
+    history, solver = run.history, run.scene.solver
+    last = max(1, len(history.time) - ROWS)
+    first = int(np.random.default_rng([seed, number]).integers(last))
+    rows = range(first, min(first + ROWS, len(history.time)))
+    second = Second(run.scene)
+    try:
+        whole = second.march(history, rows)
+        halved = second.march(history, rows, halved=True)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        return {"number": number, "status": "no verdict", "message": str(error)}
+    kept = slice(rows[1], rows[-1] + 1)
+    angles = solver.rtol * float(np.abs(history.tilt_angles).max()) + solver.angle_tolerance
+    parts = {
+        "angles": (history.tilt_angles[kept], halved.q, whole.q, angles),
+        "friction": (history.friction_state[kept], halved.f, whole.f, 10 * solver.rtol),
+        "force": (history.top_force[kept], halved.force, whole.force, 10 * solver.rtol * second.size),
+    }
+    over = {
+        name: float(np.abs(run_ - best).max() / (len(rows) * unit + 3 * np.abs(best - coarse).max()))
+        for name, (run_, best, coarse, unit) in parts.items()
+    }
+    worst = max(over.values())
+    return {"number": number, "agrees": worst <= 1.0, "deviation": worst, **over}
+
+
+def main() -> None:
+    """Tasks from standard input, lines of JSON to standard output."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    seed, short = int(sys.argv[1]), sys.argv[2] == "short"
+    for line in sys.stdin:
+        task, number = line.split()[0], int(line.split()[1])
+        if task == "check":
+            print(json.dumps(check(seed, number, short)), flush=True)
+            continue
+        scene = case(seed, number, short).scene
+        print(json.dumps({"number": number, **describe(scene), **run(scene)}), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""The fuzz campaign in a short version; `python benchmarks/fuzz.py` is the whole of it, docs/stability.md its table."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stacks import a_stack
+
+from msfp_gen import Effects, Motion, Scene, Solver, Top, simulate
+
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "benchmarks"))
+
+import fuzz  # noqa: E402
+import fuzz_scenes  # noqa: E402
+import fuzz_second  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def short() -> dict[str, Any]:
+    """150 scenes of a few models, five of them held against the second method."""
+    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "150", "--seed", "7", "--check", "5"]
+    done = subprocess.run([*command, "--short"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def test_every_scene_ends_right_or_with_a_name(short: dict[str, Any]) -> None:
+    assert short["scenes"] == sum(short["ends"].values()) == 150 and short["faults"] == []
+    assert short["sensible"] > 20 and short["sensible_failures"] == []
+    assert short["checked"] == 5 and short["largest_deviation"] <= 1.0
+
+
+@pytest.mark.slow
+def test_the_campaign(tmp_path: Path) -> None:
+    """Another seed than that of the page; minutes."""
+    assert fuzz.main(["--scenes", "10000", "--seed", "2", "--output", str(tmp_path / "table.json")]) == 0
+
+
+def test_a_scene_is_its_number() -> None:
+    one, two = (fuzz_scenes.case(1, 11).scene for _ in range(2))
+    assert repr(one) == repr(two) != repr(fuzz_scenes.case(1, 12).scene)
+
+
+def a_sensible_scene() -> Scene:
+    bearing = a_stack((3, 1, 1), [1.0, 1.0], capacity=0.2, yield_displacement=1e-3)
+    return Scene(bearing, Motion.harmonic(0.1, 0.5), Top.rig(1e5, 1e8, 0.0, 1e7), Effects())
+
+
+def test_what_is_sensible_is_what_an_engineer_asks() -> None:
+    scene = a_sensible_scene()
+    assert fuzz_scenes.sensible(scene)
+    for change in (
+        {"motion": Motion.harmonic(0.5, 0.5)},  # beyond capacity
+        {"top": Top.rig(0.0, 1e8, 0.0, 1e7)},  # no load
+        {"top": Top.rig(1e5, 1e8)},  # nothing holds the plate
+        {"bearing": scene.bearing.replace(friction=0.3)},
+        {"solver": Solver(rtol=0.1)},
+    ):
+        assert not fuzz_scenes.sensible(replace(scene, **change)), change
+
+
+@pytest.mark.parametrize("what", ["hang", "crash"])
+def test_hangs_and_crashes_are_seen(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker that sleeps, and one that kills itself: both have a row, and the next one is asked again."""
+    code = "import os, sys, time\nfor line in sys.stdin:\n    " + (
+        "time.sleep(60)\n" if what == "hang" else f"os.kill(os.getpid(), {int(signal.SIGSEGV)})\n"
+    )
+    (tmp_path / "fuzz_worker.py").write_text(code, encoding="utf-8")
+    monkeypatch.setattr(fuzz, "HERE", tmp_path)
+    worker = fuzz.Worker(1, 1.0)
+    rows = [worker.ask("run", number) for number in (3, 4)]
+    worker.stop()
+    assert [row["status"] for row in rows] == [what, what]
+    assert [row["number"] for row in rows] == [3, 4]
+    assert len(fuzz.faults(rows, [])) == 2
+
+
+def test_the_second_method_sees_a_wrong_run() -> None:
+    """Friction a tenth higher than the run had: the second method disagrees, by more than what it errs itself."""
+    scene = replace(a_sensible_scene(), solver=Solver(rtol=1e-5), duration=0.6)
+    history = simulate(scene).history
+    rows = range(len(history.time) // 2, len(history.time) // 2 + 6)
+    kept = slice(rows[1], rows[-1] + 1)
+
+    def deviation(of: Scene) -> float:
+        found = fuzz_second.Second(of).march(history, rows)
+        return float(np.abs(found.force - history.top_force[kept]).max() / np.abs(history.top_force).max())
+
+    wrong = replace(scene, bearing=scene.bearing.replace(friction=0.055))
+    assert deviation(scene) < 1e-3 < 3e-3 < deviation(wrong)
