@@ -1,55 +1,76 @@
-"""One evaluation, tangent, Newton iteration and solve for accelerations of built models: `python benchmarks/kernels.py`.
+"""One evaluation of built models: `python benchmarks/kernels.py`, each comparison with its ratio last.
 
-The state is one of a run, in the middle of its strong part; numbers are nanoseconds of CPU time, the best of many.
+What a Newton iteration of the default step costs (residual, tangent, solve), against CasADi's C where it is installed; the
+accelerations against the articulated-body recursion of the same chain; cost and build against the number of bodies.
+States are from runs, all surfaces on the move; numbers are nanoseconds of CPU time, the best of many.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from msfp_gen import Effects, Scene, load_scene, simulate
-from msfp_gen.build import build_model
+import casadi_peer
+from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Surface, Top, build_model, load_scene, simulate
 from msfp_gen.compiler import FLAGS, find_compiler
 from msfp_gen.packing import bodies_and_surfaces, load_values, top_values
 
 HERE = Path(__file__).parent
 FULL = Effects()
+BETA = 1.5e-3  # gamma h of a step on a record [s]
 
 
-def compiled(folder: Path, main: Path, target: Path) -> Path:
+class State(NamedTuple):
+    """What `kernels.c` reads, by name."""
+
+    bodies: np.ndarray
+    surfaces: np.ndarray
+    top: np.ndarray
+    base: np.ndarray
+    load: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    f: np.ndarray
+
+
+def compiled(main: Path, target: Path, folder: Path | None = None) -> Path:
     """A program of `main` and the sources of a built model, with the flags that built it."""
-    units = [str(p) for p in folder.glob("*.c") if not p.name.startswith("msfp_")]
-    command = [*find_compiler().command, *FLAGS["c"], "-I", str(folder), str(main), *units, "-o", str(target), "-lm"]
+    units = [] if folder is None else [str(p) for p in folder.glob("*.c") if not p.name.startswith("msfp_")]
+    found = [] if folder is None else ["-I", str(folder)]
+    command = [*find_compiler().command, *FLAGS["c"], *found, str(main), *units, "-o", str(target), "-lm"]
     subprocess.run(command, check=True)
     return target
 
 
-def state_of(scene: Scene, beta: float) -> str:
-    """What `kernels.c` reads: the scene half-way through, all surfaces on the move."""
+def state_of(scene: Scene) -> State:
+    """The scene in its first half, where the slowest surface slides fastest."""
     history = simulate(scene).history
     speed = np.abs(history.slip_velocity).min(axis=1).max(axis=1)
     i = int(np.argmax(speed[: len(speed) // 2]))
     motion, t = scene.motion, float(history.time[i])
     bodies, surfaces = bodies_and_surfaces(scene.bearing, scene.effects)
-    anchor = motion.displacement(0.0)[:2]
-    values: list[object] = [beta, scene.bearing.gravity, bodies, surfaces, top_values(scene.top, anchor)]
-    values += [motion.evaluate(t, order) for order in range(3)] + [load_values(scene.top)]
-    values += [history.tilt_angles[i], history.tilt_rates[i], history.tilt_accelerations[i], history.friction_state[i]]
-    return " ".join(repr(float(x)) for value in values for x in np.ravel(value))
+    top = top_values(scene.top, motion.displacement(0.0)[:2])
+    base = np.array([motion.evaluate(t, order) for order in range(3)])
+    return State(bodies, surfaces, top, base, load_values(scene.top), history.tilt_angles[i], history.tilt_rates[i],
+                 history.tilt_accelerations[i], history.friction_state[i])  # fmt: skip
 
 
-def timed(scene: Scene, beta: float = 1.5e-3) -> list[float]:
+def timed(scene: Scene, state: State) -> list[float]:
     """Value, tangent, Newton iteration, accelerations [ns]."""
     model = build_model(scene.bearing.layout, scene.effects)
+    text = " ".join(repr(float(x)) for value in (BETA, scene.bearing.gravity, *state) for x in np.ravel(value))
     with tempfile.TemporaryDirectory() as folder:
-        program = compiled(model.info.folder, HERE / "c" / "kernels.c", Path(folder) / "kernels")
-        done = subprocess.run([program], input=state_of(scene, beta), text=True, capture_output=True, check=True)
+        program = compiled(HERE / "c" / "kernels.c", Path(folder) / "kernels", model.info.folder)
+        done = subprocess.run([program], input=text, text=True, capture_output=True, check=True)
     return [float(word) for word in done.stdout.split()]
 
 
@@ -61,13 +82,117 @@ CASES = {
 }
 
 
+def deep(layout: Layout) -> Scene:
+    """A stack of any depth on a circle: radii shrink towards the middle."""
+    radii = [2.0 * 0.8**k for k in range(layout.m)] + [2.0 * 0.8**k for k in range(layout.p)][::-1]
+    bearing = Bearing(layout, 0.06, [Surface(r, 0.15, 0.05, 5e-4, 1e8, 1e4) for r in radii],
+                      [Body(0.06, 0.03, 50.0, (0.5, 0.8), 0.1, 0.003) for _ in radii])  # fmt: skip
+    return Scene(bearing=bearing, motion=Motion.circle(0.05, 3.0, cycles=0.5), effects=FULL,
+                 top=Top.rig(1e6, 1e9, 1e5, 1e9, 1e5))  # fmt: skip
+
+
+def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
+    """The parameters that the graph of CasADi takes, by record, index and field."""
+    out: dict[tuple[str, int, str], float] = {("beta", 0, ""): BETA}
+    layout, g = scene.bearing.layout, scene.bearing.gravity
+    signs = (*layout.signs, 0)
+    for axis, name in enumerate("xyz"):
+        out["load", 0, name] = state.load[axis]
+        out |= {("base", 0, f"{letter}{name}"): state.base[order, axis] for order, letter in enumerate("CVA")}
+    for k in range(1, layout.n):
+        height, centroid, mass, transverse, axial = state.bodies[k, :5]
+        sign, above = signs[k - 1], signs[k]
+        bottom = -sign * state.surfaces[k - 1, 0]
+        c = bottom + (centroid if sign > 0 else height - centroid)
+        e = bottom + height + (above * state.surfaces[k, 0] if above else 0.0)
+        values = dict(c=c, e=e, m=mass, jt=transverse, ja=axial, g=g)
+        out |= {("body_parameters", k, name): value for name, value in values.items()}
+        for i, name in enumerate(("psi", "theta")):
+            out["Q", k - 1, name] = state.q[k - 1, i] - BETA * state.v[k - 1, i]
+            out["V", k - 1, name] = state.v[k - 1, i] - BETA * state.a[k - 1, i]
+        for i, name in enumerate("YZ"):
+            out["fp", k - 1, name] = state.f[k - 1, i]
+        radius, capacity, mu, dy, kc, cc = state.surfaces[k - 1, :6]
+        values = dict(sign=sign, R=radius, sc=capacity, mu=mu, dy=dy, kc=kc, cc=cc, rs=0.0, pr=0.0, ks=0.0, cs=0.0, ca=0.0, sa=0.0)
+        out |= {("surface_parameters", k - 1, name): value for name, value in values.items()}
+    names = ("k", "c", "kr", "cr", "m", "jt", "ja", "h", "x0x", "x0y")
+    out |= {("top_parameters", 0, name): value for name, value in zip(names, state.top, strict=True)}
+    return out | {("top_parameters", 0, "g"): g, ("top_parameters", 0, "x0z"): 0.0}
+
+
+def against_casadi(scene: Scene, state: State, ours: float) -> None:
+    """One Newton iteration by CasADi's generated C, with our flags and with all that this machine has."""
+    if find_spec("casadi") is None:
+        print(f"Newton iteration {ours:.0f} ns; casadi is not installed (pip install casadi); times faster: not measured")
+        return
+    unknowns = [*state.v[:, :2].ravel(), *state.f.ravel()]
+    given, times = numbers(scene, state), []
+    for flags in ((), ("-O3", "-march=native", "-ffp-contract=fast")):
+        with tempfile.TemporaryDirectory() as folder:
+            seconds, residual = casadi_peer.timed(scene, given, unknowns, Path(folder), flags)
+        times.append(seconds)
+    model = build_model(scene.bearing.layout, scene.effects)
+    stack = model.stack(scene.bearing, scene.top, anchor=scene.motion.displacement(0.0)[:2])
+    # At Y, Z held the moments of both must agree: beta = 0 keeps ours there.
+    mine = stack.condensed(state.q, state.v, state.a, state.f, state.base, state.load, BETA, 1.0, 1.0 / BETA, 0.0)[1]
+    apart = np.abs(residual[: len(mine)] - mine).max() / np.abs(mine).max()
+    print(f"Newton iteration (residual, tangent, solve), TFP spatial, spin locked: {ours:.0f} ns; CasADi's C and a dense "
+          f"solve {times[0]:.0f} ns, with -O3 -march=native {times[1]:.0f} ns; residuals apart by {apart:.0e}; "
+          f"times faster: {times[0] / ours:.1f}", flush=True)  # fmt: skip
+
+
+def against_the_recursion(ours: float) -> None:
+    """Accelerations against the articulated-body recursion in plain C, moments of the surfaces given."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = compiled(HERE / "c" / "recursion.c", Path(folder) / "recursion")
+        theirs = float(subprocess.run([program], text=True, capture_output=True, check=True).stdout.split()[0])
+    print(f"accelerations, TFP: {ours:.0f} ns; articulated-body recursion of the same chain {theirs:.0f} ns; "
+          f"times slower: {ours / theirs:.1f}", flush=True)  # fmt: skip
+
+
+def against_depth() -> None:
+    """Newton iteration and build of ten surfaces over four."""
+    small, large = (deep(Layout(*counts)) for counts in ((5, 2, 2), (11, 5, 5)))
+    few, many = (timed(scene, state_of(scene))[2] for scene in (small, large))
+    print(f"Newton iteration: (5,2,2) {few:.0f} ns, (11,5,5) {many:.0f} ns; ratio: {many / few:.2f}", flush=True)
+    few, many = (min(build_seconds(scene.bearing.layout) for _ in range(3)) for scene in (small, large))
+    print(f"derive, emit, compile: (5,2,2) {few:.2f} s, (11,5,5) {many:.2f} s of CPU; ratio: {many / few:.2f}", flush=True)
+
+
+BUILD = """
+import resource, sys
+from msfp_gen import Layout, build_model
+def cpu():
+    return sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+begin = cpu()
+build_model(Layout(*map(int, sys.argv[1:])))
+print(cpu() - begin)
+"""
+
+
+def build_seconds(layout: Layout) -> float:
+    """CPU seconds of `build_model` into a cache of its own, compilers included."""
+    with tempfile.TemporaryDirectory() as cache:
+        command = [sys.executable, "-c", BUILD, str(layout.n), str(layout.m), str(layout.p)]
+        done = subprocess.run(command, env={**os.environ, "MSFP_GEN_CACHE": cache}, text=True, capture_output=True, check=True)
+    return float(done.stdout)
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the table, then a line for every comparison."""
     print("| effects, fenz-test2 | value [ns] | tangent [ns] | Newton iteration [ns] | accelerations [ns] |")
     print("|---|---|---|---|---|")
     for name, effects in CASES.items():
-        print(f"| {name} | " + " | ".join(f"{ns:.0f}" for ns in timed(replace(load_scene("fenz-test2"), effects=effects))) + " |", flush=True)
+        scene = replace(load_scene("fenz-test2"), effects=effects)
+        found = timed(scene, state_of(scene))
+        print(f"| {name} | " + " | ".join("" if ns < 0 else f"{ns:.0f}" for ns in found) + " |", flush=True)
+    scene = replace(load_scene("fenz-test2"), effects=FULL)
+    state = state_of(scene)
+    ours = timed(scene, state)
+    against_casadi(scene, state, ours[2])
+    against_the_recursion(ours[3])
+    against_depth()
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

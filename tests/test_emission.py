@@ -139,7 +139,7 @@ def test_massless_leaves_no_inertia_in_the_balances() -> None:
 
 def test_drilling_moment_is_there_for_the_patch_alone() -> None:
     kernels = {spin: functions(text("msfp_kernels.h", spin=spin)) for spin in ("locked", "patch", "free")}
-    uses_radius = {spin: "par_rs" in code["msfp_contact"] for spin, code in kernels.items()}
+    uses_radius = {spin: "par_rs" in code["msfp_contact_lanes"] for spin, code in kernels.items()}
     assert uses_radius == {"locked": False, "patch": True, "free": False}
 
 

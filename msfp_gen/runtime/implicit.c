@@ -177,7 +177,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     s.now.seed.cq = s.now.seed.beta = beta;
     s.now.seed.cv = 1.0;
     s.now.seed.ca = 1.0 / beta;
-    s.now.seed.accuracy = 1e-3 * run->options.rtol;
+    s.now.seed.accuracy = 1e-5 * run->options.rtol;
     memset(&s.now.at, 0, sizeof s.now.at);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);

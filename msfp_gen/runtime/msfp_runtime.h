@@ -16,11 +16,12 @@ extern "C" {
 #else
 #define MSFP_WIDE
 #endif
-#if defined(__GNUC__)
-#define MSFP_INLINE static inline __attribute__((always_inline))
+#if defined(__GNUC__) /* a kernel is compiled for the vectors of the function that calls it */
+#define MSFP_INLINED __attribute__((always_inline))
 #else
-#define MSFP_INLINE static inline
+#define MSFP_INLINED
 #endif
+#define MSFP_INLINE MSFP_INLINED static inline
 
 /* ---- values: a bearing and its top ------------------------------------------------------- */
 
