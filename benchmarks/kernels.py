@@ -16,9 +16,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+import casadi_peer
 import numpy as np
 
-import casadi_peer
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Surface, Top, build_model, load_scene, simulate
 from msfp_gen.compiler import FLAGS, find_compiler
 from msfp_gen.packing import bodies_and_surfaces, load_values, top_values
@@ -105,7 +105,7 @@ def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
         bottom = -sign * state.surfaces[k - 1, 0]
         c = bottom + (centroid if sign > 0 else height - centroid)
         e = bottom + height + (above * state.surfaces[k, 0] if above else 0.0)
-        values = dict(c=c, e=e, m=mass, jt=transverse, ja=axial, g=g)
+        values = {"c": c, "e": e, "m": mass, "jt": transverse, "ja": axial, "g": g}
         out |= {("body_parameters", k, name): value for name, value in values.items()}
         for i, name in enumerate(("psi", "theta")):
             out["Q", k - 1, name] = state.q[k - 1, i] - BETA * state.v[k - 1, i]
@@ -113,7 +113,7 @@ def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
         for i, name in enumerate("YZ"):
             out["fp", k - 1, name] = state.f[k - 1, i]
         radius, capacity, mu, dy, kc, cc = state.surfaces[k - 1, :6]
-        values = dict(sign=sign, R=radius, sc=capacity, mu=mu, dy=dy, kc=kc, cc=cc, rs=0.0, pr=0.0, ks=0.0, cs=0.0, ca=0.0, sa=0.0)
+        values = {"sign": sign, "R": radius, "sc": capacity, "mu": mu, "dy": dy, "kc": kc, "cc": cc, "rs": 0.0, "pr": 0.0, "ks": 0.0, "cs": 0.0, "ca": 0.0, "sa": 0.0}
         out |= {("surface_parameters", k - 1, name): value for name, value in values.items()}
     names = ("k", "c", "kr", "cr", "m", "jt", "ja", "h", "x0x", "x0y")
     out |= {("top_parameters", 0, name): value for name, value in zip(names, state.top, strict=True)}

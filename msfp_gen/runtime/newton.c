@@ -171,7 +171,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = fmin(1e-3, fmax(rounding(s), 1e-1 * run->options.rtol));
+    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = msfp_stage_residual(run, s, &run->work, residual);
