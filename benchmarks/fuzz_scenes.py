@@ -209,7 +209,7 @@ def case(seed: int, number: int, short: bool = False) -> Case:
     rtol = draw.decades((1e-5, 1e-3), (1e-7, 3e-2))
     duration = None
     if explicit:
-        duration = min(motion.duration, EXPLICIT_STEPS / 2 / explicit_rate(bearing, top))
+        duration = min(motion.duration, EXPLICIT_STEPS / 6 / explicit_rate(bearing, top))
     solver = Solver(method="dopri5" if explicit else "implicit", rtol=rtol, max_steps=40_000)
     scene = Scene(bearing, motion, top, effects, solver, duration=duration, initial_state=start,
                   output_step=draw.one([None, None, 0.01]) if motion.duration > 0.1 and not explicit else None,
@@ -241,7 +241,8 @@ def explicit_rate(bearing: Bearing, top: Top) -> float:
     radius = max(s.radius for s in bearing.surfaces)
     for body in bearing.bodies:
         inertia = min(body.moments)
-        worst = max(worst, np.sqrt((2 * stiffness * (radius * 0.1) ** 2 + held + 2 * load * radius) / inertia))
+        turning = (2 * stiffness * (radius * 0.1) ** 2 + held + 2 * load * radius) / inertia
+        worst = max(worst, np.sqrt(2 * stiffness / body.mass + turning))
     return float(worst)
 
 
