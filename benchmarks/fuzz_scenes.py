@@ -282,6 +282,8 @@ def sensible(scene: Scene) -> bool:
         and (
             solver.method == "implicit" or (effects.spin, effects.friction) == ("locked", "constant")
         )  # others are stiff
+        and scene.initial_state is None
+        and (not effects.uplift or wide(bearing))  # sliders that do not tip
         and 1e-5 <= solver.rtol <= 1e-3
         and (solver.method == "implicit" or scene.end * explicit_rate(bearing, top) <= EXPLICIT_STEPS)
     )
