@@ -57,16 +57,22 @@ class Worker:
         if line:
             row: Row = json.loads(line)
             return row
-        code = self.process.wait()
-        self.process = None
+        code = self.ended()
         reason = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         return {"number": number, "status": "crash", "message": reason}
 
+    def ended(self) -> int:
+        """The exit code of the process, once its pipes are closed."""
+        assert self.process is not None
+        process, self.process = self.process, None
+        with process:
+            return process.wait()
+
     def stop(self) -> None:
+        """End the process."""
         if self.process is not None:
             self.process.kill()
-            self.process.wait()
-            self.process = None
+            self.ended()
 
 
 def build_all(specs: list[Any]) -> None:

@@ -38,6 +38,8 @@ def test_tighter_targets_cost_more_and_say_so():
     loose, tight = simulate_within(scene, 0.05), simulate_within(scene, 1e-4)
     assert tight.chosen.rtol < loose.chosen.rtol and tight.chosen.newton > loose.chosen.newton
     assert loose.next_step.rtol < loose.chosen.rtol
+    ratio = loose.next_step.newton / loose.chosen.newton
+    assert loose.next_step.seconds == pytest.approx(ratio * loose.chosen.seconds)
     assert loose.seconds > loose.chosen.seconds
     assert tight.result.provenance["error_target"] == "0.0001"
     assert float(tight.result.provenance["error_estimate"]) == pytest.approx(tight.chosen.estimate, rel=1e-2)

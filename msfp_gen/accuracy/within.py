@@ -34,6 +34,8 @@ METHODS_BY_TARGET: tuple[tuple[float, str], ...] = ((0.0, "implicit"),)  # least
 class Attempt:
     """One rung: its settings, its cost, and what it is off by (None: not judged, or it failed).
 
+    seconds: of the rung that was chosen as measured; of others by their iterations at its pace.
+
     estimate: the largest of the RMS errors and the errors of the peaks of force and sliding, relative.
     """
 
@@ -114,14 +116,16 @@ def simulate_within(
     rung = search.cheapest(rung)
     result = simulate(replace(scene, solver=search.solver(rung)), progress=progress)
     chosen = replace(search.attempt(rung), seconds=result.counters.wall_time)
+    pace = chosen.seconds / max(chosen.newton, 1)  # runs of the search write many rows, and took longer for that
+    above = search.next_step(rung)
     reasons = (why, *search.reasons(rung), *(_report_method(scene) if explain else ()))
     provenance = {"error_target": f"{error:g}", "error_estimate": f"{chosen.estimate:.3g}"}
     return Within(
         result=replace(result, provenance=result.provenance | provenance),
         target=error,
         chosen=chosen,
-        next_step=search.next_step(rung),
-        attempts=tuple(search.attempt(tried) for tried in sorted(search.trials)),
+        next_step=None if above is None else replace(above, seconds=pace * above.newton),
+        attempts=tuple(replace(a, seconds=pace * a.newton) for a in map(search.attempt, sorted(search.trials))),
         seconds=time.perf_counter() - begin,
         left_out=_left_out(result),
         reasons=reasons,

@@ -59,7 +59,9 @@ class Wanted:
     def simulate(self, scene: Scene) -> Within:
         """The run, with its estimate."""
         from msfp_gen.accuracy import simulate_within
+        from msfp_gen.accuracy.effects import full
 
-        build(scene)
+        for each in (scene, full(scene)):  # what runs, and what judges it
+            build(each)
         with Progress(scene.name or "run") as progress:
             return simulate_within(scene, self.error, budget=self.budget, explain=self.explain, progress=progress)

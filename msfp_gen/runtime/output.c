@@ -146,6 +146,7 @@ static void measure(const msfp_run *run, msfp_row *row)
     for (int j = 0; j < NB; ++j) {
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = sliding[j][MSFP_GAP_G];
+        row->rim[j] = row->gap[j] > 0.0 ? 0.0 : fmax(row->rim[j], 0.0); /* a rim pushes, and only where it is met */
     }
 }
 
