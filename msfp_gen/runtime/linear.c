@@ -1,4 +1,7 @@
 /* linear.c: dense LU with partial pivoting for the small systems of one step. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* rows of any length as vectors */
+#endif
 #include <math.h>
 #include "msfp_model.h"
 
