@@ -45,20 +45,34 @@ static void prepare(const msfp_run *run, stages *s, int i, double h)
     }
 }
 
-/* Rates to start a stage from: those of the last step, or by accelerations that go on as they have changed, which is
- * what a base acceleration linear in time asks for. */
-static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
+/* A rate as it goes on from those of the stages before. */
+static double carried(const msfp_run *run, const stages *s, int i, int k, int j, double h)
 {
     const double *c = s->method->c;
+    const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / c[1] : h * run->now.a[k][j];
+    double v = run->now.v[k][j] + c[i] * slope;
+    if (i > 2) /* as curved as the last stage says */
+        v += c[i] * (c[i] - c[1]) / (c[i - 1] * (c[i - 1] - c[1])) * (s->v[i - 1][k][j] - s->v[0][k][j] - c[i - 1] * slope);
+    return v;
+}
+
+/* A rate by an acceleration that goes on as it has changed: what a base acceleration linear in time asks for. */
+static double driven(const msfp_run *run, const stages *s, int i, int k, int j, double h)
+{
+    const double *c = s->method->c;
+    const double change = i > 1 ? (s->a[i - 1][k][j] - s->a[0][k][j]) / c[i - 1] : h * run->slope[k][j];
+    return s->now.V[k][j] + s->now.beta * (s->a[0][k][j] + c[i] * change);
+}
+
+static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
+{
+    const int sampled = run->options.stop_at_knots;
     memcpy(s->now.at.v, run->now.v, sizeof s->now.at.v);
     if (i == 1)
         memcpy(s->now.f, run->now.f, sizeof s->now.f);
     for (int k = 0; k < NB && extrapolate; ++k)
-        for (int d = 0; d < ND; ++d) {
-            const int j = unknown[d];
-            const double change = i > 1 ? (s->a[i - 1][k][j] - s->a[0][k][j]) / c[i - 1] : h * run->slope[k][j];
-            s->now.at.v[k][j] = s->now.V[k][j] + s->now.beta * (s->a[0][k][j] + c[i] * change);
-        }
+        for (int d = 0; d < ND; ++d)
+            s->now.at.v[k][unknown[d]] = (sampled ? driven : carried)(run, s, i, k, unknown[d], h);
 }
 
 /* Starts are tried in their order; the last only once a shorter step has not helped either. */
