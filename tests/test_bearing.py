@@ -184,7 +184,7 @@ def test_three_kinds_of_top():
         (lambda: Top.mass(0, 300, 0.5), "top.mass = 0"),
         (lambda: Top.mass(1e4, (300, -1), 0.5), "top.inertia"),
         (lambda: Top.mass(1e4, 300, -0.5), "top.height = -0.5"),
-        (lambda: Solver(method="rk4"), "solver.method = 'rk4': give one of 'implicit', 'dopri5'"),
+        (lambda: Solver(method="rk4"), "solver.method = 'rk4': give one of 'implicit', 'esdirk4', 'dopri5'"),
         (lambda: Solver(rtol=0), "solver.rtol = 0"),
         (lambda: Solver(rtol=1), "solver.rtol = 1.0: give a number below 1"),
         (lambda: Solver(atol_angle=-1), "solver.atol_angle = -1"),

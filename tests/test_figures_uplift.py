@@ -27,7 +27,7 @@ SMOOTH = 1e-3  # friction so small that the footprint of the seat is the slider'
 @cache
 def hop():
     """A load on nearly frictionless sliders that lifts off and lands."""
-    scene = shaken(1.4, sideways=0.02, duration=0.9)
+    scene = shaken(1.4, sideways=0.02, duration=0.85)
     return simulate(replace(scene, bearing=scene.bearing.replace(friction=SMOOTH)))
 
 
