@@ -1,4 +1,4 @@
-"""What a build and a run cost here: `python benchmarks/speed.py`.
+"""What a build and a run cost here, then against others: `python benchmarks/speed.py` (docs/performance.md).
 
 Builds go to a cache of their own that is thrown away; every run is repeated and its fastest wall time counts.
 """
@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 LAYOUTS = ("5 2 2", "7 3 3", "11 5 5")
 SCENES = ("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc", "ridgecrest-ccc")
@@ -67,6 +68,9 @@ def main() -> None:
         count = best.counters
         speed = best.history.time[-1] / count.wall_time
         print(f"| {name} | {count.wall_time:.4f} | {speed:.0f} | {count.steps} | {count.newton_iterations} |")
+    for script in ("kernels.py", "runs.py"):
+        print(flush=True)
+        subprocess.run([sys.executable, str(Path(__file__).with_name(script))], check=True)
 
 
 if __name__ == "__main__":

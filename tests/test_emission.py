@@ -23,7 +23,7 @@ CHOICES: dict[str, tuple[object, ...]] = {
 COMBINATIONS = [dict(zip(CHOICES, values, strict=True)) for values in product(*CHOICES.values())]
 REFUSED = {"sliders": "massless", "spin": "free"}  # nothing would determine the spin
 POSSIBLE = [e for e in COMBINATIONS if not REFUSED.items() <= e.items()]
-LONGEST = 400  # lines of a function: one body or one surface, whatever the stack; the Jacobian of a contact is the longest
+LONGEST = 400  # lines of a function, whatever the stack: the Jacobian of a contact is the longest
 
 
 @cache
