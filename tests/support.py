@@ -67,6 +67,6 @@ def failure_of(scene: Scene) -> RunError:
 
 
 def hearing() -> None:
-    """In a new process: hear the signals that the tests may themselves have been told to ignore (nohup, a shell's `&`)."""
+    """In a new process: hear the signals that the tests may have been told to ignore themselves (nohup, `&`)."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
