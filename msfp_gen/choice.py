@@ -7,12 +7,14 @@ from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.drive import plane_of
 from msfp_gen.layout import Auto, Effects
+from msfp_gen.packing import load_values
 from msfp_gen.piecewise import Array
 from msfp_gen.prescribed import Prescribed
-from msfp_gen.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.top import MassTop, RigTop
 
 if TYPE_CHECKING:
     from msfp_gen.scene import Scene
@@ -37,14 +39,12 @@ class Choice:
     """The effects a run begins with.
 
     plane_until: time at which the scene leaves the vertical plane of a planar model [s]. error: the asked error.
-    open: effects that a run may take in later; none where the user gave all.
     """
 
     effects: Effects
     reasons: tuple[Reason, ...] = ()
     plane_until: float = inf
     error: float = 0.005
-    open: tuple[str, ...] = ()
 
 
 def choose(scene: Scene) -> Choice:
@@ -59,7 +59,7 @@ def choose(scene: Scene) -> Choice:
     reasons = (plane, sliders, _rims(scene, asked), uplift, _friction(scene, asked))
     effects = asked.closed(**{reason.effect: reason.chosen for reason in reasons}, top_rotation=turning or None)
     stays = until if effects.dimension == "planar" else inf
-    return Choice(effects, reasons, stays, asked.error, asked.open)
+    return Choice(effects, reasons, stays, asked.error)
 
 
 def _given(asked: Auto, name: str) -> Reason | None:
@@ -91,7 +91,7 @@ def _rims(scene: Scene, asked: Auto) -> Reason:
     start = 0.0 if scene.initial_state is None else _started(scene)
     if isinstance(scene.top, RigTop) and scene.top.stiffness > 0 and scene.load is None and reach + start < least:
         because = f"the base moves {1e3 * reach:.4g} mm, the least capacity is {1e3 * least:.4g} mm"
-        return Reason("rims", False, because, "the gap of every surface at every evaluation")
+        return Reason("rims", False, because, "the forces of the rims and their events")
     if isinstance(scene.top, RigTop) and scene.top.stiffness > 0:
         return Reason("rims", True, f"the base moves {1e3 * reach:.4g} mm, the least capacity is {1e3 * least:.4g} mm")
     return Reason("rims", True, f"a {scene.top.kind} top bounds no sliding; the least capacity is {1e3 * least:.4g} mm")
@@ -148,7 +148,7 @@ def _uplift(scene: Scene, asked: Auto) -> Reason:
 def resting_load(scene: Scene) -> float:
     """Vertical load on the lowest surface at the start [N]."""
     weights = scene.bearing.gravity * sum(body.mass for body in scene.bearing.bodies)
-    return _vertical(scene, 0.0) + _supported(scene) * scene.bearing.gravity + weights
+    return float(_vertical(scene, 0.0)) + _supported(scene) * scene.bearing.gravity + weights
 
 
 def least_load(scene: Scene) -> float:
@@ -157,18 +157,17 @@ def least_load(scene: Scene) -> float:
     vertical = scene.motion.evaluate(times, 2)[:, 2]
     weights = sum(body.mass for body in scene.bearing.bodies)
     carried = (_supported(scene) + weights) * (scene.bearing.gravity + vertical)
-    return float(np.min(carried + np.array([_vertical(scene, t) for t in times]) if scene.load else
-                        carried + _vertical(scene, 0.0)))  # fmt: skip
+    return float(np.min(carried + _vertical(scene, times)))
 
 
 def _supported(scene: Scene) -> float:
     return scene.top.mass if isinstance(scene.top, MassTop) else 0.0
 
 
-def _vertical(scene: Scene, time: float) -> float:
-    top = {RigTop: lambda t: t.axial_load, PrescribedTop: lambda t: -t.force[2]}.get(type(scene.top), lambda t: 0.0)
-    added = 0.0 if scene.load is None else -float(scene.load.evaluate(time)[2])
-    return float(top(scene.top)) + added  # type: ignore[no-untyped-call]
+def _vertical(scene: Scene, time: ArrayLike) -> Array:
+    """What top and load press with at times [s]."""
+    added = 0.0 if scene.load is None else scene.load.evaluate(time)[..., 2]
+    return -np.asarray(load_values(scene.top)[2] + added)
 
 
 def inertia_share(scene: Scene) -> float:

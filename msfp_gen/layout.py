@@ -149,11 +149,6 @@ class Auto:
             raise InputError(f"effects.error = {self.error}: a share of the friction force; give less than 1: 0.005")
         self.closed(friction=self.friction or ("custom" if self.friction_law else None))
 
-    @property
-    def open(self) -> tuple[str, ...]:
-        """The effects that are chosen."""
-        return tuple(name for name in CHOSEN if getattr(self, name) is None)
-
     def closed(self, **choices: object) -> Effects:
         """Effects with the given choices; what is still open is modelled, but uplift. Raises InputError."""
         given = {field.name: getattr(self, field.name) for field in fields(Effects) if hasattr(self, field.name)}

@@ -94,7 +94,9 @@ def begin_run(
     if frame.rotation is not None and scene.top_rotation is not None:
         more["support_knots"], more["support_coefficients"] = _support(scene, frame.rotation)
     if at is not None:
-        more |= {"origin": at.origin, "guard_heat": at.guard_heat, "start_time": at.time}
+        turns = at.planar and not model.planar
+        origin = out_of_plane(at.origin, at.azimuth, "vector") if turns else at.origin
+        more |= {"origin": np.ascontiguousarray(origin), "guard_heat": at.guard_heat, "start_time": at.time}
         if at.heat is not None and model.effects.law is not None and model.effects.law.heats:
             more["heat"] = at.heat
     run = model.extension.Run(

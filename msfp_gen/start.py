@@ -36,17 +36,11 @@ def prelude(scene: Scene) -> Scene:
     rotation = scene.top_rotation
     if rotation is not None:
         rotation = Rotation.ramp(*(float(x) for x in rotation.evaluate(0.0)), duration=TURNING)
-    load = None if scene.load is None else Load.of([0.0, 1.0], _constant(scene.load.evaluate(0.0)))
+    load = None if scene.load is None else Load.constant(*np.split(scene.load.evaluate(0.0), 2))
     return replace(
         scene, motion=motion, motion_table=None, top_rotation=rotation, load=load, duration=None, stop=None,
         output_step=None, effects=_effects(scene), solver=Solver(rtol=min(1e-4, scene.solver.rtol)),
     )  # fmt: skip
-
-
-def _constant(values: Array) -> Array:
-    pieces = np.zeros((1, len(values), ORDER))
-    pieces[0, :, 0] = values
-    return pieces
 
 
 def _effects(scene: Scene) -> Auto:

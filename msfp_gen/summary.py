@@ -86,7 +86,7 @@ def rims_met(result: Result) -> list[int]:
 
 
 def axial_load(result: Result) -> float | None:
-    """The constant load N that presses on the top plate [N]; None where nothing does."""
+    """The constant load N that presses on the top plate [N]; None where nothing does, or it changes."""
     scene = result.scene
     loads: dict[str, Callable[[Any], float]] = {
         "rig": lambda top: top.axial_load,
@@ -94,6 +94,11 @@ def axial_load(result: Result) -> float | None:
         "mass": lambda top: top.mass * scene.bearing.gravity,
     }
     load = loads[scene.top.kind](scene.top)
+    if scene.load is not None:
+        vertical = scene.load.coefficients[:, 2]
+        if np.any(vertical[:, 1:]) or np.any(vertical[:, 0] != vertical[0, 0]):
+            return None
+        load -= float(vertical[0, 0])
     return load if load > 0 else None
 
 

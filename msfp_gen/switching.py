@@ -44,10 +44,10 @@ def widened(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
         return _answer(scene, effects, "inertia") or _answer(scene, effects, "uplift")
     if status != "guard":
         return None
-    wider: Effects | None = effects
-    for name, (time, _, _) in run.trips.items():
-        if time >= run.time and wider is not None and name in WIDER:
-            wider = _answer(scene, wider, name)
+    wider = effects
+    for name in stopping(scene, effects, strict=False):  # others that tripped in the same step took notes
+        if name in run.trips:
+            wider = _answer(scene, wider, name) or wider
     return wider
 
 

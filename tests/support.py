@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -63,3 +64,9 @@ def failure_of(scene: Scene) -> RunError:
     except RunError as error:
         return error
     raise AssertionError("the run did not fail")
+
+
+def hearing() -> None:
+    """In a new process: hear the signals that the tests may have been told to ignore themselves (nohup, `&`)."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from msfp_gen.choice import Choice
 from msfp_gen.explain import explain
 from msfp_gen.piecewise import ORDER
 from msfp_gen.result import Result
+from msfp_gen.scene import InitialState, Stop
 from msfp_gen.scenefile import scene_from_table
+from msfp_gen.switching import widened
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -28,9 +31,8 @@ def chosen(scene: Scene, effect: str) -> tuple[object, str]:
 
 def optimist(scene: Scene, **effects: Any) -> Scene:
     """The same scene, begun with effects that are too few, as a choice that was wrong would have it."""
-    again, asked = replace(scene), scene.effects
-    assert isinstance(asked, Auto)
-    again.__dict__["choice"] = Choice(replace(scene.modelled, **effects), open=asked.open)
+    again = replace(scene)
+    again.__dict__["choice"] = Choice(replace(scene.modelled, **effects))
     return again
 
 
@@ -261,3 +263,33 @@ def test_a_run_of_several_models_resumes_to_the_same_rows(tmp_path: Any) -> None
     for result in (first, again):
         np.testing.assert_array_equal(result.history.top_force, whole.history.top_force)
         assert result.notes == whole.notes
+
+
+def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:
+    """Heat without numbers can only be noted; inertia, in the same step, is answered."""
+    scene = replace(TEST2, effects=Auto())
+    segment = SimpleNamespace(
+        status="guard",
+        run=SimpleNamespace(rows=[0], time=1.0, trips={"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}),
+    )
+    assert widened(scene, scene.modelled, segment) == replace(scene.modelled, sliders="inertial")  # type: ignore[arg-type]
+
+
+def test_displacements_go_on_from_their_start_in_the_frame_of_the_user() -> None:
+    """A planar run aslant, begun off centre, that becomes spatial: events measure from where the first run began."""
+    time = np.linspace(0.0, 6.0, 301)
+    moved = np.outer(0.02 * np.sin(np.pi * time) * np.sin(np.pi * np.clip(time / 4, 0, 1)) ** 2, [0.0, 1.0, 0.0])
+    moved[:, 0] = 0.05 * np.sin(np.pi * np.clip(time - 4, 0, None) / 4) ** 3
+    tilt = np.zeros((4, 3))
+    tilt[:, 0] = 0.01, -0.02, 0.02, -0.01
+    start = InitialState(tilt.tolist(), np.zeros((4, 3)).tolist(), np.zeros((4, 2)).tolist())
+    scene = replace(TEST2, motion=Motion.from_arrays(time, moved), duration=None, initial_state=start)
+    whole = simulate(replace(scene, effects=FULL))
+    far = 0.9 * whole.history.horizontal[whole.history.time > 4.5].max()
+    assert whole.history.horizontal[whole.history.time < 4.0].max() < far
+    stop = Stop(displacement=float(far))
+    stopped = [simulate(replace(scene, effects=each, stop=stop)) for each in (Auto(sliders="inertial"), FULL)]
+    assert kinds(stopped[0]) == ["plane"] and [result.status for result in stopped] == ["stopped", "stopped"]
+    times = [result.history.time[-1] for result in stopped]
+    assert times[0] == pytest.approx(times[1], abs=2e-3)
+    assert np.hypot(*stopped[0].events[-1].displacement[:2]) == pytest.approx(far, rel=1e-3)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import preset_run, scene_of
+from support import hearing, preset_run, scene_of
 from test_uplift import shaken
 
 from msfp_gen import InputError, Motion, RunError, Scene, checkpoint, simulate, simulation
@@ -242,7 +242,9 @@ LONG = ["run", "fenz-test2", "--method", "dopri5", "--rtol", "1e-3", "--duration
 
 def started(folder: Path, *arguments: str, chunk: int = 200) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", RUN, str(chunk), *LONG, "-o", "run.nc", "--every", "0", *arguments]
-    return subprocess.Popen(command, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        command, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=hearing
+    )
 
 
 def finished(folder: Path) -> int:

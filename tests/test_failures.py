@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import failure_of, scene_of
+from support import failure_of, hearing, scene_of
 
 from msfp_gen import Effects, Motion, RunError, Scene, Top, build_model, presets
 from msfp_gen.result import Result
@@ -110,7 +110,7 @@ except RunError as error:
 def test_interrupt_keeps_what_was_computed() -> None:
     """Ctrl-C in the middle of the compiled loop."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    process = subprocess.Popen([sys.executable, "-c", INTERRUPTED], text=True, **pipes)
+    process = subprocess.Popen([sys.executable, "-c", INTERRUPTED], text=True, preexec_fn=hearing, **pipes)
     assert process.stdout is not None and process.stdout.readline() == "running\n"
     begin = time.perf_counter()
     process.send_signal(signal.SIGINT)

@@ -58,6 +58,9 @@ def test_a_bearing_that_never_moved_can_be_drawn(name):
     history = dataclasses.replace(history, **nothing, energy=energy)
     figure = FIGURES[name](dataclasses.replace(still, history=history, events=()), None)
     figure.draw_without_rendering()
+    limits = np.array([[*axes.get_xlim(), *axes.get_ylim()] for axes in figure.axes])
+    assert len(limits) and np.isfinite(limits).all()
+    assert np.all(limits[:, 0] != limits[:, 1]) and np.all(limits[:, 2] != limits[:, 3])
 
 
 @pytest.mark.parametrize("run", RUNS)

@@ -37,11 +37,12 @@ def test_every_command_has_help_with_examples(name, capsys):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_examples_are_understood(name):
+def test_examples_are_understood(name, capsys):
     """Names and options of every example exist: parsing stops short of running."""
     for example in examples(name):
         words = shlex.split(re.split(r" [|>]", example)[0])[2:]
-        ROOT.commands[name].make_context(name, words)
+        assert ROOT.commands[name].make_context(name, words).info_name == name
+    assert main([name, "--no-such-option"]) == 2 and "--no-such-option" in capsys.readouterr().err
 
 
 def completed(words, count, shell="bash"):

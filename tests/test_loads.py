@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from msfp_gen import Auto, Effects, InputError, Load, Motion, Rotation, Scene, Top, build_model, presets, simulate
+from msfp_gen.accuracy.library import run_library
+from msfp_gen.accuracy.opensees import run_opensees
+from msfp_gen.accuracy.series import run_series
 from msfp_gen.piecewise import ORDER
 from msfp_gen.result import Result
 from msfp_gen.scenefile import scene_from_table, scene_text
@@ -219,3 +222,19 @@ def test_a_rotation_that_stops_dead_is_refused() -> None:
         double(effects=Effects(), top_rotation=Rotation.constant(0.01))
     with pytest.raises(InputError, match="angle jumps at t = 1 s"):
         Rotation(np.array([0.0, 1.0, 2.0]), np.arange(24.0).reshape(2, 2, 6) / 1e3)
+
+
+def test_a_load_that_changes_is_no_constant_load() -> None:
+    more = Load.constant((0.0, 0.0, -0.5 * WEIGHT))
+    still = simulate(double(motion=STILL, load=more))
+    assert still.summary["axial_load"] == pytest.approx(1.5 * WEIGHT)
+    rising = simulate(double(motion=STILL, load=more + Load.ramp((0, 0, 1e5), duration=2.0)))
+    assert rising.summary["axial_load"] is None
+
+
+@pytest.mark.parametrize("run", [run_series, run_opensees, lambda scene, _: run_library("Radau", scene, 1e-2, 1.0)])
+@pytest.mark.parametrize("name", ["load", "top_rotation"])
+def test_methods_that_know_the_base_alone_say_so(name: str, run: Any) -> None:
+    value = {"load": Load.constant((0.0, 0.0, -1e4)), "top_rotation": Rotation.constant(theta=0.01)}[name]
+    with pytest.raises(InputError, match=f"{name}: this method follows the motion of the base alone"):
+        run(double(**{name: value}), 10)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.accuracy.trial import CUT_OFF, OK, Trial, grid
+from msfp_gen.accuracy.trial import CUT_OFF, OK, Trial, base_alone, grid
 from msfp_gen.build import build_model
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Array
@@ -38,6 +38,7 @@ def run_library(name: str, scene: Scene, rtol: float, limit: float) -> Trial:
     `rtol` for Y and Z. Steps are kept to what the motion resolves, and a run starts anew at a declared jump.
     Raises InputError where the model is no ordinary differential equation.
     """
+    base_alone(scene)
     if scene.modelled.uplift:
         raise InputError("effects.uplift: as_ode keeps all surfaces closed")
     ode = build_model(scene.bearing.layout, scene.modelled).as_ode(scene.bearing, scene.motion, scene.top)

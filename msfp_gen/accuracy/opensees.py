@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.accuracy.series import Link, Series
-from msfp_gen.accuracy.trial import OK, Trial, grid
+from msfp_gen.accuracy.trial import OK, Trial, base_alone, grid
 from msfp_gen.errors import InputError
 from msfp_gen.history import Array
 from msfp_gen.layout import Layout
@@ -29,6 +29,7 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
 
     Raises InputError: OpenSees is not installed, or the element cannot be this bearing under this load.
     """
+    base_alone(scene)
     if find_spec("openseespy") is None:
         raise InputError("openseespy is not installed: pip install openseespy to have TripleFrictionPendulum beside")
     lower, upper, inner = _links(scene)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.accuracy.trial import OK, ROWS, Trial, grid
+from msfp_gen.accuracy.trial import OK, ROWS, Trial, base_alone, grid
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Array
 from msfp_gen.top import MassTop, PrescribedTop, RigTop
@@ -166,6 +166,7 @@ def _links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
 
 def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
     """`scene` by the linearised bearing in `steps` equal steps. Raises InputError for a prescribed load."""
+    base_alone(scene)
     begin = time.perf_counter()
     times = np.linspace(0.0, scene.end, steps + 1)
     series = Series(scene.bearing, scene.modelled.rims, arms)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from msfp_gen.errors import RunError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Array, Counters
 from msfp_gen.simulation import simulate
 
@@ -90,6 +90,13 @@ def watch(limit: float) -> Callable[[float, float], None]:
             raise _OutOfTime
 
     return look
+
+
+def base_alone(scene: Scene) -> None:
+    """Raise InputError where more than the base drives a scene: methods of others would leave it out unsaid."""
+    for name in ("load", "top_rotation"):
+        if getattr(scene, name) is not None:
+            raise InputError(f"{name}: this method follows the motion of the base alone; leave {name} out, or it")
 
 
 def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:

@@ -110,17 +110,20 @@ def test_dormand_prince_tableau_is_exact() -> None:
 
 def tr_bdf2_tableau() -> tuple[Array, Array, Array]:
     """a (3, 3), c, and weights less embedded weights, evaluated from the C."""
-    text = (RUNTIME / "implicit.c").read_text(encoding="utf-8")
+    text = (RUNTIME / "tableaux.c").read_text(encoding="utf-8")
     names: dict[str, float] = {}
     for name in ("ROOT2", "W", "D"):
         found = re.search(rf"#define {name} (.+)", text)
         assert found
         names[name] = arithmetic(found[1].split("/*")[0], names)
-    table = re.search(r"tableau method = \{(.*?)\n\};", text, re.DOTALL)
+    table = re.search(r"msfp_tableau tr_bdf2 = \{(.*?)\n\};", text, re.DOTALL)
     assert table
-    gamma, *rest = [arithmetic(x, names) for x in re.sub(r"[{}\n]", " ", table[1]).split(",") if x.strip()]
-    a = np.array(rest[:9]).reshape(3, 3) + gamma * np.diag([0.0, 1.0, 1.0])
-    return a, np.array(rest[9:12]), np.array(rest[12:15])
+    numbers = [arithmetic(x, names) for x in re.sub(r"[{}\n]", " ", table[1]).split(",") if x.strip()]
+    (stages, gamma), lower, rest = numbers[:2], numbers[2:6], numbers[6:12]
+    assert stages == 3
+    a = gamma * np.diag([0.0, 1.0, 1.0])
+    a[0, 0], a[1, 0], a[2, 0], a[2, 1] = lower
+    return a, np.array(rest[:3]), np.array(rest[3:])
 
 
 def arithmetic(text: str, names: dict[str, float]) -> float:
