@@ -30,7 +30,7 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
 }
 
 /* Absolute tolerance of a coordinate: the solver's for angles; a separation's that of the force it stands for, as for Y, Z. */
-static double absolute(const msfp_run *run, int j, int d)
+double msfp_absolute(const msfp_run *run, int j, int d)
 {
     if (d < 3)
         return run->options.atol_angle;
@@ -44,7 +44,7 @@ double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], c
     for (int k = 0; k < NB; ++k) {
         for (int i = 0; i < MSFP_ND; ++i) {
             const int d = unknown[i];
-            const double atol = absolute(run, k, d);
+            const double atol = msfp_absolute(run, k, d);
             const double q = fmax(fabs(run->now.q[k][d]), fabs(run->next.q[k][d]));
             worst = fmax(worst, fabs(dq[k][d]) / (atol + rtol * q));
             if (dv)
@@ -54,97 +54,6 @@ double msfp_error_norm(const msfp_run *run, const double dq[MSFP_NB][MSFP_NQ], c
             worst = fmax(worst, fabs(df[k][d]) / (10.0 * rtol));
     }
     return worst;
-}
-
-/* ---- events: rims met, stop conditions -------------------------------------------------------------------- */
-
-#define EVENTS MSFP_EVENTS
-#define FIRST_SEAT (NB + 1)
-
-/* Event functions of a state: the gaps (while open, to first order where they close), what is left to the stop displacement, compressions. */
-static void event_values(msfp_run *run, const msfp_state *s, double *g)
-{
-    double u[3], sliding[NB][MSFP_GAP_SIZE];
-    msfp_row row;
-    int met = 0;
-    for (int j = 0; j < NB; ++j) { /* no arc tangent while the rim is away */
-        g[j] = (cos(s->q[j][0]) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
-        met |= g[j] <= 0.0;
-    }
-    if (met) {
-        msfp_gaps(&run->parameters, s->q, sliding);
-        for (int j = 0; j < NB; ++j)
-            g[j] = g[j] <= 0.0 ? sliding[j][MSFP_GAP_G] : g[j];
-    }
-    g[NB] = 1.0;
-    if (run->options.stop_displacement > 0.0) {
-        msfp_observe_state(run, s, &row);
-        msfp_across(run, &row, u);
-        g[NB] = run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]);
-    }
-#if MSFP_UPLIFT
-    msfp_observe_state(run, s, &row);
-    for (int j = 0; j < NB; ++j)
-        g[FIRST_SEAT + j] = row.compression[j];
-#endif
-}
-
-static double event_tolerance(const msfp_run *run, int i)
-{
-    if (i >= FIRST_SEAT)
-        return 0.1 * absolute(run, i - FIRST_SEAT, 3);
-    return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
-}
-
-/* Where in the step the first event lies: its share of the step, or 1. */
-static double first_event(msfp_run *run, const double *before, const double *after)
-{
-    double first = 1.0, g[EVENTS];
-    for (int i = 0; i < EVENTS; ++i) {
-        const double tolerance = event_tolerance(run, i);
-        const int met = before[i] > tolerance && after[i] < -tolerance;
-        const int left = i != NB && before[i] < -tolerance && after[i] > tolerance;
-        if (!(met || left) || (i < NB && !MSFP_RIMS))
-            continue;
-        double low = 0.0, high = 1.0;
-        for (int n = 0; n < 40; ++n) {
-            msfp_state s;
-            const double middle = 0.5 * (low + high);
-            msfp_interpolate(run, middle, &s);
-            event_values(run, &s, g);
-            *((g[i] > 0.0) == met ? &low : &high) = middle;
-        }
-        first = fmin(first, high);
-    }
-    return first;
-}
-
-static int all_rims_met(const double *g)
-{
-    for (int j = 0; j < NB; ++j)
-        if (g[j] > 0.0)
-            return 0;
-    return 1;
-}
-
-/* Record what happened in the accepted step; 1: stop here. */
-static int record_events(msfp_run *run, const double *before, const double *after)
-{
-    int stop = 0;
-    for (int j = 0; j < NB && MSFP_RIMS; ++j) {
-        if (before[j] > 0.0 && after[j] <= 0.0)
-            msfp_write_event(run, &run->next, j + 1, 0);
-        else if (before[j] <= 0.0 && after[j] > 0.0)
-            msfp_write_event(run, &run->next, j + 1, 1);
-    }
-    for (int j = 0, i = FIRST_SEAT; i < EVENTS; ++i, ++j)
-        if ((before[i] > 0.0) != (after[i] > 0.0))
-            msfp_write_event(run, &run->next, j + 1, after[i] > 0.0 ? 4 : 3);
-    if (after[NB] <= event_tolerance(run, NB) || (run->options.stop_all_rims && all_rims_met(after))) {
-        msfp_write_event(run, &run->next, 0, 2);
-        stop = 1;
-    }
-    return stop;
 }
 
 /* ---- the loop ------------------------------------------------------------------------------------------------ */
@@ -216,7 +125,7 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
         run->start[i] = options->origin ? options->origin[i] : row.base[i] - row.top[i];
     run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * (options->duration - run->now.t));
     run->previous_error = 1.0;
-    event_values(run, &run->now, run->events_now);
+    msfp_event_values(run, &run->now, run->events_now);
     msfp_guard_begin(run);
     run->status = msfp_write_row(run, &run->now);
     if (options->output_step > 0.0)
@@ -295,7 +204,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->h = fmax(h * controlled(run, error), cut ? run->h : 0.0);
     run->previous_error = error;
     run->restart = run->shortened = 0;
-    const int stop = record_events(run, before, after);
+    const int stop = msfp_record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);
     if (run->status)
@@ -320,7 +229,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
 
 static int one_step(msfp_run *run)
 {
-    double error = 0.0, before[EVENTS], after[EVENTS];
+    double error = 0.0, before[MSFP_EVENTS], after[MSFP_EVENTS];
     const double left = target(run) - run->now.t;
     double h = run->h;
     if (run->options.max_step > 0.0)
@@ -339,8 +248,8 @@ static int one_step(msfp_run *run)
             return !shrink(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_order(run->options.method))), MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);
-        event_values(run, &run->next, after);
-        const double share = relocations < 4 ? first_event(run, before, after) : 1.0;
+        msfp_event_values(run, &run->next, after);
+        const double share = relocations < 4 ? msfp_first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
         h = fmin(0.99 * h, fmax(h * share, SHORTEST_TO_EVENT));

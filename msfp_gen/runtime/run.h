@@ -11,6 +11,11 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
 /* Displacement across the bearing, less its start. */
 void msfp_across(const msfp_run *run, const msfp_row *row, double *displacement);
+/* Absolute tolerance of a coordinate of body j: of an angle, or of a separation (d = 3). */
+double msfp_absolute(const msfp_run *run, int j, int d);
+void msfp_event_values(msfp_run *run, const msfp_state *s, double *g);
+double msfp_first_event(msfp_run *run, const double *before, const double *after);
+int msfp_record_events(msfp_run *run, const double *before, const double *after);
 /* Whether the step just made leaves what the model holds for, and the run is to stop for it. */
 int msfp_guarded(msfp_run *run, const double *gaps);
 void msfp_guard_begin(msfp_run *run);

@@ -1,0 +1,91 @@
+/* events.c: rims met and left, interfaces that part and close, the stop displacement. */
+#include <math.h>
+#include "run.h"
+
+#define FIRST_SEAT (NB + 1)
+
+/* Event functions of a state: the gaps (while open, to first order where they close), what is left to the stop displacement, compressions. */
+void msfp_event_values(msfp_run *run, const msfp_state *s, double *g)
+{
+    double u[3], sliding[NB][MSFP_GAP_SIZE];
+    msfp_row row;
+    int met = 0;
+    for (int j = 0; j < NB; ++j) { /* no arc tangent while the rim is away */
+        g[j] = (cos(s->q[j][0]) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        met |= g[j] <= 0.0;
+    }
+    if (met) {
+        msfp_gaps(&run->parameters, s->q, sliding);
+        for (int j = 0; j < NB; ++j)
+            g[j] = g[j] <= 0.0 ? sliding[j][MSFP_GAP_G] : g[j];
+    }
+    g[NB] = 1.0;
+    if (run->options.stop_displacement > 0.0) {
+        msfp_observe_state(run, s, &row);
+        msfp_across(run, &row, u);
+        g[NB] = run->options.stop_displacement - sqrt(u[0] * u[0] + u[1] * u[1]);
+    }
+#if MSFP_UPLIFT
+    msfp_observe_state(run, s, &row);
+    for (int j = 0; j < NB; ++j)
+        g[FIRST_SEAT + j] = row.compression[j];
+#endif
+}
+
+static double event_tolerance(const msfp_run *run, int i)
+{
+    if (i >= FIRST_SEAT)
+        return 0.1 * msfp_absolute(run, i - FIRST_SEAT, 3);
+    return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
+}
+
+/* Where in the step the first event lies: its share of the step, or 1. */
+double msfp_first_event(msfp_run *run, const double *before, const double *after)
+{
+    double first = 1.0, g[MSFP_EVENTS];
+    for (int i = 0; i < MSFP_EVENTS; ++i) {
+        const double tolerance = event_tolerance(run, i);
+        const int met = before[i] > tolerance && after[i] < -tolerance;
+        const int left = i != NB && before[i] < -tolerance && after[i] > tolerance;
+        if (!(met || left) || (i < NB && !MSFP_RIMS))
+            continue;
+        double low = 0.0, high = 1.0;
+        for (int n = 0; n < 40; ++n) {
+            msfp_state s;
+            const double middle = 0.5 * (low + high);
+            msfp_interpolate(run, middle, &s);
+            msfp_event_values(run, &s, g);
+            *((g[i] > 0.0) == met ? &low : &high) = middle;
+        }
+        first = fmin(first, high);
+    }
+    return first;
+}
+
+static int all_rims_met(const double *g)
+{
+    for (int j = 0; j < NB; ++j)
+        if (g[j] > 0.0)
+            return 0;
+    return 1;
+}
+
+/* Record what happened in the accepted step; 1: stop here. */
+int msfp_record_events(msfp_run *run, const double *before, const double *after)
+{
+    int stop = 0;
+    for (int j = 0; j < NB && MSFP_RIMS; ++j) {
+        if (before[j] > 0.0 && after[j] <= 0.0)
+            msfp_write_event(run, &run->next, j + 1, 0);
+        else if (before[j] <= 0.0 && after[j] > 0.0)
+            msfp_write_event(run, &run->next, j + 1, 1);
+    }
+    for (int j = 0, i = FIRST_SEAT; i < MSFP_EVENTS; ++i, ++j)
+        if ((before[i] > 0.0) != (after[i] > 0.0))
+            msfp_write_event(run, &run->next, j + 1, after[i] > 0.0 ? 4 : 3);
+    if (after[NB] <= event_tolerance(run, NB) || (run->options.stop_all_rims && all_rims_met(after))) {
+        msfp_write_event(run, &run->next, 0, 2);
+        stop = 1;
+    }
+    return stop;
+}
