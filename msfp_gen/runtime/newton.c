@@ -8,6 +8,12 @@
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
+#if MSFP_FLOW
+#define FLOWS(s) ((s)->seed.flow)
+#else
+#define FLOWS(s) 0
+#endif
+
 static const int unknown[ND] = MSFP_FREE;
 
 static void place(msfp_stage *s)
@@ -93,6 +99,10 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double s
     double step[DOF], factor = 1.0;
     memcpy(step, residual, sizeof step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
+#if MSFP_FLOW
+    for (int i = 0; i < DOF && s->seed.flow; ++i) /* nothing depends on rates but through what a step turns */
+        step[i] *= run->factored_beta / s->beta;
+#endif
     msfp_stage_move(s, step, 1.0);
     double next = msfp_stage_residual(run, s, &run->work, residual);
     while (fresh && next > size && factor > 0.05) {
@@ -173,7 +183,7 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
     const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF];
-    int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+    int good = FLOWS(s) ? run->factored_beta > 0.0 : fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     run->work_sign = 0;
     for (int i = 0; size > goal; ++i) {

@@ -108,6 +108,16 @@ static double support_power(const double *t, const msfp_point *at, const double 
 }
 #endif
 
+double msfp_load_power(const msfp_point *at, const msfp_work *w)
+{
+    double V[3], turning[3], power = 0.0;
+    msfp_body_V_get(w->body[NB], V);
+    msfp_body_wp_get(w->body[NB], turning);
+    for (int i = 0; i < 3; ++i)
+        power += at->load[i] * (V[i] - at->base[1][i]) + at->load[3 + i] * turning[i];
+    return power;
+}
+
 /* Work of the base on the stack by turning, of the rig's base point, and of the loads. */
 static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
 {
@@ -118,9 +128,7 @@ static double drive_power(const msfp_parameters *p, const msfp_point *at, const 
     msfp_body_wp_get(body, turning);
     msfp_body_t3_get(body, axis);
     msfp_top_parameters_x0_get(t, anchor);
-    for (int i = 0; i < 3; ++i)
-        relative[i] = V[i] - at->base[1][i];
-    double power = dot3(at->load, relative) + dot3(at->load + 3, turning);
+    double power = msfp_load_power(at, w);
     power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
     for (int i = 0; i < 2; ++i)
         power += (t[MSFP_TOP_PARAMETERS_K] * (C[i] - anchor[i]) + t[MSFP_TOP_PARAMETERS_C] * V[i]) * at->base[1][i];
