@@ -283,7 +283,7 @@ typedef struct {
 /* What a step without integration wants to know of the state it starts from (now) and ends at (next), and of the step
  * that led there: coordinates before it, its length (0: none since the start or a jump), powers before it. */
 typedef struct {
-    double q[MSFP_NB], h, power[MSFP_WORKS];
+    double q[MSFP_NB], h, power[MSFP_WORKS], jerk[MSFP_NB], span;
     double load[6], top[3], tilt, normal[MSFP_NB]; /* r_nn seen from the base, rotation about E2 */
 } msfp_passage;
 #endif
@@ -323,6 +323,7 @@ typedef struct {
     } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
+    int refreshed; /* the last stage found its first factors wanting */
     int shortened; /* the step at hand is a shorter one after Newton failed */
     long counts[MSFP_COUNTS];
     int status, status_surface, worst_surface;

@@ -49,21 +49,40 @@ static void tangent_over_normal(const msfp_work *w, const double *residual, doub
     }
 }
 
-double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual)
+/* Largest entry of a residual relative to its natural size. */
+static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
 {
     double scale[DOF], size = 0.0;
-    place(s);
-    ++run->counts[MSFP_COUNT_EVALUATIONS];
-    if (msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, NULL))
-        return INFINITY;
-    s->seed.same_base = 1;
     msfp_residual_scale(&run->parameters, w, scale);
     for (int i = 0; i < DOF; ++i)
         if (!(fabs(residual[i]) / scale[i] <= size)) {
             size = fabs(residual[i]) / scale[i];
             run->worst_surface = i / ND + 1;
         }
+    return size;
+}
+
+/* Residual over N, its largest entry relative to its natural size, and the tangent (or NULL). Returns a status. */
+static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual, double *tangent, double *size)
+{
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
+    if (status)
+        return status;
+    s->seed.same_base = 1;
+    *size = size_of(run, w, residual);
     over_normal(w, residual);
+    if (tangent)
+        tangent_over_normal(w, residual, tangent);
+    return MSFP_OK;
+}
+
+double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual)
+{
+    double size;
+    place(s);
+    if (evaluate(run, s, w, residual, NULL, &size))
+        return INFINITY;
     return size < INFINITY ? size : INFINITY;
 }
 
@@ -74,18 +93,15 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor)
             s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
 }
 
-/* Factors of the tangent at the present rates. */
-static int factorise(msfp_run *run, msfp_stage *s)
+/* Factors of the tangent at the present rates, with the residual there and its size. */
+static int factorise(msfp_run *run, msfp_stage *s, double *residual, double *size)
 {
-    double residual[DOF];
-    ++run->counts[MSFP_COUNT_EVALUATIONS];
+    place(s);
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
     run->factored_beta = 0.0;
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, run->factors);
+    const int status = evaluate(run, s, &run->work, residual, run->factors, size);
     if (status)
         return status;
-    over_normal(&run->work, residual);
-    tangent_over_normal(&run->work, residual, run->factors);
     run->work_sign = msfp_lu(run->factors, DOF, run->pivots);
     if (run->work_sign == 0)
         return MSFP_E_IRREGULAR;
@@ -125,7 +141,7 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
-        if (factorise(run, s))
+        if (factorise(run, s, residual, &size))
             break;
         size = take_step(run, s, residual, size, 1);
     }
@@ -167,7 +183,8 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
     if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
-        const int status = factorise(run, s);
+        double residual[DOF];
+        const int status = factorise(run, s, residual, &size);
         if (status)
             return failed(run, status, size);
     }
@@ -176,30 +193,40 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
     return failed(run, MSFP_E_IRREGULAR, size);
 }
 
+/* Whether the factors at hand may serve a stage to begin with. */
+static int trusted(const msfp_run *run, const msfp_stage *s)
+{
+    if (FLOWS(s))
+        return run->factored_beta > 0.0 && !run->refreshed;
+    return fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+}
+
 /* Factors serve as long as they reduce the residual tenfold: other stages, other steps of like size. The switches of
  * friction and rims make Newton semi-smooth. The sign of the determinant is looked at with every factorisation; while
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
-    double residual[DOF];
-    int good = FLOWS(s) ? run->factored_beta > 0.0 : fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
-    double size = msfp_stage_residual(run, s, &run->work, residual);
+    const double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 1e-1 : 1e-2) * run->options.rtol));
+    double residual[DOF], size = INFINITY;
+    int fresh = !trusted(run, s), status = MSFP_OK;
     run->work_sign = 0;
+    if (fresh)
+        status = factorise(run, s, residual, &size);
+    else
+        size = msfp_stage_residual(run, s, &run->work, residual);
+    run->refreshed = 0;
     for (int i = 0; size > goal; ++i) {
-        if (i == 30 || !(size < INFINITY))
-            return failed(run, MSFP_E_NEWTON, size);
+        if (i == 30 || !(size < INFINITY) || status)
+            return failed(run, status == MSFP_E_IRREGULAR ? status : MSFP_E_NEWTON, size);
         ++run->counts[MSFP_COUNT_NEWTON];
-        const int fresh = !good;
-        if (fresh) {
-            run->counts[MSFP_COUNT_FRESH_TANGENTS] += i > 0;
-            const int status = factorise(run, s);
-            if (status)
-                return failed(run, status, size);
-        }
         const double before = size;
         size = take_step(run, s, residual, size, fresh);
-        good = size < 0.1 * before;
+        fresh = size > goal && size >= 0.1 * before;
+        if (fresh) {
+            ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
+            run->refreshed = 1;
+            status = factorise(run, s, residual, &size);
+        }
     }
     return regular(run, s, size);
 }

@@ -35,7 +35,8 @@ static void pass(msfp_passage *to, const msfp_point *at, const msfp_work *w)
 
 void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
 {
-    run->passage.h = 0.0;
+    run->passage.h = run->passage.span = 0.0;
+    memset(run->passage.jerk, 0, sizeof run->passage.jerk);
     pass(&run->passage, at, &run->work);
 }
 
@@ -55,11 +56,18 @@ static void through(const msfp_run *run, msfp_stage *s, double h)
     s->seed.flow = 1;
 }
 
+static double cube(const msfp_run *run, int k, double h)
+{
+    const double c = run->passage.jerk[k] * h * (h + run->passage.h) * (h + run->passage.span);
+    const double b = 0.5 * run->now.a[k][ANGLE] * h * (h + run->passage.h);
+    return fabs(c) < 0.5 * fabs(b) ? c : 0.0;
+}
+
 /* Rates at which Newton starts: those of a motion that goes on as it went, or of bodies that stay. */
 static void begin(const msfp_run *run, msfp_stage *s, double h, int on)
 {
     for (int k = 0; k < NB; ++k) {
-        const double turn = on ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) : 0.0;
+        const double turn = on ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) + cube(run, k, h) : 0.0;
         s->at.v[k][ANGLE] = (turn - s->seed.turn[k]) / s->beta;
         s->f[k][0] = run->now.f[k][0];
     }
@@ -85,7 +93,10 @@ static double retraced(const msfp_run *run, double h)
         const double mean = (run->next.q[k][ANGLE] - run->now.q[k][ANGLE]) / h;
         const double first = mean - 0.5 * h * bend, last = mean + 0.5 * h * bend;
         if (first * last < 0.0) {
-            const double back = 0.5 * fmin(first * first, last * last) / fabs(bend);
+            const double v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE];
+            double back = 0.5 * fmin(first * first, last * last) / fabs(bend);
+            if (v * a < 0.0) /* it was about to turn back as it was */
+                back = fmin(back, 0.5 * v * v / fabs(a));
             worst = fmax(worst, back * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY]);
         }
     }
@@ -178,8 +189,10 @@ static void finish(msfp_run *run, const msfp_stage *s, double h)
         const double mean = (next->q[k][ANGLE] - now->q[k][ANGLE]) / h;
         next->a[k][ANGLE] = 2.0 * (next->v[k][ANGLE] - mean) / h;
         run->passing.q[k] = now->q[k][ANGLE];
+        run->passing.jerk[k] = run->passage.span > 0.0 ? 0.5 * (next->a[k][ANGLE] - now->a[k][ANGLE]) / (h + run->passage.span) : 0.0;
     }
     run->passing.h = h;
+    run->passing.span = run->passage.h > 0 ? h + run->passage.h : 0.0;
     memcpy(run->passing.power, now->power, sizeof now->power);
     pass(&run->passing, &s->at, &run->work);
     count_work(run, s, h);
