@@ -107,10 +107,11 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
         const double met = 0.0;
 #endif
         /* Rates far off make N, and what is measured by it, a number without a meaning. */
-        const double pressed = fmin(w->contact[k][MSFP_CONTACT_N], 1e3 * w->reference) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        const double normal = w->contact[k][MSFP_CONTACT_N], most = 1e3 * w->reference;
+        const double pressed = (normal < most ? normal : most) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
         const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
-            scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
+            scale[k * ND + i] = (i < NA ? natural : pressed) + 1e-12;
     }
 }
 

@@ -81,6 +81,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
         return status;
     next->t = run->now.t + h;
     msfp_heat_finish(run);
+    run->reached = *at;
     memcpy(next->q, at->q, sizeof next->q);
     memcpy(next->v, at->v, sizeof next->v);
     memcpy(next->a, last->a, sizeof next->a);

@@ -210,6 +210,8 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     }
     next->t = now->t + h;
     msfp_heat_finish(run);
+    memcpy(s.now.at.f, s.now.f, sizeof s.now.f);
+    run->reached = s.now.at;
     memcpy(next->q, s.now.at.q, sizeof next->q);
     memcpy(next->v, s.now.at.v, sizeof next->v);
     memcpy(next->a, s.now.at.a, sizeof next->a);

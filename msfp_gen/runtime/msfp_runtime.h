@@ -297,6 +297,7 @@ typedef struct {
     const double *jumps;
     int jump_count;
     msfp_options options;
+    msfp_point reached; /* where the evaluation that ended the last step was made, base and load included */
     /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
     int next_jump;
     msfp_state now, next;

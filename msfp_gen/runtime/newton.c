@@ -18,12 +18,13 @@ static const int unknown[ND] = MSFP_FREE;
 
 static void place(msfp_stage *s)
 {
-    for (int k = 0; k < NB; ++k)
+    const double rate = s->inertia / s->beta;
+    for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
             s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
-    for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i)
-            s->at.a[k][unknown[i]] = s->inertia * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]) / s->beta;
+            s->at.a[k][unknown[i]] = rate * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]);
+    }
 }
 
 /* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that

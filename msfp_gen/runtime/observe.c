@@ -225,7 +225,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     for (int j = 0; j < NB; ++j) {
         const double *contact = w->contact[j];
         row->normal[j] = contact[MSFP_CONTACT_N];
-        row->angles[j][0] = atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
+        row->angles[j][0] = MSFP_PLANAR ? 0.0 : atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
         row->angles[j][1] = atan2(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = sliding[j][MSFP_GAP_G];

@@ -198,11 +198,9 @@ int msfp_write_step(msfp_run *run)
     const double last = run->next.t * (1.0 + 1e-14);
     if (run->options.output_step <= 0.0) { /* the evaluation that ended the step is still there */
         msfp_row *row = new_row(run);
-        msfp_point at;
         if (!row)
             return MSFP_E_MEMORY;
-        msfp_to_point(run, &run->next, &at);
-        msfp_record(&run->parameters, &at, &run->work, row);
+        msfp_record(&run->parameters, &run->reached, &run->work, row);
         row->time = run->next.t;
         memcpy(row->work, run->next.work, sizeof row->work);
         return MSFP_OK;

@@ -175,12 +175,14 @@ static void count_work(msfp_run *run, const msfp_stage *s, double h)
     next->work[MSFP_WORK_INPUT] += load_work(run);
 }
 
-static void finish(msfp_run *run, const msfp_stage *s, double h)
+static void finish(msfp_run *run, msfp_stage *s, double h)
 {
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
     *next = *now;
     next->t = now->t + h;
+    memcpy(s->at.f, s->f, sizeof s->f);
+    run->reached = s->at;
     memcpy(next->q, s->at.q, sizeof next->q);
     memcpy(next->v, s->at.v, sizeof next->v);
     memcpy(next->f, s->f, sizeof next->f);
