@@ -180,11 +180,11 @@ def inertia_share(scene: Scene) -> float:
 def quasistatic(scene: Scene) -> bool:
     """Whether no force depends on a rate, to the tolerance: massless sliders in the plane then need no integration.
 
-    There must be no mass on top, and dampers must carry less of the friction than Y, Z may be wrong by.
+    There must be no mass on top, and dampers must carry little of the friction: rates are known to a hundredth at worst.
     """
     if scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
         return False
-    return damping_share(scene) <= 10 * scene.solver.rtol
+    return damping_share(scene) <= min(1e-3, 1e3 * scene.solver.rtol)
 
 
 def damping_share(scene: Scene) -> float:

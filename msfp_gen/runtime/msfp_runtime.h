@@ -185,6 +185,8 @@ typedef struct {
     const double *knots;        /* [pieces + 1] */
     const double *coefficients; /* [pieces][6][MSFP_DEGREE + 1], ascending powers of t - knot */
     int last;                   /* piece found last: the search starts there */
+    int held;                   /* the piece, counted from 1, whose coefficients are at hand with channels side by side */
+    double powers[MSFP_DEGREE + 1][6];
 } msfp_history;
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
@@ -360,6 +362,8 @@ const char *msfp_guard_name(int guard);
 /* Between the files of the runtime. */
 /* Friction of one surface: mu N f . slip, added to what Y, Z store and what is lost (3.16)-(3.18). */
 void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
+/* All but those of friction. */
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS]);
 /* Of the load on the top plate, in the frame of the base. */
 double msfp_load_power(const msfp_point *at, const msfp_work *w);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);

@@ -18,6 +18,11 @@ static const int unknown[ND] = MSFP_FREE;
 
 static void place(msfp_stage *s)
 {
+    if (FLOWS(s)) { /* the plane, no masses */
+        for (int k = 0; k < NB; ++k)
+            s->at.q[k][unknown[0]] = s->Q[k][unknown[0]] + s->beta * s->at.v[k][unknown[0]];
+        return;
+    }
     const double rate = s->inertia / s->beta;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
@@ -161,6 +166,21 @@ static double rounding(const msfp_stage *s)
     return fmax(1e-10, 2e-12 * speed / s->beta);
 }
 
+/* A rim with a damper is met with a jump of its force, c dg/dt, and the balance may lie within: where a gap is as small as
+ * the spring makes of that, no residual below the jump is asked for. */
+static double jump(const msfp_run *run, const msfp_stage *s)
+{
+    double worst = 0.0;
+    for (int j = 0; j < NB && MSFP_RIMS; ++j) {
+        const double *par = run->parameters.surface[j], *q = s->at.q[j], *v = s->at.v[j];
+        const double gap = (cos(q[0]) * cos(q[1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        const double force = par[MSFP_SURFACE_PARAMETERS_CC] * par[MSFP_SURFACE_PARAMETERS_R] * hypot(v[0], v[1]);
+        if (fabs(gap) * par[MSFP_SURFACE_PARAMETERS_KC] <= 10.0 * force)
+            worst = fmax(worst, force / (run->work.contact[j][MSFP_CONTACT_N] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01)));
+    }
+    return fmin(worst, 1e-4);
+}
+
 /* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
  * down through slopes alone: that inertia is of the order of the tilt squared, friction gives it either sign, and steps
  * of any use are longer than what it does. */
@@ -207,7 +227,7 @@ static int trusted(const msfp_run *run, const msfp_stage *s)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 1e-1 : 1e-2) * run->options.rtol));
+    double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 1e-1 : 1e-2) * run->options.rtol));
     double residual[DOF], size = INFINITY;
     int fresh = !trusted(run, s), status = MSFP_OK;
     run->work_sign = 0;
@@ -219,6 +239,8 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     for (int i = 0; size > goal; ++i) {
         if (i == 30 || !(size < INFINITY) || status)
             return failed(run, status == MSFP_E_IRREGULAR ? status : MSFP_E_NEWTON, size);
+        if (i == 10)
+            goal = fmax(goal, jump(run, s));
         ++run->counts[MSFP_COUNT_NEWTON];
         const double before = size;
         size = take_step(run, s, residual, size, fresh);

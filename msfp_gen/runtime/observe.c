@@ -158,18 +158,23 @@ static double lock_power(const msfp_work *w)
     return power;
 }
 
-void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS])
 {
     double total[3];
     energies(p, at, w, total);
     memset(power, 0, MSFP_WORKS * sizeof *power);
     power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
     power[MSFP_WORK_SEAT] = seat_power(w);
-    for (int j = 0; j < NB; ++j) {
-        msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
+    for (int j = 0; j < NB; ++j)
         if (w->rim_sum[j] != 0.0)
             power[MSFP_WORK_RIM] += rim_power(p, at, w, j);
-    }
+}
+
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+{
+    msfp_other_powers(p, at, w, power);
+    for (int j = 0; j < NB; ++j)
+        msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
 }
 
 static double restraint_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)

@@ -19,6 +19,7 @@ int msfp_is_quasistatic(const msfp_run *run)
 }
 
 #if MSFP_FLOW
+/* What the next step wants to know of a state. */
 static void pass(msfp_passage *to, const msfp_point *at, const msfp_work *w)
 {
     double C[3];
@@ -38,6 +39,8 @@ void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
     run->passage.h = run->passage.span = 0.0;
     memset(run->passage.jerk, 0, sizeof run->passage.jerk);
     pass(&run->passage, at, &run->work);
+    if (msfp_is_quasistatic(run)) /* the load's work is counted by itself */
+        run->now.power[MSFP_WORK_INPUT] -= msfp_load_power(at, &run->work);
 }
 
 /* q = Q + beta v makes v the slope at the end of the parabola through the last two states and the next. */
@@ -56,6 +59,7 @@ static void through(const msfp_run *run, msfp_stage *s, double h)
     s->seed.flow = 1;
 }
 
+/* What a cubic through the last four states adds to the parabola, where it adds little. */
 static double cube(const msfp_run *run, int k, double h)
 {
     const double c = run->passage.jerk[k] * h * (h + run->passage.h) * (h + run->passage.span);
@@ -103,6 +107,7 @@ static double retraced(const msfp_run *run, double h)
     return worst / (10.0 * run->options.rtol);
 }
 
+/* Y goes half a unit a step at most, as in implicit.c. */
 static double leap(const msfp_run *run)
 {
     double worst = 0.0;
@@ -119,7 +124,7 @@ double msfp_foreseen(const msfp_run *run, double h)
         const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE];
         const double reach = par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
         if (v * (v + a * h) < 0.0 && 0.5 * v * v / fabs(a) * reach > 5.0 * run->options.rtol)
-            h = -v / a;
+            h = fmax(-v / a, 0.02 * h);
     }
     for (int k = 0; k < NB; ++k) {
         const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE], Y = run->now.f[k][0];
@@ -166,7 +171,7 @@ static double load_work(const msfp_run *run)
 static void count_work(msfp_run *run, const msfp_stage *s, double h)
 {
     msfp_state *next = &run->next;
-    msfp_powers(&run->parameters, &s->at, s->f, &run->work, next->power);
+    msfp_other_powers(&run->parameters, &s->at, &run->work, next->power);
     next->power[MSFP_WORK_INPUT] -= msfp_load_power(&s->at, &run->work);
     for (int e = 0; e < MSFP_WORKS; ++e)
         if (e != MSFP_WORK_FRICTION && e != MSFP_WORK_FRICTION_STORED)
@@ -197,7 +202,6 @@ static void finish(msfp_run *run, msfp_stage *s, double h)
     run->passing.span = run->passage.h > 0 ? h + run->passage.h : 0.0;
     memcpy(run->passing.power, now->power, sizeof now->power);
     pass(&run->passing, &s->at, &run->work);
-    count_work(run, s, h);
 }
 
 int msfp_step_quasistatic(msfp_run *run, double h, double *error)
@@ -212,6 +216,8 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
         return status;
     finish(run, &s, h);
     *error = fmax(leap(run), retraced(run, h));
+    if (*error <= 1.0)
+        count_work(run, &s, h);
     return MSFP_OK;
 }
 #else

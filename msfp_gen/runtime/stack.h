@@ -54,6 +54,8 @@ MSFP_INLINE double msfp_flown(double Y, double slip)
         far += y;
         y = 0.0;
     }
+    if (y == 1.0) /* it has slid for long */
+        return sign;
     const double left = (1.0 - y) * exp(-2.0 * far);
     return sign * (1.0 + y - left) / (1.0 + y + left);
 }
@@ -74,6 +76,8 @@ MSFP_INLINE double msfp_flow_loss(double Y, double slip)
         far += y;
         y = 0.0;
     }
+    if (y == 1.0)
+        return far;
     const double left = (1.0 - y) * exp(-2.0 * far), end = (1.0 + y - left) / (1.0 + y + left);
     return far + log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
 }
