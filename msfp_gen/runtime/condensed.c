@@ -151,7 +151,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
     int pivots[DOF], good = 0;
-    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { .ca = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
     out->determinant = 1;

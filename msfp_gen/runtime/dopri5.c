@@ -73,7 +73,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
 {
     msfp_state *next = &run->next;
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
     const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, f, residual, NULL);

@@ -9,6 +9,10 @@ static void hold(msfp_history *h, int i)
         for (int k = 0; k <= MSFP_DEGREE; ++k)
             h->powers[k][channel] = piece[channel * (MSFP_DEGREE + 1) + k];
     h->held = i + 1;
+    h->degree = MSFP_DEGREE;
+    for (int blank = 1; h->degree > 0 && blank; h->degree -= blank)
+        for (int channel = 0; channel < 6; ++channel)
+            blank = blank && h->powers[h->degree][channel] == 0.0;
 }
 
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6])
@@ -23,7 +27,7 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6])
         hold(h, i);
     const double s = t - h->knots[i];
     double value[6] = { 0.0 }, rate[6] = { 0.0 }, second[6] = { 0.0 };
-    for (int k = MSFP_DEGREE; k >= 0; --k)
+    for (int k = h->degree; k >= 0; --k)
         for (int channel = 0; channel < 6; ++channel) {
             if (orders > 1) {
                 second[channel] = second[channel] * s + 2.0 * rate[channel];

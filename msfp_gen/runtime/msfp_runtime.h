@@ -185,7 +185,7 @@ typedef struct {
     const double *knots;        /* [pieces + 1] */
     const double *coefficients; /* [pieces][6][MSFP_DEGREE + 1], ascending powers of t - knot */
     int last;                   /* piece found last: the search starts there */
-    int held;                   /* the piece, counted from 1, whose coefficients are at hand with channels side by side */
+    int held, degree;           /* the piece, counted from 1, whose coefficients are at hand with channels side by side */
     double powers[MSFP_DEGREE + 1][6];
 } msfp_history;
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
@@ -326,7 +326,6 @@ typedef struct {
     } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
-    int refreshed; /* the last stage found its first factors wanting */
     int shortened; /* the step at hand is a shorter one after Newton failed */
     long counts[MSFP_COUNTS];
     int status, status_surface, worst_surface;

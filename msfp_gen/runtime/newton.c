@@ -121,10 +121,6 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double s
     double step[DOF], factor = 1.0;
     memcpy(step, residual, sizeof step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
-#if MSFP_FLOW
-    for (int i = 0; i < DOF && s->seed.flow; ++i) /* nothing depends on rates but through what a step turns */
-        step[i] *= run->factored_beta / s->beta;
-#endif
     msfp_stage_move(s, step, 1.0);
     double next = msfp_stage_residual(run, s, &run->work, residual);
     while (fresh && next > size && factor > 0.05) {
@@ -217,9 +213,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
 /* Whether the factors at hand may serve a stage to begin with. */
 static int trusted(const msfp_run *run, const msfp_stage *s)
 {
-    if (FLOWS(s))
-        return run->factored_beta > 0.0 && !run->refreshed;
-    return fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+    return !FLOWS(s) && fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
 }
 
 /* Factors serve as long as they reduce the residual tenfold: other stages, other steps of like size. The switches of
@@ -235,7 +229,6 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
         status = factorise(run, s, residual, &size);
     else
         size = msfp_stage_residual(run, s, &run->work, residual);
-    run->refreshed = 0;
     for (int i = 0; size > goal; ++i) {
         if (i == 30 || !(size < INFINITY) || status)
             return failed(run, status == MSFP_E_IRREGULAR ? status : MSFP_E_NEWTON, size);
@@ -247,7 +240,6 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
         fresh = size > goal && size >= 0.1 * before;
         if (fresh) {
             ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
-            run->refreshed = 1;
             status = factorise(run, s, residual, &size);
         }
     }

@@ -209,7 +209,7 @@ static double rim_energy(const msfp_parameters *p, const double *gap)
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
     double residual[MSFP_DOF], f[NB][2];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
 #if MSFP_LAW

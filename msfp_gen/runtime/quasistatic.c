@@ -64,7 +64,7 @@ static double cube(const msfp_run *run, int k, double h)
 {
     const double c = run->passage.jerk[k] * h * (h + run->passage.h) * (h + run->passage.span);
     const double b = 0.5 * run->now.a[k][ANGLE] * h * (h + run->passage.h);
-    return fabs(c) < 0.5 * fabs(b) ? c : 0.0;
+    return fabs(c) < 0.5 * fabs(b) + 0.02 * fabs(h * run->now.v[k][ANGLE]) ? c : 0.0;
 }
 
 /* Rates at which Newton starts: those of a motion that goes on as it went, or of bodies that stay. */
@@ -128,8 +128,12 @@ double msfp_foreseen(const msfp_run *run, double h)
     }
     for (int k = 0; k < NB; ++k) {
         const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE], Y = run->now.f[k][0];
-        for (int i = 0; i < 20 && fabs(msfp_flown(Y, msfp_reach(par) * h * (v + 0.5 * h * a)) - Y) > 0.4; ++i)
+        for (int i = 0; i < 20; ++i) {
+            const double slip = msfp_reach(par) * h * (v + 0.5 * h * a);
+            if (fabs(slip) <= 0.4 || fabs(msfp_flown(Y, slip) - Y) <= 0.4) /* Y goes no further than the slip */
+                break;
             h *= 0.7;
+        }
     }
     return h;
 }

@@ -64,7 +64,7 @@ static int settle(msfp_run *run)
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
