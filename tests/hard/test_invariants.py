@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 from random_scenes import LAYOUTS, bearings, between, capacity, scenes
-from stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, pendulum_angle, swing
+from stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, nested_radii, pendulum_angle, swing
 from support import Array
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, simulate
@@ -53,6 +54,17 @@ def test_energy_balances_and_only_friction_and_rims_take_it(scene: Scene) -> Non
     assert np.linalg.norm(history.friction_state, axis=2).max() < 1 + 10 * scene.solver.rtol
     assert history.rim_force.min() >= 0 and not history.rim_force[history.gap > 0].any()
     assert history.normal_force.min() > 0
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_rows_between_steps_keep_to_the_friction_disc(layout: tuple[int, int, int], rtol: float) -> None:
+    """The parabola through a step passed it by up to nine tolerances where the motion turns; steps themselves stay
+    within one."""
+    bearing = a_stack(layout, nested_radii(layout), yield_displacement=1e-3)
+    top = a_rig(tilt=0.0 if layout == (2, 1, 0) else 1e6)
+    scene = Scene(bearing, Motion.harmonic(0.1, 0.5, cycles=2), top, PLANAR, Solver(rtol=rtol), output_step=2e-3)
+    assert np.linalg.norm(simulate(scene).history.friction_state, axis=2).max() < 1 + rtol
 
 
 @holds(6, 200, KNOWN, scene=scenes(law="isotropic"))
