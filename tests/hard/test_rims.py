@@ -103,7 +103,7 @@ def test_energy_put_in_through_a_stiff_rig_is_what_rim_and_friction_have(
     layout: tuple[int, int, int], rtol: float
 ) -> None:
     """Rig and rim carry the load, angles have no error to speak of and steps are long. The default used to be off by
-    0.9 to 3.7 %: force times a prescribed rate is curved over such a step, and the method's own weights are of order 2."""
+    0.9 to 3.7 %: force times a prescribed rate is curved over such a step, which second order does not see."""
     bearing = a_stack(layout, [0.36], capacity=0.026, friction=0.0056, yield_displacement=1e-4, rim_stiffness=2e7,
                       body={"mass": 0.065, "height": 0.0076})  # fmt: skip
     scene = Scene(
