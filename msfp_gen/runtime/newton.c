@@ -88,10 +88,10 @@ static int factorise(msfp_run *run, msfp_stage *s)
 }
 
 /* Newton step from the residual at hand (scaled in place). Where a full step does not reduce the residual, halve it. */
-static double take_step(msfp_run *run, msfp_stage *s, double *residual, double size, int fresh)
+static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *step, double size, int fresh)
 {
-    double step[DOF], factor = 1.0;
-    memcpy(step, residual, sizeof step);
+    double factor = 1.0;
+    memcpy(step, residual, DOF * sizeof *step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
     msfp_stage_move(s, step, 1.0);
     double next = msfp_stage_residual(run, s, &run->work, residual);
@@ -110,14 +110,14 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double s
 
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
-    double residual[DOF];
+    double residual[DOF], step[DOF];
     const double with_inertia = s->seed.ca;
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
         if (factorise(run, s))
             break;
-        size = take_step(run, s, residual, size, 1);
+        size = take_step(run, s, residual, step, size, 1);
     }
     s->inertia = 1.0;
     s->seed.ca = with_inertia;
@@ -132,6 +132,20 @@ static double rounding(const msfp_stage *s)
         for (int d = 3; d < NQ; ++d)
             speed = fmax(speed, fabs(s->at.v[k][d]));
     return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
+/* Whether a step of Newton is below the last digits of the rates. Over a short time those are accelerations, and times a
+ * heavy mass a residual that no further step makes smaller. */
+static int drowned(const msfp_stage *s, const double *step)
+{
+    double speed[2] = { 0.0 }, moved[2] = { 0.0 }; /* of angles, of separations */
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int kind = unknown[i] >= 3;
+            speed[kind] = fmax(speed[kind], fabs(s->at.v[k][unknown[i]]));
+            moved[kind] = fmax(moved[kind], fabs(step[k * ND + i]));
+        }
+    return moved[0] <= 4e-15 * speed[0] && moved[1] <= 4e-15 * speed[1];
 }
 
 /* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
@@ -172,7 +186,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
     const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
-    double residual[DOF];
+    double residual[DOF], step[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     run->work_sign = 0;
@@ -188,8 +202,10 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
                 return failed(run, status, size);
         }
         const double before = size;
-        size = take_step(run, s, residual, size, fresh);
+        size = take_step(run, s, residual, step, size, fresh);
         good = size < 0.1 * before;
+        if (fresh && size < 1e-3 && drowned(s, step))
+            break;
     }
     return regular(run, s, size);
 }
