@@ -180,7 +180,7 @@ def inertia_share(scene: Scene) -> float:
 def quasistatic(scene: Scene) -> bool:
     """Whether no force depends on a rate, to the tolerance: massless sliders in the plane then need no integration.
 
-    There must be no mass on top, and dampers must carry little of the friction: rates are known to a hundredth at worst.
+    There must be no mass on top, and dampers must carry little of the friction: rates are known to a hundredth.
     """
     if scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
         return False

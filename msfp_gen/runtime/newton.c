@@ -116,10 +116,10 @@ static int factorise(msfp_run *run, msfp_stage *s, double *residual, double *siz
 }
 
 /* Newton step from the residual at hand (scaled in place). Where a full step does not reduce the residual, halve it. */
-static double take_step(msfp_run *run, msfp_stage *s, double *residual, double size, int fresh)
+static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *step, double size, int fresh)
 {
-    double step[DOF], factor = 1.0;
-    memcpy(step, residual, sizeof step);
+    double factor = 1.0;
+    memcpy(step, residual, DOF * sizeof *step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
     msfp_stage_move(s, step, 1.0);
     double next = msfp_stage_residual(run, s, &run->work, residual);
@@ -138,14 +138,14 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double s
 
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
-    double residual[DOF];
+    double residual[DOF], step[DOF];
     const double with_inertia = s->seed.ca;
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
         if (factorise(run, s, residual, &size))
             break;
-        size = take_step(run, s, residual, size, 1);
+        size = take_step(run, s, residual, step, size, 1);
     }
     s->inertia = 1.0;
     s->seed.ca = with_inertia;
@@ -175,6 +175,20 @@ static double jump(const msfp_run *run, const msfp_stage *s)
             worst = fmax(worst, force / (run->work.contact[j][MSFP_CONTACT_N] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01)));
     }
     return fmin(worst, 1e-4);
+}
+
+/* Whether a step of Newton is below the last digits of the rates. Over a short time those are accelerations, and times a
+ * heavy mass a residual that no further step makes smaller. */
+static int drowned(const msfp_stage *s, const double *step)
+{
+    double speed[2] = { 0.0 }, moved[2] = { 0.0 }; /* of angles, of separations */
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int kind = unknown[i] >= 3;
+            speed[kind] = fmax(speed[kind], fabs(s->at.v[k][unknown[i]]));
+            moved[kind] = fmax(moved[kind], fabs(step[k * ND + i]));
+        }
+    return moved[0] <= 4e-15 * speed[0] && moved[1] <= 4e-15 * speed[1];
 }
 
 /* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
@@ -222,21 +236,25 @@ static int trusted(const msfp_run *run, const msfp_stage *s)
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
     double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 1e-1 : 1e-2) * run->options.rtol));
-    double residual[DOF], size = INFINITY;
+    double residual[DOF], step[DOF], size = INFINITY;
     int fresh = !trusted(run, s), status = MSFP_OK;
     run->work_sign = 0;
     if (fresh)
         status = factorise(run, s, residual, &size);
     else
         size = msfp_stage_residual(run, s, &run->work, residual);
+    if (status && status != MSFP_E_IRREGULAR) /* a guess for which forces cannot be formed */
+        status = MSFP_E_NEWTON;
     for (int i = 0; size > goal; ++i) {
-        if (i == 30 || !(size < INFINITY) || status)
-            return failed(run, status == MSFP_E_IRREGULAR ? status : MSFP_E_NEWTON, size);
+        if (status || i == 30 || !(size < INFINITY))
+            return failed(run, status ? status : MSFP_E_NEWTON, size);
         if (i == 10)
             goal = fmax(goal, jump(run, s));
         ++run->counts[MSFP_COUNT_NEWTON];
         const double before = size;
-        size = take_step(run, s, residual, size, fresh);
+        size = take_step(run, s, residual, step, size, fresh);
+        if (fresh && size < 1e-3 && drowned(s, step))
+            break;
         fresh = size > goal && size >= 0.1 * before;
         if (fresh) {
             ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
