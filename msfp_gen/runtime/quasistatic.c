@@ -88,7 +88,9 @@ static int solve(msfp_run *run, msfp_stage *s, double h)
     return status;
 }
 
-/* How far Y may be off because a surface slips to and fro within the step: the way back of the parabola. */
+/* How far Y may be off because a surface slips to and fro within the step: the way back of the parabola. Where slip turns
+ * sharply that goes with the length of the step, elsewhere with its square; as an error it is squared for the controller,
+ * which takes the cube root. */
 static double retraced(const msfp_run *run, double h)
 {
     double worst = 0.0;
@@ -104,7 +106,8 @@ static double retraced(const msfp_run *run, double h)
             worst = fmax(worst, back * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY]);
         }
     }
-    return worst / (10.0 * run->options.rtol);
+    worst /= 10.0 * run->options.rtol;
+    return worst * worst;
 }
 
 /* Y goes half a unit a step at most, as in implicit.c. */
