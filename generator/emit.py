@@ -8,12 +8,10 @@ from importlib import resources
 
 import sympy as sp
 
-from msfp_gen.layout import Effects
 from msfp_gen.version import __version__
 
 from .derive import Equations
 from .heat import HEAT_KERNEL
-from .hysteresis import grows_alone
 from .lower import Kernel, column, own_inputs
 from .printer import to_c
 from .program import Block, Use
@@ -169,12 +167,6 @@ def lanes(surfaces: int) -> int:
     return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
 
 
-def flows(effects: Effects) -> bool:
-    """Whether Y follows slip in closed form and nothing else needs integration, whatever the length of a step."""
-    quasistatic = effects.dimension == "planar" and effects.sliders == "massless" and not effects.uplift
-    return quasistatic and effects.law is None and grows_alone(effects.bouc_wen)
-
-
 def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
     """Render all generated files: {file name: text}."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -209,7 +201,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "scalars": scalar_quantities,
         "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields) + (law is not None),
         "law": law,
-        "flows": flows(spec.effects),
+        "flows": spec.effects.flows,
         "heat": HEAT_KERNEL if law is not None and law.heats else (),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
     }

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support import scene_of
 
-from generator.emit import flows
-from generator.hysteresis import HYSTERESIS, Hysteresis
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.choice import damping_share, quasistatic
+from msfp_gen.explain import explain
+from msfp_gen.generator.hysteresis import HYSTERESIS, Hysteresis
 from msfp_gen.result import Result
 
 PLANAR = Effects(dimension="planar", sliders="massless")
@@ -45,16 +45,25 @@ def test_where_nothing_needs_integration() -> None:
     assert damping_share(replace(TEST2, bearing=slippery)) == np.inf
 
 
+def test_explain_says_so() -> None:
+    def steps(scene: Scene) -> str:
+        table = next(table for table in explain(scene) if table.title == "solver")
+        return next(row[1] for row in table.rows if row[0] == "steps")
+
+    assert steps(TEST2).startswith("exact whatever their length") and "dampers carry 0.043% of friction" in steps(TEST2)
+    assert steps(replace(TEST2, effects=Effects())) == "integrated"
+
+
 def test_which_models_flow(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert flows(PLANAR) and flows(replace(PLANAR, bouc_wen="isotropic"))
+    assert PLANAR.flows and replace(PLANAR, bouc_wen="isotropic").flows
     for other in ({"sliders": "inertial"}, {"dimension": "spatial"}, {"friction": "velocity"}):
-        assert not flows(replace(PLANAR, **other))
+        assert not replace(PLANAR, **other).flows
     later = Hysteresis("grows past the middle only", lambda yu, zv, step: (step(yu - 0.5), step(zv)))
     monkeypatch.setitem(HYSTERESIS, "report", later)
-    assert flows(PLANAR), "the switch is asked at one unit either way"
+    assert PLANAR.flows, "the switch is asked at one unit either way"
     never = Hysteresis("never grows", lambda yu, zv, step: (0.0 * step(yu), step(zv)))
     monkeypatch.setitem(HYSTERESIS, "report", never)
-    assert not flows(PLANAR)
+    assert not PLANAR.flows
 
 
 @pytest.mark.parametrize("name", ["fenz-test2", "fenz-test5"])

@@ -235,7 +235,7 @@ static int trusted(const msfp_run *run, const msfp_stage *s)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 1e-1 : 1e-2) * run->options.rtol));
+    double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 0.3 : 1e-2) * run->options.rtol));
     double residual[DOF], step[DOF], size = INFINITY;
     int fresh = !trusted(run, s), status = MSFP_OK;
     run->work_sign = 0;
