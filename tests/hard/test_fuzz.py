@@ -103,7 +103,7 @@ def test_the_second_method_sees_a_wrong_run() -> None:
 
 
 def test_no_step_goes_over_a_moment_without_a_solution() -> None:
-    """A mass thrown against a rim, whose normal force has no bound at 1.376 s: the default used to step over that and go
+    """A mass thrown against a rim; its normal force has no bound at 1.376 s. The default used to step over that and go
     on with 13 kJ where there had been 0.2 kJ. A run with a tolerance 300 times smaller ends there too."""
     scene = fuzz_scenes.case(21, 1741).scene
     for rtol in (scene.solver.rtol, 1e-6):
