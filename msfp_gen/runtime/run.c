@@ -193,8 +193,10 @@ static double controlled(const msfp_run *run, double error)
 /* Shrink after a failure that a shorter step may cure. Returns nonzero when there is no shorter step. */
 static int shrink(msfp_run *run, double h, double factor, int status)
 {
+    /* The moment in which a body leaves is known well enough before steps in flight are nothing but rounding. */
+    const double smallest = status == MSFP_E_PARTED ? SHORTEST_TO_EVENT : SMALLEST_STEP;
     run->h = h * factor;
-    if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
+    if (run->h >= smallest * fmax(1.0, run->now.t))
         return 0;
     run->status = msfp_last_word(run, status);
     return 1;
