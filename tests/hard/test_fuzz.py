@@ -119,3 +119,13 @@ def test_a_run_whose_energy_does_not_close_says_so() -> None:
     (note,) = [note for note in simulate(scene).notes if note.kind == "energy"]
     assert 0.02 < note.value < 0.2 and "give a smaller solver.rtol" in note.line
     assert not simulate(replace(scene, solver=replace(scene.solver, rtol=1e-6))).notes
+
+
+def test_a_residual_is_measured_by_the_force_of_its_rim_too() -> None:
+    """Before an interface parts a rim pushes a hundred times more than the normal force. Measured by the latter alone
+    Newton was asked for what rounding does not leave, and the run ended as newton."""
+    scene = fuzz_scenes.case(41, 1010).scene
+    error = failure_of(scene)
+    assert error.status == "uplift" and isinstance(error.result, Result)
+    last = error.result.history
+    assert last.rim_force[-1].max() > 3 * last.normal_force[-1].min()

@@ -192,8 +192,8 @@ def test_a_heavy_mass_on_massless_sliders_is_not_called_irregular() -> None:
 
 @pytest.mark.parametrize("rtol", [1e-4, 3e-5])
 def test_loose_sliders_hop_until_one_has_left_its_place(rtol: float) -> None:
-    """Nearly without friction nothing brings the sliders back between two hops. That used to end as newton at 0.89 s,
-    where residuals of rounding were asked to be smaller, and later with steps of nanoseconds towards the moment at which
+    """Nearly without friction nothing brings the sliders back between hops. That used to end as newton at 0.89 s, where
+    residuals of rounding were asked to be smaller, and later with steps of nanoseconds towards the moment at which
     a slider is beside its cup: when that is depends on chaos, what it is does not."""
     from test_uplift import shaken
 
