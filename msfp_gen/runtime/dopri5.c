@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "msfp_model.h"
+#include "run.h"
 #include "heat.h"
 
 #define NB MSFP_NB
@@ -76,7 +77,7 @@ static int works(msfp_run *run, double h)
     msfp_point at;
     msfp_work w;
     double f[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(next->work, run->now.work, sizeof next->work); /* of which nothing is used in the middle */
     msfp_interpolate(run, 0.5, &middle);
     msfp_to_point(run, &middle, &at);
