@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -40,6 +40,13 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
     "libraries": ("-lm",),
 }
+
+LANES: dict[int, tuple[str, ...]] = {
+    8: ("-march=x86-64-v4",),
+    4: ("-march=x86-64-v3",),
+    2: (),
+}
+"""Runs side by side in a vector -> what tells the compiler of the vectors: AVX-512, AVX2, and what every x86-64 has."""
 
 # What the first line that explains a failure looks like: gcc and clang, Cython, the linker.
 FAILURES = (
@@ -97,8 +104,9 @@ def check_headers() -> Path:
 
 
 def compile_extension(
-    sources: dict[str, str], module: str, folder: Path, progress: Callable[[int, int], None] | None = None
-) -> Path:
+    sources: dict[str, str], module: str, folder: Path, progress: Callable[[int, int], None] | None = None,
+    extra: Mapping[str, tuple[str, ...]] | None = None,
+) -> Path:  # fmt: skip
     """Write `sources` into `folder` and build the extension `module` there.
 
     Parameters
@@ -111,6 +119,8 @@ def compile_extension(
         A folder of the caller's; sources, `build.log` and the extension stay there, also after a failure.
     progress
         Called with how many C files are compiled, and how many there are.
+    extra
+        File name -> flags that this file alone takes as well.
 
     Returns
     -------
@@ -129,7 +139,7 @@ def compile_extension(
         (folder / name).write_text(text, encoding="utf-8")
     log = Log(folder)
     units = sorted(name for name in sources if name.endswith(".c"))
-    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler)] for name in units)]
+    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler, (extra or {}).get(name, ()))] for name in units)]
     for done in _at_once(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
@@ -193,8 +203,8 @@ def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> I
             raise
 
 
-def _unit(name: str, compiler: Compiler) -> Step:
-    return Step(name, (*compiler.command, *FLAGS["c"], "-c", name, "-o", _object(name)))
+def _unit(name: str, compiler: Compiler, extra: tuple[str, ...]) -> Step:
+    return Step(name, (*compiler.command, *FLAGS["c"], *extra, "-c", name, "-o", _object(name)))
 
 
 def _wrapper(module: str, compiler: Compiler, include: Path) -> list[Step]:

@@ -2,6 +2,9 @@
 #include <math.h>
 #include <string.h>
 #include "newton.h"
+#if MSFP_BATCH
+#include "batch.h"
+#endif
 
 #define DOF MSFP_DOF
 #define NB MSFP_NB
@@ -43,21 +46,67 @@ static void tangent_over_normal(const msfp_work *w, const double *residual, doub
     }
 }
 
-double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual)
+/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
+static double rounding(const msfp_stage *s)
+{
+    double speed = 0.0;
+    for (int k = 0; k < NB; ++k)
+        for (int d = 3; d < NQ; ++d)
+            speed = fmax(speed, fabs(s->at.v[k][d]));
+    return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
+/* The residual at which Newton has arrived. */
+static double goal_of(const msfp_run *run, const msfp_stage *s)
+{
+    return fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
+}
+
+/* Largest entry of a residual relative to its natural size. */
+static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
 {
     double scale[DOF], size = 0.0;
-    place(s);
-    ++run->counts[MSFP_COUNT_EVALUATIONS];
-    if (msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, NULL))
-        return INFINITY;
-    s->seed.same_base = 1;
     msfp_residual_scale(&run->parameters, w, scale);
     for (int i = 0; i < DOF; ++i)
         if (!(fabs(residual[i]) / scale[i] <= size)) {
             size = fabs(residual[i]) / scale[i];
             run->worst_surface = i / ND + 1;
         }
+    return size;
+}
+
+/* Residual over N, its largest entry relative to its natural size (or NULL), and the tangent (or NULL). Returns a status. */
+static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual, double *tangent, double *size)
+{
+    ++run->counts[MSFP_COUNT_EVALUATIONS];
+#if MSFP_BATCH
+    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, goal_of(run, s), MSFP_OK, -1, INFINITY };
+    if (msfp_batch_asked(&request)) {
+        if (size && !request.status) {
+            *size = request.size;
+            run->worst_surface = request.worst < 0 ? run->worst_surface : request.worst / ND + 1;
+        }
+        return request.status;
+    }
+#endif
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
+    if (status)
+        return status;
+    if (size)
+        *size = size_of(run, w, residual);
     over_normal(w, residual);
+    if (tangent)
+        tangent_over_normal(w, residual, tangent);
+    return MSFP_OK;
+}
+
+double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual)
+{
+    double size;
+    place(s);
+    if (evaluate(run, s, w, residual, NULL, &size))
+        return INFINITY;
+    s->seed.same_base = 1;
     return size < INFINITY ? size : INFINITY;
 }
 
@@ -72,14 +121,11 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor)
 static int factorise(msfp_run *run, msfp_stage *s)
 {
     double residual[DOF];
-    ++run->counts[MSFP_COUNT_EVALUATIONS];
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
     run->factored_beta = 0.0;
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &run->work, s->f, residual, run->factors);
+    const int status = evaluate(run, s, &run->work, residual, run->factors, NULL);
     if (status)
         return status;
-    over_normal(&run->work, residual);
-    tangent_over_normal(&run->work, residual, run->factors);
     run->work_sign = msfp_lu(run->factors, DOF, run->pivots);
     if (run->work_sign == 0)
         return MSFP_E_IRREGULAR;
@@ -124,16 +170,6 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
     run->factored_beta = 0.0;
 }
 
-/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
-static double rounding(const msfp_stage *s)
-{
-    double speed = 0.0;
-    for (int k = 0; k < NB; ++k)
-        for (int d = 3; d < NQ; ++d)
-            speed = fmax(speed, fabs(s->at.v[k][d]));
-    return fmax(1e-10, 2e-12 * speed / s->beta);
-}
-
 /* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
  * down through slopes alone: that inertia is of the order of the tilt squared, friction gives it either sign, and steps
  * of any use are longer than what it does. */
@@ -171,7 +207,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
+    const double goal = goal_of(run, s);
     double residual[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = msfp_stage_residual(run, s, &run->work, residual);

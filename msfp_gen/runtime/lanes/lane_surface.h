@@ -1,0 +1,177 @@
+/* lane_surface.h: the sliding surfaces of several runs at once: surface.c and contact.c with a run in every lane. */
+#ifndef MSFP_LANE_SURFACE_H
+#define MSFP_LANE_SURFACE_H
+#include "lane_work.h"
+
+#define ROWS (MOMENT + FRICTION + 1) /* rows of the contact's Jacobian: M, dY, dZ, N */
+
+/* ---- rims: few are met at a time, so run by run ---------------------------------------------------------------- */
+
+/* Rim force of surface j in one run; columns of force and moment where they are asked for. */
+static void lane_rim_met(lane_work *w, int j, int run, lane *drf, lane *dmoment /* NULL: no tangent */)
+{
+#if MSFP_RIMS
+    double x[MSFP_RIM_LOCAL], out[MSFP_RIM_SIZE], drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL], identity[MSFP_RIM_LOCAL * MSFP_RIM_LOCAL] = { 0 };
+    for (int i = 0; i < MSFP_RIM_LOCAL; ++i) {
+        x[i] = w->out.x[j + 1][coordinate(i / PAIR, i % PAIR)][run];
+        identity[i * MSFP_RIM_LOCAL + i] = 1.0;
+    }
+    if (dmoment)
+        msfp_rim_tangent(w->parameters[run]->surface[j], x, out, identity, drim);
+    else
+        msfp_rim(w->parameters[run]->surface[j], x, out);
+    w->more.rim_sum[j][run] = out[MSFP_RIM_FC];
+    if (!(out[MSFP_RIM_FC] < 0.0))
+        return;
+    w->rim_active[j][run] = 1;
+    for (int i = 0; i < MSFP_RIM_SIZE; ++i)
+        w->out.rim[j][i][run] = out[i];
+    for (int r = 0; r < (VECTOR + MOMENT) && dmoment; ++r)
+        for (int c = 0; c < DOF; ++c) {
+            double sum = 0.0;
+            for (int i = 0; i < MSFP_RIM_LOCAL; ++i)
+                sum += drim[r * MSFP_RIM_LOCAL + i] * w->dx[j + 1][coordinate(i / PAIR, i % PAIR) * DOF + c][run];
+            (r < VECTOR ? drf + r * DOF : dmoment + (r - VECTOR) * DOF)[c][run] = sum;
+        }
+#else
+    (void)w, (void)j, (void)run, (void)drf, (void)dmoment;
+#endif
+}
+
+static void lane_rims(lane_work *w, int j, lane *drf, lane *dmoment)
+{
+    memset(w->out.rim[j], 0, sizeof w->out.rim[j]);
+    memset(w->rim_active[j], 0, sizeof w->rim_active[j]);
+    w->more.rim_sum[j] = lane_of(0.0);
+    if (dmoment) {
+        memset(drf, 0, VECTOR * DOF * sizeof *drf);
+        memset(dmoment, 0, MOMENT * DOF * sizeof *dmoment);
+    }
+    if (!MSFP_RIMS)
+        return;
+    const lane_mask near = ~(lane_body_cp(w->out.body[j + 1]) * lane_body_ct(w->out.body[j + 1]) > w->in.rim_cosine[j]);
+    for (int run = 0; run < W && lane_any(near); ++run)
+        if (near[run])
+            lane_rim_met(w, j, run, drf, dmoment);
+}
+
+/* ---- friction: Y, Z by their stage formula ---------------------------------------------------------------------- */
+
+/* x of the 1x1 or 2x2 system a x = b, in place of b. */
+LANE_INLINE void lane_solve_small(const lane *a, lane *b)
+{
+#if MSFP_PLANAR
+    b[0] /= a[0];
+#else
+    const lane inverse = 1.0 / (a[0] * a[3] - a[1] * a[2]);
+    const lane x = (b[0] * a[3] - a[1] * b[1]) * inverse;
+    b[1] = (a[0] * b[1] - a[2] * b[0]) * inverse;
+    b[0] = x;
+#endif
+}
+
+/* Newton on Y, Z of surface j, in the runs that are not there yet; what overshoots goes half its last step back. */
+LANE_INLINE void lane_friction(lane_work *w, int j)
+{
+    const lane *par = w->in.parts.surface[j], *local = w->out.local[j], beta = w->in.seed.beta;
+    lane *out = w->out.contact[j], step[FRICTION], best = lane_of(INFINITY);
+    const lane accuracy = lane_max(w->in.seed.accuracy, lane_of(1e-12));
+    lane_mask done = { 0 };
+    for (int r = 0; r < FRICTION; ++r)
+        step[r] = lane_of(0.0);
+    for (int i = 0;; ++i) {
+        lane a[FRICTION * FRICTION], newton[FRICTION], size = lane_of(0.0), sum = lane_of(0.0);
+        lane_contact(par, local, w->in.f[j], out);
+        for (int r = 0; r < FRICTION; ++r) {
+            newton[r] = w->in.f[j][r] - w->in.seed.fp[j][r] - beta * out[MSFP_CONTACT_DY + r];
+            size = lane_max(size, lane_abs(newton[r]));
+            sum += lane_abs(newton[r]);
+        }
+        const lane_mask broken = ~(sum < INFINITY) & ~done;
+        const lane_mask there = ~(size > accuracy * (1.0 + lane_abs(beta * out[MSFP_CONTACT_DY])));
+        for (int run = 0; run < W && lane_any(broken); ++run)
+            if (broken[run])
+                w->status[run] = i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
+        done |= there | broken;
+        if (!lane_any(~done))
+            return;
+        for (int run = 0; run < W && i == 59; ++run)
+            if (!done[run])
+                w->status[run] = MSFP_E_NEWTON;
+        if (i == 59)
+            return;
+        for (int r = 0; r < FRICTION * FRICTION; ++r)
+            a[r] = (r % (FRICTION + 1) == 0) - beta * out[MSFP_CONTACT_YY + r];
+        lane_solve_small(a, newton);
+        const lane_mask overshot = size > best;
+        for (int r = 0; r < FRICTION; ++r) {
+            step[r] = lane_choose(overshot, 0.5 * step[r], newton[r]);
+            const lane moved = w->in.f[j][r] + lane_choose(overshot, step[r], -step[r]);
+            w->in.f[j][r] = lane_choose(done, w->in.f[j][r], moved);
+        }
+        best = lane_choose(overshot, best, size);
+    }
+}
+
+/* Jacobian of the moment and of N with Y, Z following their stage formula: [MOMENT + 1][INPUTS]. */
+LANE_INLINE void lane_condense(const lane_work *w, int j, lane *condensed)
+{
+    lane jacobian[ROWS * MSFP_LOCAL], a[FRICTION][FRICTION + INPUTS];
+    lane_contact_jacobian(w->in.parts.surface[j], w->out.local[j], w->in.f[j], jacobian);
+    for (int r = 0; r < FRICTION; ++r)
+        for (int c = 0; c < FRICTION + INPUTS; ++c) {
+            const lane from = jacobian[(MOMENT + r) * MSFP_LOCAL + (c < FRICTION ? INPUTS + c : c - FRICTION)];
+            a[r][c] = c < FRICTION ? (r == c) - w->in.seed.beta * from : w->in.seed.beta * from;
+        }
+    for (int k = 0; k < FRICTION; ++k) /* Gauss and Jordan */
+        for (int r = 0; r < FRICTION; ++r) {
+            const lane factor = r == k ? 1.0 - 1.0 / a[k][k] : a[r][k] / a[k][k];
+            for (int c = k + 1; c < FRICTION + INPUTS && r != k; ++c)
+                a[r][c] -= factor * a[k][c];
+        }
+    for (int r = 0; r <= MOMENT; ++r) {
+        const lane *row = jacobian + (r < MOMENT ? r : MOMENT + FRICTION) * MSFP_LOCAL;
+        for (int k = 0; k < INPUTS; ++k) {
+            lane sum = row[k];
+            for (int c = 0; c < FRICTION; ++c)
+                sum += row[INPUTS + c] * a[c][FRICTION + k] / a[c][c];
+            condensed[r * INPUTS + k] = sum;
+        }
+    }
+}
+
+/* ---- one surface ------------------------------------------------------------------------------------------------ */
+
+/* Moment of surface j on the body above. */
+LANE_INLINE void lane_surface(lane_work *w, int j)
+{
+    lane moment[MOMENT];
+    lane_rims(w, j, NULL, NULL);
+    lane_surface_local(w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j]);
+    lane_friction(w, j);
+    for (int r = 0; r < MOMENT; ++r)
+        moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
+    lane_moment_to_world(w->out.body[j], moment, w->out.moment[j]);
+}
+
+LANE_INLINE void lane_surface_columns(lane_work *w, int j)
+{
+    lane drf[VECTOR * DOF], dlocal[INPUTS * DOF], dmoment[MOMENT * DOF], moment[MOMENT], condensed[(MOMENT + 1) * INPUTS];
+    lane_rims(w, j, drf, dmoment);
+    lane_surface_local_tangent(DOF, w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j],
+                               w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
+    lane_friction(w, j);
+    lane_condense(w, j, condensed);
+    for (int r = 0; r < MOMENT; ++r)
+        moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
+    for (int r = 0; r <= MOMENT; ++r)
+        for (int c = 0; c < DOF; ++c) {
+            lane sum = r < MOMENT ? dmoment[r * DOF + c] : lane_of(0.0);
+            for (int k = 0; k < INPUTS; ++k)
+                sum += condensed[r * INPUTS + k] * dlocal[k * DOF + c];
+            *(r < MOMENT ? &dmoment[r * DOF + c] : &w->dnormal[j][c]) = sum;
+        }
+    lane_moment_to_world_tangent(DOF, w->out.body[j], moment, w->out.moment[j], w->dbody[j], dmoment, w->dmoment[j]);
+}
+
+#endif
