@@ -21,7 +21,7 @@ from time import perf_counter
 from types import ModuleType
 
 from msfp_gen import cache
-from msfp_gen.compiler import LANES, LOG_NAME, compile_extension
+from msfp_gen.compiler import FLAGS, LANES, LOG_NAME, compile_extension
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.layout import Effects, Layout, ModelSpec
 from msfp_gen.model import Model
@@ -160,7 +160,7 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
     generated = generate(entry.spec, entry.module, batch=True) if lanes else generate(entry.spec, entry.module)
     sources = {**runtime_sources(lanes), **generated.files}
     width = f"-DMSFP_WIDTH={lanes}"
-    extra = {"lanes.c": (width, "-Wno-psabi", *LANES[lanes]), "batch.c": (width,)} if lanes else {}
+    extra = {name: (width, *FLAGS["lanes"], *LANES[lanes]) for name in sources} if lanes else {}
     begin = perf_counter()
     extension = compile_extension(
         sources, entry.module, folder, lambda done, count: say(f"compiling {entry.module} ({done} of {count} files)",

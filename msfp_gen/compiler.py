@@ -34,8 +34,10 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "c": (
         "-std=c99", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-O2", "-fno-math-errno", "-fno-trapping-math",
         "-ffp-contract=off",
-        *shlex.split(os.environ.get("MSFP_GEN_CFLAGS", "")),
     ),
+    # A batch agrees with one run at a time to rounding: a product and a sum may be one operation, a quotient a product.
+    "lanes": ("-O3", "-ffp-contract=fast", "-freciprocal-math", "-Wno-psabi"),
+    "user": tuple(shlex.split(os.environ.get("MSFP_GEN_CFLAGS", ""))),
     # Cython's own output is not ours to keep free of warnings, and it is not where the time goes.
     "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
     "libraries": ("-lm",),
@@ -204,7 +206,7 @@ def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> I
 
 
 def _unit(name: str, compiler: Compiler, extra: tuple[str, ...]) -> Step:
-    return Step(name, (*compiler.command, *FLAGS["c"], *extra, "-c", name, "-o", _object(name)))
+    return Step(name, (*compiler.command, *FLAGS["c"], *extra, *FLAGS["user"], "-c", name, "-o", _object(name)))
 
 
 def _wrapper(module: str, compiler: Compiler, include: Path) -> list[Step]:

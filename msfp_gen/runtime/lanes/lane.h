@@ -11,6 +11,7 @@
 #include <string.h>
 
 #define LANES_ALL for (int lane_index = 0; lane_index < MSFP_WIDTH; ++lane_index)
+#define LANE_BITS ((1u << MSFP_WIDTH) - 1)
 typedef double lane __attribute__((vector_size(8 * MSFP_WIDTH), aligned(8 * MSFP_WIDTH)));
 typedef long long lane_mask __attribute__((vector_size(8 * MSFP_WIDTH), aligned(8 * MSFP_WIDTH)));
 #define LANE_INLINE __attribute__((always_inline)) static inline
@@ -45,11 +46,16 @@ LANE_INLINE lane lane_min(lane x, lane y) { return lane_choose(y < x, y, x); }
 
 LANE_INLINE lane lane_step(lane x) { return lane_choose(x > 0.0, lane_of(1.0), lane_of(0.0)); }
 
-LANE_INLINE int lane_any(lane_mask where)
+/* A bit for every lane. */
+LANE_INLINE unsigned lane_bits(lane_mask where)
 {
-    long long all = 0;
-    LANES_ALL all |= where[lane_index];
-    return all != 0;
+#if MSFP_WIDTH == 8
+    return _mm512_movepi64_mask((__m512i)where);
+#elif MSFP_WIDTH == 4
+    return (unsigned)_mm256_movemask_pd((__m256d)where);
+#else
+    return (unsigned)_mm_movemask_pd((__m128d)where);
+#endif
 }
 
 #ifdef MSFP_EXACT

@@ -49,9 +49,9 @@ static void lane_rims(lane_work *w, int j, lane *drf, lane *dmoment)
     }
     if (!MSFP_RIMS)
         return;
-    const lane_mask near = ~(lane_body_cp(w->out.body[j + 1]) * lane_body_ct(w->out.body[j + 1]) > w->in.rim_cosine[j]);
-    for (int run = 0; run < W && lane_any(near); ++run)
-        if (near[run])
+    const unsigned away = lane_bits(lane_body_cp(w->out.body[j + 1]) * w->out.body[j + 1][MSFP_BODY_CT] > w->in.rim_cosine[j]);
+    for (int run = 0; run < W && away != LANE_BITS; ++run)
+        if (!(away >> run & 1))
             lane_rim_met(w, j, run, drf, dmoment);
 }
 
@@ -70,47 +70,65 @@ LANE_INLINE void lane_solve_small(const lane *a, lane *b)
 #endif
 }
 
-/* Newton on Y, Z of surface j, in the runs that are not there yet; what overshoots goes half its last step back. */
-LANE_INLINE void lane_friction(lane_work *w, int j)
+typedef struct {
+    lane step[FRICTION], best;
+    unsigned done; /* runs that are there, or broken */
+} lane_progress;
+
+/* One Newton step on Y, Z of surface j in the runs that are not there yet; what overshoots goes half its last step back. */
+LANE_INLINE void lane_improve(lane_work *w, int j, int i, lane_progress *p)
 {
-    const lane *par = w->in.parts.surface[j], *local = w->out.local[j], beta = w->in.seed.beta;
-    lane *out = w->out.contact[j], step[FRICTION], best = lane_of(INFINITY);
+    const lane *par = w->in.parts.surface[j], beta = w->in.seed.beta;
     const lane accuracy = lane_max(w->in.seed.accuracy, lane_of(1e-12));
-    lane_mask done = { 0 };
-    for (int r = 0; r < FRICTION; ++r)
-        step[r] = lane_of(0.0);
-    for (int i = 0;; ++i) {
-        lane a[FRICTION * FRICTION], newton[FRICTION], size = lane_of(0.0), sum = lane_of(0.0);
-        lane_contact(par, local, w->in.f[j], out);
-        for (int r = 0; r < FRICTION; ++r) {
-            newton[r] = w->in.f[j][r] - w->in.seed.fp[j][r] - beta * out[MSFP_CONTACT_DY + r];
-            size = lane_max(size, lane_abs(newton[r]));
-            sum += lane_abs(newton[r]);
-        }
-        const lane_mask broken = ~(sum < INFINITY) & ~done;
-        const lane_mask there = ~(size > accuracy * (1.0 + lane_abs(beta * out[MSFP_CONTACT_DY])));
-        for (int run = 0; run < W && lane_any(broken); ++run)
-            if (broken[run])
-                w->status[run] = i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
-        done |= there | broken;
-        if (!lane_any(~done))
-            return;
-        for (int run = 0; run < W && i == 59; ++run)
-            if (!done[run])
-                w->status[run] = MSFP_E_NEWTON;
-        if (i == 59)
-            return;
-        for (int r = 0; r < FRICTION * FRICTION; ++r)
-            a[r] = (r % (FRICTION + 1) == 0) - beta * out[MSFP_CONTACT_YY + r];
-        lane_solve_small(a, newton);
-        const lane_mask overshot = size > best;
-        for (int r = 0; r < FRICTION; ++r) {
-            step[r] = lane_choose(overshot, 0.5 * step[r], newton[r]);
-            const lane moved = w->in.f[j][r] + lane_choose(overshot, step[r], -step[r]);
-            w->in.f[j][r] = lane_choose(done, w->in.f[j][r], moved);
-        }
-        best = lane_choose(overshot, best, size);
+    lane *out = w->out.contact[j], a[FRICTION * FRICTION], newton[FRICTION], size = lane_of(0.0), sum = lane_of(0.0);
+    lane_contact(par, w->out.local[j], w->in.f[j], out);
+    for (int r = 0; r < FRICTION; ++r) {
+        newton[r] = w->in.f[j][r] - w->in.seed.fp[j][r] - beta * out[MSFP_CONTACT_DY + r];
+        size = lane_max(size, lane_abs(newton[r]));
+        sum += lane_abs(newton[r]);
     }
+    const unsigned broken = ~lane_bits(sum < INFINITY) & LANE_BITS & ~p->done;
+    const lane_mask there = ~(size > accuracy * (1.0 + lane_abs(beta * out[MSFP_CONTACT_DY])));
+    for (int run = 0; run < W && broken; ++run)
+        if (broken >> run & 1)
+            w->status[run] = i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
+    p->done |= lane_bits(there) | broken;
+    if (p->done == LANE_BITS)
+        return;
+    for (int r = 0; r < FRICTION * FRICTION; ++r)
+        a[r] = (r % (FRICTION + 1) == 0) - beta * out[MSFP_CONTACT_YY + r];
+    lane_solve_small(a, newton);
+    const lane_mask overshot = size > p->best;
+    for (int r = 0; r < FRICTION; ++r) {
+        p->step[r] = lane_choose(overshot, 0.5 * p->step[r], newton[r]);
+        const lane moved = w->in.f[j][r] + lane_choose(overshot, p->step[r], -p->step[r]);
+        w->in.f[j][r] = lane_choose(there, w->in.f[j][r], moved);
+    }
+    p->best = lane_choose(overshot, p->best, size);
+}
+
+/* Newton on Y, Z of all surfaces in turn, so that one does not wait for the square roots of another. */
+LANE_INLINE void lane_friction(lane_work *w)
+{
+    lane_progress progress[NB];
+    unsigned done = 0;
+    for (int j = 0; j < NB; ++j) {
+        for (int r = 0; r < FRICTION; ++r)
+            progress[j].step[r] = lane_of(0.0);
+        progress[j].best = lane_of(INFINITY);
+        progress[j].done = 0;
+    }
+    for (int i = 0; i < 60 && done != LANE_BITS; ++i) {
+        done = LANE_BITS;
+        for (int j = 0; j < NB; ++j) {
+            if (progress[j].done != LANE_BITS)
+                lane_improve(w, j, i, &progress[j]);
+            done &= progress[j].done;
+        }
+    }
+    for (int run = 0; run < W; ++run)
+        if (!(done >> run & 1) && !w->status[run])
+            w->status[run] = MSFP_E_NEWTON;
 }
 
 /* Jacobian of the moment and of N with Y, Z following their stage formula: [MOMENT + 1][INPUTS]. */
@@ -142,25 +160,26 @@ LANE_INLINE void lane_condense(const lane_work *w, int j, lane *condensed)
 
 /* ---- one surface ------------------------------------------------------------------------------------------------ */
 
-/* Moment of surface j on the body above. */
-LANE_INLINE void lane_surface(lane_work *w, int j)
+/* Moments of all surfaces on the bodies above. */
+LANE_INLINE void lane_surfaces(lane_work *w)
 {
-    lane moment[MOMENT];
-    lane_rims(w, j, NULL, NULL);
-    lane_surface_local(w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j]);
-    lane_friction(w, j);
-    for (int r = 0; r < MOMENT; ++r)
-        moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
-    lane_moment_to_world(w->out.body[j], moment, w->out.moment[j]);
+    for (int j = 0; j < NB; ++j) {
+        lane_rims(w, j, NULL, NULL);
+        lane_surface_local(w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j]);
+    }
+    lane_friction(w);
+    for (int j = 0; j < NB; ++j) {
+        lane moment[MOMENT];
+        for (int r = 0; r < MOMENT; ++r)
+            moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
+        lane_moment_to_world(w->out.body[j], moment, w->out.moment[j]);
+    }
 }
 
-LANE_INLINE void lane_surface_columns(lane_work *w, int j)
+/* Columns of the moment and of N of surface j from those of what it is given. */
+LANE_INLINE void lane_turn_columns(lane_work *w, int j, const lane *dlocal, lane *dmoment)
 {
-    lane drf[VECTOR * DOF], dlocal[INPUTS * DOF], dmoment[MOMENT * DOF], moment[MOMENT], condensed[(MOMENT + 1) * INPUTS];
-    lane_rims(w, j, drf, dmoment);
-    lane_surface_local_tangent(DOF, w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j],
-                               w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
-    lane_friction(w, j);
+    lane moment[MOMENT], condensed[(MOMENT + 1) * INPUTS];
     lane_condense(w, j, condensed);
     for (int r = 0; r < MOMENT; ++r)
         moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
@@ -172,6 +191,20 @@ LANE_INLINE void lane_surface_columns(lane_work *w, int j)
             *(r < MOMENT ? &dmoment[r * DOF + c] : &w->dnormal[j][c]) = sum;
         }
     lane_moment_to_world_tangent(DOF, w->out.body[j], moment, w->out.moment[j], w->dbody[j], dmoment, w->dmoment[j]);
+}
+
+/* The same with columns. */
+LANE_INLINE void lane_surfaces_columns(lane_work *w)
+{
+    lane drf[VECTOR * DOF], dlocal[NB][INPUTS * DOF], dmoment[NB][MOMENT * DOF];
+    for (int j = 0; j < NB; ++j) {
+        lane_rims(w, j, drf, dmoment[j]);
+        lane_surface_local_tangent(DOF, w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j],
+                                   w->out.local[j], w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal[j]);
+    }
+    lane_friction(w);
+    for (int j = 0; j < NB; ++j)
+        lane_turn_columns(w, j, dlocal[j], dmoment[j]);
 }
 
 #endif

@@ -211,11 +211,10 @@ void msfp_lanes(lane_work *w, msfp_request *const *requests, int count)
     stack_up(w, tangent);
     top(w, tangent);
     forces(w, tangent);
-    for (int j = 0; j < NB; ++j)
-        if (tangent)
-            lane_surface_columns(w, j);
-        else
-            lane_surface(w, j);
+    if (tangent)
+        lane_surfaces_columns(w);
+    else
+        lane_surfaces(w);
     balances(w, tangent);
     measure(w);
     over_normal(w, tangent);
