@@ -92,6 +92,7 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
     const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
     if (status)
         return status;
+    s->seed.same_base = 1;
     if (size)
         *size = size_of(run, w, residual);
     over_normal(w, residual);
@@ -106,7 +107,6 @@ double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *r
     place(s);
     if (evaluate(run, s, w, residual, NULL, &size))
         return INFINITY;
-    s->seed.same_base = 1;
     return size < INFINITY ? size : INFINITY;
 }
 

@@ -20,7 +20,7 @@ typedef struct {
 struct msfp_batch {
     strand strands[MSFP_MOST_RUNS];
     void *pointer; /* of the stack of who called msfp_batch_advance */
-    int current;
+    int current, runs; /* runs: how many there are */
     int ready[MSFP_MOST_RUNS], ready_count;
     int waiting[KINDS][MSFP_MOST_RUNS], waiting_count[KINDS];
     lane_work *lanes;
@@ -130,13 +130,14 @@ int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run)
             return status;
     }
     s->run = run;
+    ++b->runs;
     b->ready[b->ready_count++] = slot;
     return MSFP_OK;
 }
 
 int msfp_batch_asked(msfp_request *request)
 {
-    if (!active)
+    if (!active || active->runs <= MSFP_WIDTH / 4)
         return 0;
     strand *s = &active->strands[active->current];
     s->request = request;
@@ -160,6 +161,7 @@ static int go_on(msfp_batch *b, int *ended)
         } else
             ended[count++] = slot;
     }
+    b->runs -= count;
     return count;
 }
 

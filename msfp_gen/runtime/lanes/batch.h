@@ -30,7 +30,8 @@ void msfp_batch_free(msfp_batch *b);
 int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run);
 /* Go on for a while or until a run has ended; the slots that have become free. */
 int msfp_batch_advance(msfp_batch *b, long evaluations, int *ended);
-/* Whether the caller is a run of a batch; then a request is answered when this returns. */
+/* Whether the caller is a run of a batch; then a request is answered when this returns. The last few runs of a batch go
+ * alone: vectors that are nearly empty cost more. */
 int msfp_batch_asked(msfp_request *request);
 
 /* lanes.c: up to MSFP_WIDTH requests at once, all with a tangent or none. */
