@@ -70,64 +70,76 @@ LANE_INLINE void lane_solve_small(const lane *a, lane *b)
 #endif
 }
 
+/* Newton's progress with one surface. */
 typedef struct {
-    lane step[FRICTION], best;
-    unsigned done; /* runs that are there, or broken */
+    lane newton[FRICTION], step[FRICTION], size, best;
+    lane_mask there;
 } lane_progress;
 
-/* One Newton step on Y, Z of surface j in the runs that are not there yet; what overshoots goes half its last step back. */
-LANE_INLINE void lane_improve(lane_work *w, int j, int i, lane_progress *p)
+/* What is left of the stage formula of surface j. */
+LANE_INLINE void lane_miss(lane_work *w, int j, lane_progress *p, unsigned *broken)
 {
-    const lane *par = w->in.parts.surface[j], beta = w->in.seed.beta;
-    const lane accuracy = lane_max(w->in.seed.accuracy, lane_of(1e-12));
-    lane *out = w->out.contact[j], a[FRICTION * FRICTION], newton[FRICTION], size = lane_of(0.0), sum = lane_of(0.0);
-    lane_contact(par, w->out.local[j], w->in.f[j], out);
+    const lane beta = w->in.seed.beta, accuracy = lane_max(w->in.seed.accuracy, lane_of(1e-12));
+    lane *out = w->out.contact[j], sum = lane_of(0.0);
+    lane_contact(w->in.parts.surface[j], w->out.local[j], w->in.f[j], out);
+    p->size = lane_of(0.0);
     for (int r = 0; r < FRICTION; ++r) {
-        newton[r] = w->in.f[j][r] - w->in.seed.fp[j][r] - beta * out[MSFP_CONTACT_DY + r];
-        size = lane_max(size, lane_abs(newton[r]));
-        sum += lane_abs(newton[r]);
+        p->newton[r] = w->in.f[j][r] - w->in.seed.fp[j][r] - beta * out[MSFP_CONTACT_DY + r];
+        p->size = lane_max(p->size, lane_abs(p->newton[r]));
+        sum += lane_abs(p->newton[r]);
     }
-    const unsigned broken = ~lane_bits(sum < INFINITY) & LANE_BITS & ~p->done;
-    const lane_mask there = ~(size > accuracy * (1.0 + lane_abs(beta * out[MSFP_CONTACT_DY])));
-    for (int run = 0; run < W && broken; ++run)
-        if (broken >> run & 1)
-            w->status[run] = i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
-    p->done |= lane_bits(there) | broken;
-    if (p->done == LANE_BITS)
-        return;
-    for (int r = 0; r < FRICTION * FRICTION; ++r)
-        a[r] = (r % (FRICTION + 1) == 0) - beta * out[MSFP_CONTACT_YY + r];
-    lane_solve_small(a, newton);
-    const lane_mask overshot = size > p->best;
-    for (int r = 0; r < FRICTION; ++r) {
-        p->step[r] = lane_choose(overshot, 0.5 * p->step[r], newton[r]);
-        const lane moved = w->in.f[j][r] + lane_choose(overshot, p->step[r], -p->step[r]);
-        w->in.f[j][r] = lane_choose(there, w->in.f[j][r], moved);
-    }
-    p->best = lane_choose(overshot, p->best, size);
+    p->there = ~(p->size > accuracy * (1.0 + lane_abs(beta * out[MSFP_CONTACT_DY])));
+    *broken |= ~lane_bits(sum < INFINITY) & LANE_BITS;
 }
 
-/* Newton on Y, Z of all surfaces in turn, so that one does not wait for the square roots of another. */
+/* A Newton step on Y, Z of surface j in the runs that are not there yet; what overshoots goes half its last step back. */
+LANE_INLINE void lane_improve(lane_work *w, int j, lane_progress *p, lane_mask still)
+{
+    const lane_mask overshot = p->size > p->best;
+    lane a[FRICTION * FRICTION];
+    for (int r = 0; r < FRICTION * FRICTION; ++r)
+        a[r] = (r % (FRICTION + 1) == 0) - w->in.seed.beta * w->out.contact[j][MSFP_CONTACT_YY + r];
+    lane_solve_small(a, p->newton);
+    for (int r = 0; r < FRICTION; ++r) {
+        p->step[r] = lane_choose(overshot, 0.5 * p->step[r], p->newton[r]);
+        const lane moved = w->in.f[j][r] + lane_choose(overshot, p->step[r], -p->step[r]);
+        w->in.f[j][r] = lane_choose(p->there | still, w->in.f[j][r], moved);
+    }
+    p->best = lane_choose(overshot, p->best, p->size);
+}
+
+/* Newton on Y, Z of all surfaces in turn, so that one does not wait for the square roots of another. A run of which one
+ * surface has no finite value is left as it is. */
 LANE_INLINE void lane_friction(lane_work *w)
 {
     lane_progress progress[NB];
-    unsigned done = 0;
+    unsigned broken = 0, done = 0;
+    lane_mask still = { 0 };
     for (int j = 0; j < NB; ++j) {
         for (int r = 0; r < FRICTION; ++r)
             progress[j].step[r] = lane_of(0.0);
         progress[j].best = lane_of(INFINITY);
-        progress[j].done = 0;
     }
     for (int i = 0; i < 60 && done != LANE_BITS; ++i) {
-        done = LANE_BITS;
+        const unsigned before = broken;
+        unsigned there = LANE_BITS;
         for (int j = 0; j < NB; ++j) {
-            if (progress[j].done != LANE_BITS)
-                lane_improve(w, j, i, &progress[j]);
-            done &= progress[j].done;
+            if (i == 0 || lane_bits(progress[j].there) != LANE_BITS)
+                lane_miss(w, j, &progress[j], &broken);
+            there &= lane_bits(progress[j].there);
         }
+        for (int run = 0; run < W && broken != before; ++run)
+            if ((broken & ~before & ~done) >> run & 1) {
+                w->status[run] = i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
+                still[run] = -1;
+            }
+        done |= there | broken;
+        for (int j = 0; j < NB && done != LANE_BITS; ++j)
+            if (lane_bits(progress[j].there) != LANE_BITS)
+                lane_improve(w, j, &progress[j], still);
     }
-    for (int run = 0; run < W; ++run)
-        if (!(done >> run & 1) && !w->status[run])
+    for (int run = 0; run < W && done != LANE_BITS; ++run)
+        if (!(done >> run & 1))
             w->status[run] = MSFP_E_NEWTON;
 }
 
