@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from msfp_gen.build import build_model
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.lanes import alone_because, chosen_width
+from msfp_gen.lanes import alone_because, chosen_width, too_few
 from msfp_gen.layout import ModelSpec
 from msfp_gen.scene import Scene
 from msfp_gen.simulation import Course, Segment, check
@@ -52,8 +52,8 @@ def simulate_batch(
 ) -> list[Result]:
     """Integrate many scenes: those of one model side by side in the lanes of a vector.
 
-    Every run has its own steps, events and end, by the same code as `simulate`; results agree with those of `simulate`
-    to what rounding makes of them, far within the tolerance, and do not depend on what else is in the batch.
+    Every run has its own steps, events and end, by the same code as `simulate`; results differ from those of `simulate`
+    by what rounding makes of them, within the tolerance of the scene.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def simulate_batch(
     Returns
     -------
     list of Result
-        In the order of the scenes. A run that could not go on raises nothing: its `status` and `message` say so, and its
-        history goes as far as it came. `provenance["batch"]` says how each was run, and why if one at a time.
+        In the order of the scenes. A run that could not go on raises nothing: its `status` and `message` say so, and
+        its history goes as far as it came. `provenance["batch"]` says how each was run, and why if one at a time.
 
     Raises
     ------
@@ -93,13 +93,20 @@ def simulate_batch(
             groups.setdefault(leg.kind, []).append(leg)
         todo = []
         for (spec, reason), legs in groups.items():
-            few = "the only scene of its model" if len(legs) == 1 else "asked for" if not width else reason
-            many = 0 if few else width
+            why = reason or _reason(width, len(legs) / workers)
+            many = 0 if why else width
             begin = time.perf_counter()
             model = build_model(spec.layout, spec.effects, lanes=many)
             setup = (time.perf_counter() - begin) / len(legs)
-            todo += _run(Queue(legs, model, setup, f"{many} lanes" if many else f"one at a time: {few}", desk), workers)
+            todo += _run(Queue(legs, model, setup, f"{many} lanes" if many else f"one at a time: {why}", desk), workers)
     return [result for _, result in sorted(desk.results.items())]
+
+
+def _reason(width: int, scenes: float) -> str:
+    """Why scenes of one model, so many a worker, run one at a time; empty where they go in lanes."""
+    if not width:
+        return "no lanes here, or none asked for"
+    return "too few scenes of its model" if scenes <= too_few(width) else ""
 
 
 def _checked(scenes: Iterable[Scene], workers: int) -> list[Scene]:

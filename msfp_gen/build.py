@@ -160,7 +160,7 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
     generated = generate(entry.spec, entry.module, batch=True) if lanes else generate(entry.spec, entry.module)
     sources = {**runtime_sources(lanes), **generated.files}
     width = f"-DMSFP_WIDTH={lanes}"
-    extra = {name: (width, *FLAGS["lanes"], *LANES[lanes]) for name in sources} if lanes else {}
+    extra = dict.fromkeys(sources, (width, *FLAGS["lanes"], *LANES[lanes])) if lanes else {}
     begin = perf_counter()
     extension = compile_extension(
         sources, entry.module, folder, lambda done, count: say(f"compiling {entry.module} ({done} of {count} files)",

@@ -86,7 +86,7 @@ def cache_root() -> Path:
 
 
 def module_name(spec: ModelSpec, lanes: int = 0) -> str:
-    """Name of the extension module, `msfp_<n>_<m>_<p>`; of one for batches, with how many runs it takes side by side."""
+    """Name of the extension module, `msfp_<n>_<m>_<p>`, and `_lanes<width>` where it is made for batches."""
     return f"msfp_{spec.layout.name}" + (f"_lanes{lanes}" if lanes else "")
 
 

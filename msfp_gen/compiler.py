@@ -141,7 +141,8 @@ def compile_extension(
         (folder / name).write_text(text, encoding="utf-8")
     log = Log(folder)
     units = sorted(name for name in sources if name.endswith(".c"))
-    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler, (extra or {}).get(name, ()))] for name in units)]
+    more = extra or {}
+    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler, more.get(name, ()))] for name in units)]
     for done in _at_once(chains, log.run):
         if progress is not None:
             progress(done, len(chains))

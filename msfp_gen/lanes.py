@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from msfp_gen.layout import Effects
 
 VARIABLE = "MSFP_GEN_LANES"
+WORTH_IT = 4
+"""Lanes from which a batch gains: two side by side take longer than one after the other (docs/performance.md)."""
 # What a processor must say of itself for each width, as Linux names it: x86-64-v4, x86-64-v3, any.
 NEEDED = {
     8: {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
@@ -58,13 +60,19 @@ def chosen_width(asked: int | None) -> int:
         name, value = VARIABLE, int(text) if text.isdecimal() else -1
     here = widths_here()
     if value is None:
-        return here[0] if here else 0
+        return here[0] if here and here[0] >= WORTH_IT else 0
     if isinstance(value, bool) or not isinstance(value, int) or value not in (0, *LANES):
         given = os.environ[VARIABLE] if name == VARIABLE else value
         raise InputError(f"{name} = {given!r}: give 8, 4 or 2 runs side by side, or 0 for one at a time")
     if value and value not in here:
-        raise InputError(f"{name} = {value}: this machine has {', '.join(map(str, here)) or 'no lanes'}; give that or 0")
+        found = ", ".join(map(str, here)) or "no lanes"
+        raise InputError(f"{name} = {value}: this machine has {found}; give one of these, or 0 for one at a time")
     return value
+
+
+def too_few(width: int) -> int:
+    """As many runs as this go faster one at a time: most lanes would be empty (batch.h has the same)."""
+    return width // 4 + 1
 
 
 def alone_because(effects: Effects, method: str) -> str:

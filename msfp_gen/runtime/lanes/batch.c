@@ -137,7 +137,7 @@ int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run)
 
 int msfp_batch_asked(msfp_request *request)
 {
-    if (!active || active->runs <= MSFP_WIDTH / 4)
+    if (!active || active->runs <= MSFP_FEW)
         return 0;
     strand *s = &active->strands[active->current];
     s->request = request;

@@ -5,7 +5,8 @@
 #define MSFP_BATCH_H
 #include "msfp_model.h"
 
-#define MSFP_MOST_RUNS 64 /* of one batch at a time */
+#define MSFP_MOST_RUNS 64            /* of one batch at a time */
+#define MSFP_FEW (MSFP_WIDTH / 4 + 1) /* so many runs go faster alone: most lanes would be empty */
 
 /* An evaluation that a run waits for: the arguments of msfp_condensed, and what becomes of it. */
 typedef struct {
@@ -30,8 +31,8 @@ void msfp_batch_free(msfp_batch *b);
 int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run);
 /* Go on for a while or until a run has ended; the slots that have become free. */
 int msfp_batch_advance(msfp_batch *b, long evaluations, int *ended);
-/* Whether the caller is a run of a batch; then a request is answered when this returns. The last few runs of a batch go
- * alone: vectors that are nearly empty cost more. */
+/* Whether the caller is a run of a batch; then a request is answered when this returns. The last MSFP_FEW runs of a batch
+ * go alone. */
 int msfp_batch_asked(msfp_request *request);
 
 /* lanes.c: up to MSFP_WIDTH requests at once, all with a tangent or none. */
