@@ -30,9 +30,10 @@ def tables(parts: list[dict[str, Any]]) -> str:
     ends, good = summed(parts, "ends"), summed(parts, "sensible_ends")
     counts, used = summed(parts, "counts"), summed(parts, "scenes_with")
     worst = max((part["largest_deviation"] or 0.0 for part in parts), default=0.0)
-    seeds = ", ".join(str(part["seed"]) for part in parts)
+    drawn = ", ".join(f"{part['seed']}{' ' + part['which'] if part['which'] != 'all' else ''}" for part in parts)
+    commits = ", ".join(sorted({part["commit"] for part in parts}))
     lines = [
-        f"{scenes} scenes of {parts[0]['models']} models (seeds {seeds}): {len(faults)} faults. Of {sensible} sensible ones "
+        f"{scenes} scenes of {parts[0]['models']} models (seeds {drawn}; commit {commits}): {len(faults)} faults. Of {sensible} sensible ones "
         f"{len(failures)} failed, {100 * len(failures) / max(sensible, 1):.2g} %. {checked} successes were held against the "
         f"second method, the largest deviation {worst:.2f} of what is allowed; for {silent} more it found no solution of its own.",
         "",

@@ -35,8 +35,10 @@ def wrong(result: Result) -> list[str]:
     history, energy, rtol = result.history, result.history.energy, result.scene.solver.rtol
     surfaces = result.scene.bearing.surfaces
     rise = sum(float(s.max()) ** 2 / (2 * x.radius) for s, x in zip(history.sliding.T, surfaces, strict=True))
-    # What the load gives and takes counts too: the input is the difference of that and what the base does.
-    peak = max(float(np.abs(energy["input"]).max()), load_of(result.scene.top) * rise, 1e-12)
+    # Not what is put in alone: that is the difference of what the load and the base do, and next to nothing where springs
+    # that were bent at the start give back what the dampers take.
+    terms = [float(np.abs(values).max()) for name, values in energy.items() if name != "numerical"]
+    peak = max(*terms, load_of(result.scene.top) * rise, 1e-12)
     unresolved = 3 * float(history.normal_force.max()) * result.scene.solver.angle_tolerance * max(
         s.friction * s.radius for s in surfaces)  # fmt: skip
     found = []
@@ -44,7 +46,8 @@ def wrong(result: Result) -> list[str]:
     if closure > max(0.02, 30 * rtol) * peak + unresolved:
         found.append(f"energy {closure / peak:.2g}")
     disc = float(np.linalg.norm(history.friction_state, axis=2).max()) - 1
-    if disc > max(20 * rtol, 1e-9):
+    # The error control gives a step one tolerance beyond the disc; sliding takes it back.
+    if disc > max(5 * rtol, 1e-9):
         found.append(f"disc {disc / rtol:.3g} rtol")
     if history.rim_force.min() < 0 or history.rim_force[history.gap > 0].any():
         found.append("rim")
@@ -125,13 +128,17 @@ def main() -> None:
     """Tasks from standard input, lines of JSON to standard output."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    seed, short = int(sys.argv[1]), sys.argv[2] == "short"
+    seed, which = int(sys.argv[1]), sys.argv[2]
+    short = which == "short"
     for line in sys.stdin:
         task, number = line.split()[0], int(line.split()[1])
         if task == "check":
             print(json.dumps(check(seed, number, short)), flush=True)
             continue
         scene = case(seed, number, short).scene
+        if which == "sensible" and not sensible(scene):
+            print(json.dumps({"number": number, "status": "passed over"}), flush=True)
+            continue
         print(json.dumps({"number": number, **describe(scene), **run(scene)}), flush=True)
 
 

@@ -14,8 +14,8 @@ FAILURES = {
     "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
     "lower the friction or the motion",
     "step": "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
-    "irregular": "the equations lost regularity (the determinant changed sign): "
-    "friction is too high for a unique motion here",
+    "irregular": "the equations lost regularity (the determinant changed sign, or a normal force grows without a bound): "
+    "tilts and friction are too high for a unique motion here; lower the friction or the motion",
     "uplift": "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion, "
     "or give effects.uplift = true",
     "angle": "a tilt nears 90 degrees, where the Euler angles are singular; check the capacity and the rims",
@@ -30,7 +30,6 @@ FAILURES = {
 # What the number beside a failure is.
 QUANTITIES = {
     "newton": "residual",
-    "irregular": "residual",
     "uplift": "P.t3 [N]",
     "angle": "angle [rad]",
     "parted": "aside [m]",

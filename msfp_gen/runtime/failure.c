@@ -2,6 +2,7 @@
 #include "run.h"
 
 #define PARTING 0.02 /* of weight and load: an interface that carries less is about to part */
+#define RUNAWAY 20.0 /* of weight and load: no blow does that where no step helps, only a normal force without a bound */
 
 #if !MSFP_UPLIFT
 static int named(msfp_run *run, int surface, double value)
@@ -46,7 +47,7 @@ static int rim_met(const msfp_work *w)
     return met;
 }
 
-int msfp_parting(msfp_run *run)
+static int parting(msfp_run *run)
 {
     msfp_point at;
     msfp_work w;
@@ -67,10 +68,31 @@ int msfp_parting(msfp_run *run)
     }
     return 0;
 }
+/* A mass thrown upwards through slopes and friction: what presses feeds what drives, the normal force grows without a
+ * bound in a time that every method finds (Painleve's paradox), and at its end there is no acceleration. */
+static int jammed(msfp_run *run)
+{
+    msfp_point at;
+    msfp_work w;
+    msfp_row row;
+    msfp_to_point(run, &run->now, &at);
+    msfp_observe(&run->parameters, &at, &w, &row);
+    for (int j = 0; j < NB; ++j)
+        if (row.normal[j] > RUNAWAY * w.reference) {
+            run->status_surface = j + 1;
+            return 1;
+        }
+    return 0;
+}
+
+int msfp_last_word(msfp_run *run, int status)
+{
+    return parting(run) ? MSFP_E_UPLIFT : jammed(run) ? MSFP_E_IRREGULAR : status;
+}
 #else
-int msfp_parting(msfp_run *run)
+int msfp_last_word(msfp_run *run, int status)
 {
     (void)run;
-    return 0;
+    return status;
 }
 #endif

@@ -92,6 +92,21 @@ static int solve(msfp_run *run, stages *s, int i, double h)
     return status;
 }
 
+/* The integrals of the energy balance as far as a stage. Where stiff springs carry the load, angles have no error to speak
+ * of and steps are as long as the motion allows, over which a force times a rate is curved: to the end of a step the
+ * embedded weights integrate it, where they are those of the higher order. */
+static void works(const msfp_run *run, const stages *s, int i, double h, double *work)
+{
+    const msfp_tableau *method = s->method;
+    const int embedded = i == method->stages - 1 && method->order <= 3.0;
+    memcpy(work, run->now.work, sizeof run->now.work);
+    for (int j = 0; j <= i; ++j) {
+        const double weight = (j == i ? method->gamma : method->a[i][j]) - (embedded ? method->e[j] : 0.0);
+        for (int e = 0; e < MSFP_WORKS; ++e)
+            work[e] += h * weight * s->power[j][e];
+    }
+}
+
 static int stage(msfp_run *run, stages *s, int i, double h)
 {
     prepare(run, s, i, h);
@@ -103,6 +118,8 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         return status;
     memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
+    msfp_friction_rates(&run->work, s->df[i]);
+    msfp_powers(&run->parameters, &s->now.at, s->now.f, &run->work, s->power[i]);
     msfp_heat_stage(run, i, s->now.beta);
     if (run->middles < MSFP_MIDDLES && i == s->method->middle[run->middles]) {
         msfp_middle *m = &run->middle[run->middles++];
@@ -111,9 +128,8 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         memcpy(m->q, s->now.at.q, sizeof m->q);
         memcpy(m->v, s->now.at.v, sizeof m->v);
         memcpy(m->f, s->now.f, sizeof m->f);
+        works(run, s, i, h, m->work);
     }
-    msfp_friction_rates(&run->work, s->df[i]);
-    msfp_powers(&run->parameters, &s->now.at, s->now.f, &run->work, s->power[i]);
     return MSFP_OK;
 }
 
@@ -213,11 +229,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->f, s.now.f, sizeof next->f);
     memcpy(next->df, s.df[last], sizeof next->df);
     memcpy(next->power, s.power[last], sizeof next->power);
-    for (int e = 0; e < MSFP_WORKS; ++e) {
-        next->work[e] = now->work[e] + h * method->gamma * s.power[last][e];
-        for (int i = 0; i < last; ++i)
-            next->work[e] += h * method->a[last][i] * s.power[i][e];
-    }
+    works(run, &s, last, h, next->work);
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i <= last; ++i) {
             for (int d = 0; d < NQ; ++d) {

@@ -267,7 +267,7 @@ typedef struct {
 /* Values at a share of the last step, for dense output. */
 typedef struct {
     double share;
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], work[MSFP_WORKS];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif

@@ -11,6 +11,8 @@
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
+#define ARRIVED 1e-3 /* a residual above this is never the last */
+
 static const int unknown[ND] = MSFP_FREE;
 
 static void place(msfp_stage *s)
@@ -46,22 +48,6 @@ static void tangent_over_normal(const msfp_work *w, const double *residual, doub
     }
 }
 
-/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
-static double rounding(const msfp_stage *s)
-{
-    double speed = 0.0;
-    for (int k = 0; k < NB; ++k)
-        for (int d = 3; d < NQ; ++d)
-            speed = fmax(speed, fabs(s->at.v[k][d]));
-    return fmax(1e-10, 2e-12 * speed / s->beta);
-}
-
-/* The residual at which Newton has arrived. */
-static double goal_of(const msfp_run *run, const msfp_stage *s)
-{
-    return fmin(1e-3, fmax(rounding(s), 1e-2 * run->options.rtol));
-}
-
 /* Largest entry of a residual relative to its natural size. */
 static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
 {
@@ -80,7 +66,7 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
 #if MSFP_BATCH
-    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, goal_of(run, s), MSFP_OK, -1, INFINITY };
+    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY };
     if (msfp_batch_asked(&request)) {
         if (size && !request.status) {
             *size = request.size;
@@ -134,10 +120,10 @@ static int factorise(msfp_run *run, msfp_stage *s)
 }
 
 /* Newton step from the residual at hand (scaled in place). Where a full step does not reduce the residual, halve it. */
-static double take_step(msfp_run *run, msfp_stage *s, double *residual, double size, int fresh)
+static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *step, double size, int fresh)
 {
-    double step[DOF], factor = 1.0;
-    memcpy(step, residual, sizeof step);
+    double factor = 1.0;
+    memcpy(step, residual, DOF * sizeof *step);
     msfp_lu_solve(run->factors, DOF, run->pivots, step);
     msfp_stage_move(s, step, 1.0);
     double next = msfp_stage_residual(run, s, &run->work, residual);
@@ -156,18 +142,43 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double s
 
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
-    double residual[DOF];
+    double residual[DOF], step[DOF];
+    s->keep = 0.0;
     const double with_inertia = s->seed.ca;
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
         if (factorise(run, s))
             break;
-        size = take_step(run, s, residual, size, 1);
+        size = take_step(run, s, residual, step, size, 1);
     }
     s->inertia = 1.0;
     s->seed.ca = with_inertia;
     run->factored_beta = 0.0;
+}
+
+/* What rounding leaves of a residual: accelerations of parted bodies are differences of velocities over a short time. */
+static double rounding(const msfp_stage *s)
+{
+    double speed = 0.0;
+    for (int k = 0; k < NB; ++k)
+        for (int d = 3; d < NQ; ++d)
+            speed = fmax(speed, fabs(s->at.v[k][d]));
+    return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
+/* Whether a step of Newton is below the last digits of the rates. Over a short time those are accelerations, and times a
+ * heavy mass a residual that no further step makes smaller. */
+static int drowned(const msfp_stage *s, const double *step)
+{
+    double speed[2] = { 0.0 }, moved[2] = { 0.0 }; /* of angles, of separations */
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int kind = unknown[i] >= 3;
+            speed[kind] = fmax(speed[kind], fabs(s->at.v[k][unknown[i]]));
+            moved[kind] = fmax(moved[kind], fabs(step[k * ND + i]));
+        }
+    return moved[0] <= 4e-15 * speed[0] && moved[1] <= 4e-15 * speed[1];
 }
 
 /* Whether the determinant tells of a motion that is no longer unique. The mass of a top on massless sliders moves up and
@@ -207,8 +218,8 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = goal_of(run, s);
-    double residual[DOF];
+    const double goal = s->keep = fmin(ARRIVED, fmax(rounding(s), 1e-2 * run->options.rtol));
+    double residual[DOF], step[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     run->work_sign = 0;
@@ -224,8 +235,11 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
                 return failed(run, status, size);
         }
         const double before = size;
-        size = take_step(run, s, residual, size, fresh);
+        s->keep = fresh ? ARRIVED : goal;
+        size = take_step(run, s, residual, step, size, fresh);
         good = size < 0.1 * before;
+        if (fresh && size < ARRIVED && drowned(s, step))
+            break;
     }
     return regular(run, s, size);
 }

@@ -8,6 +8,7 @@ typedef struct {
     double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
     double beta;
     double inertia; /* 1; 0 leaves all inertia out */
+    double keep;    /* residual up to which an evaluation may be the last: a batch leaves no other in the work area */
     msfp_seed seed;
     msfp_point at;
     double f[MSFP_NB][2];

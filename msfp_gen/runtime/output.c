@@ -74,7 +74,7 @@ void msfp_interpolate(const msfp_run *run, double s, msfp_state *out)
     }
 #endif
     for (int i = 0; i < MSFP_WORKS; ++i)
-        out->work[i] = hermite(a->work[i], a->power[i], b->work[i], b->power[i], h, s);
+        out->work[i] = inside(&w, a->work[i], a->power[i], &m->work[i], b->work[i], b->power[i], h, s);
 }
 
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
@@ -138,6 +138,18 @@ static void blend(const msfp_row *rows, const weights *w, msfp_row *out)
     }
 }
 
+/* Friction has its limit inside a step as at the values that the row comes from: a polynomial may pass it at a reversal. */
+static void limit(const msfp_row *rows, int count, msfp_row *row)
+{
+    for (int j = 0; j < NB; ++j) {
+        double most = 1.0, size = hypot(row->f[j][0], row->f[j][1]);
+        for (int r = 0; r < count; ++r)
+            most = fmax(most, hypot(rows[r].f[j][0], rows[r].f[j][1]));
+        for (int d = 0; d < 2 && size > most; ++d)
+            row->f[j][d] *= most / size;
+    }
+}
+
 /* Sliding is a distance, with a kink at the centre: made from the angles of its own row. */
 static void measure(const msfp_run *run, msfp_row *row)
 {
@@ -184,6 +196,7 @@ static int write_between(msfp_run *run, double last)
         if (run->middles) {
             const weights w = weights_at(run, share);
             blend(rows, &w, row);
+            limit(rows, w.count, row);
             measure(run, row);
         } else
             msfp_observe_state(run, &s, row);

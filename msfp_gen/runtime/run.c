@@ -191,7 +191,7 @@ static int shrink(msfp_run *run, double h, double factor, int status)
     run->h = h * factor;
     if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
         return 0;
-    run->status = msfp_parting(run) ? MSFP_E_UPLIFT : status;
+    run->status = msfp_last_word(run, status);
     return 1;
 }
 

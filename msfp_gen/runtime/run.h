@@ -24,8 +24,8 @@ int msfp_write_row(msfp_run *run, const msfp_state *s);
 /* Time of the next row where rows are wanted at even times. */
 double msfp_next_output(const msfp_run *run);
 int msfp_write_step(msfp_run *run);
-/* Whether a run that cannot go on dies of an interface that parts: fills surface and value of its status. */
-int msfp_parting(msfp_run *run);
+/* The status of a run that cannot go on for want of a shorter step: that, or what lies behind it. */
+int msfp_last_word(msfp_run *run, int status);
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 
 #endif

@@ -127,16 +127,12 @@ def pendulum_angle(bearing: Bearing, start: float, time: Array) -> Array:
 
 
 def holds(
-    few: int, many: int, known: str = "", **strategies: Any
+    few: int, many: int, **strategies: Any
 ) -> Callable[[Callable[..., None]], Callable[[int], None]]:
-    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`.
-
-    known: what is known to break it among the many, with the chapter of docs/stability.md that says so.
-    """
-    slow = [pytest.mark.slow, *([pytest.mark.xfail(reason=known)] if known else [])]
+    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`."""
 
     def wrap(check: Callable[..., None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize("examples", [few, pytest.param(many, marks=slow)])
+        @pytest.mark.parametrize("examples", [few, pytest.param(many, marks=pytest.mark.slow)])
         def test(examples: int) -> None:
             calm = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large]
             profile = settings(max_examples=examples, derandomize=True, deadline=None, database=None,

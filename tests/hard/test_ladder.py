@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stacks import LOAD, PLANAR, a_stack, nested_radii
+from stacks import LOAD, PLANAR, a_body, a_stack, nested_radii
 from support import failure_of, scene_of
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, presets, simulate
@@ -53,6 +53,32 @@ def test_a_stack_that_falls_says_so_whatever_solves_it(solver: dict[str, float])
     assert error.status == "uplift"
     assert float(re.findall(r"t = (\S+) s", str(error))[0]) == pytest.approx(0.1032, abs=2e-4)
     assert "give it a rotational_stiffness" in str(error)
+
+
+def jamming() -> Scene:
+    """A mass on an orbit of 17 cm, thrown back by the rim of the lowest surface at 2.593 s."""
+    bearing = a_stack(
+        TFP, [1.0, 0.601, 0.601, 1.0], capacity=[0.17875, 0.10276, 0.10906, 0.14849],
+        friction=[0.0279, 0.1442, 0.01427, 0.0279], yield_displacement=[1.66e-4, 9.34e-4, 1.1e-4, 4.49e-4],
+        rim_stiffness=[6.531e7, 7.5685e7, 6.566e7, 1e6], rim_damping=[5.0, 1e3, 0.0, 1e3],
+    )  # fmt: skip
+    bodies = [
+        a_body(mass, height) for mass, height in ((0.343, 0.01884), (0.05, 0.01625), (0.066, 0.02026), (1.0, 0.01428))
+    ]
+    orbit = Motion.circle(0.17288, 2 * np.pi * 0.36788, cycles=1.0, lead_in=0.5 / 0.36788)
+    top = Top.mass(39250.6, 1962.5, 0.5, 3.84656e7, 3.84656e5)
+    return Scene(replace(bearing, bodies=bodies), orbit, top, Effects(), Solver(rtol=1e-5))
+
+
+@pytest.mark.parametrize("solver", [{}, {"rtol": 1e-7}, {"method": "dopri5", "rtol": 1e-6}], ids=str)
+def test_a_normal_force_without_a_bound_is_loss_of_regularity_whatever_solves_it(solver: dict[str, float]) -> None:
+    """Steep slopes, friction and the upward throw feed N, which grows a thousandfold within microseconds: the moment is
+    the same for methods that share no integrator. They used to call it newton, newton and step."""
+    scene = jamming()
+    error = failure_of(replace(scene, solver=replace(scene.solver, max_steps=100_000, **solver)))  # type: ignore[arg-type]
+    assert error.status == "irregular"
+    assert float(re.findall(r"t = (\S+) s", str(error))[0]) == pytest.approx(2.5933, abs=5e-4)
+    assert error.result.history.normal_force[-1].max() > 20 * 39250.6 * 9.8
 
 
 def test_the_remedy_it_names_helps() -> None:
