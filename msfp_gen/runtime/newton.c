@@ -66,8 +66,15 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
 #if MSFP_BATCH
-    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY };
+    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
+                             s->descend ? s : NULL, run->factors, run->pivots, 0 };
+    s->taken = 0;
     if (msfp_batch_asked(&request)) {
+        s->descend = 0;
+        run->counts[MSFP_COUNT_NEWTON] += s->taken;
+        run->counts[MSFP_COUNT_EVALUATIONS] += request.more;
+        if (request.more)
+            place(s);
         if (size && !request.status) {
             *size = request.size;
             run->worst_surface = request.worst < 0 ? run->worst_surface : request.worst / ND + 1;
@@ -143,7 +150,8 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
     double residual[DOF], step[DOF];
-    s->keep = 0.0;
+    s->goal = s->keep = 0.0;
+    s->descend = 0;
     const double with_inertia = s->seed.ca;
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
@@ -218,12 +226,16 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = s->keep = fmin(ARRIVED, fmax(rounding(s), 1e-2 * run->options.rtol));
+    const double goal = s->goal = s->keep = fmin(ARRIVED, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF], step[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+    s->descend = good;
+    s->taken = 0;
+    s->before = INFINITY;
     double size = msfp_stage_residual(run, s, &run->work, residual);
+    good = s->taken ? size < 0.1 * s->before : good;
     run->work_sign = 0;
-    for (int i = 0; size > goal; ++i) {
+    for (int i = s->taken; size > goal; ++i) {
         if (i == 30 || !(size < INFINITY))
             return failed(run, MSFP_E_NEWTON, size);
         ++run->counts[MSFP_COUNT_NEWTON];
@@ -236,10 +248,14 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
         }
         const double before = size;
         s->keep = fresh ? ARRIVED : goal;
+        s->descend = !fresh;
+        s->before = before;
         size = take_step(run, s, residual, step, size, fresh);
-        good = size < 0.1 * before;
+        good = size < 0.1 * (s->taken ? s->before : before);
+        i += s->taken;
         if (fresh && size < ARRIVED && drowned(s, step))
             break;
     }
+    s->descend = 0;
     return regular(run, s, size);
 }

@@ -8,7 +8,11 @@ typedef struct {
     double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
     double beta;
     double inertia; /* 1; 0 leaves all inertia out */
+    double goal;    /* residual at which Newton has arrived */
     double keep;    /* residual up to which an evaluation may be the last: a batch leaves no other in the work area */
+    int descend;    /* whether a batch may go on from the next evaluation with the factors at hand .. */
+    int taken;      /* .. and how many steps it then took, .. */
+    double before;  /* .. the residual before the evaluation, or before the last of those steps */
     msfp_seed seed;
     msfp_point at;
     double f[MSFP_NB][2];

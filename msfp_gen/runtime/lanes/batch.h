@@ -3,7 +3,7 @@
  */
 #ifndef MSFP_BATCH_H
 #define MSFP_BATCH_H
-#include "msfp_model.h"
+#include "newton.h"
 
 #define MSFP_MOST_RUNS 64            /* of one batch at a time */
 #define MSFP_FEW (MSFP_WIDTH / 4 + 1) /* so many runs go faster alone: most lanes would be empty */
@@ -20,6 +20,10 @@ typedef struct {
     double keep;                /* up to which size of the residual the work area is wanted as well */
     int status, worst;          /* worst: row of the largest residual */
     double size;                /* of the residual, relative to its natural size */
+    msfp_stage *stage;          /* Newton may go on in it; NULL: one evaluation */
+    const double *factors;      /* with these */
+    const int *pivots;
+    int more;                   /* evaluations beyond the first */
 } msfp_request;
 
 typedef struct msfp_batch msfp_batch;

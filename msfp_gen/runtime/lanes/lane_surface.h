@@ -113,8 +113,8 @@ LANE_INLINE void lane_improve(lane_work *w, int j, lane_progress *p, lane_mask s
 LANE_INLINE void lane_friction(lane_work *w)
 {
     lane_progress progress[NB];
-    unsigned broken = 0, done = 0;
-    lane_mask still = { 0 };
+    lane_mask still = ~w->asked;
+    unsigned broken = 0, done = lane_bits(still);
     for (int j = 0; j < NB; ++j) {
         for (int r = 0; r < FRICTION; ++r)
             progress[j].step[r] = lane_of(0.0);

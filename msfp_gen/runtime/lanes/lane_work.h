@@ -59,7 +59,12 @@ struct lane_work {
         lane rim_sum[NB], lock[NB], reference;
     } more; /* of msfp_work, behind rim_active */
     int rim_active[NB][W], status[W];
-    lane_mask over; /* where residual and tangent are wanted over N */
+    lane_mask over;  /* where residual and tangent are wanted over N */
+    lane_mask asked; /* runs that are evaluated; the others have been, and what Y, Z they have stays */
+    struct {
+        lane Q[NB][MSFP_NQ], V[NB][MSFP_NQ], inertia, factors[DOF * DOF], step[DOF];
+        int pivots[DOF][W];
+    } newton;
     const msfp_parameters *parameters[W];
     lane residual[DOF], worst, size;
     lane tangent[DOF * DOF], dnormal[NB][DOF];
