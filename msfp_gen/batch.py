@@ -182,15 +182,16 @@ class Queue:
         run, azimuth = leg.course.begin(self.model)
         return leg, run, azimuth, time.perf_counter() - begin
 
-    def ended(self, job: tuple[Leg, Any, float, float], wall: float) -> None:
-        """A run has ended: take its segment, and hand it in or let it go on with a wider model."""
+    def ended(self, job: tuple[Leg, Any, float, float], wall: float) -> bool:
+        """A run has ended: take its segment, and hand it in (then its rows are read) or let it go on with a wider model."""
         leg, run, azimuth, setup = job
         leg.how = (*leg.how, self.how)
         leg.course.took(Segment(self.model, run, azimuth, run.status[0], wall, setup + self.setup))
         if leg.course.effects is None:
             self.desk.hand_in(leg)
-        else:
-            self.on.append(leg)
+            return True
+        self.on.append(leg)
+        return False
 
 
 def _run(queue: Queue, workers: int) -> list[Leg]:
@@ -237,7 +238,8 @@ def _in_lanes(queue: Queue) -> None:
         clock.passed(time.perf_counter() - begin, [job[1] for job in jobs.values()])
         for slot in done:
             job = jobs.pop(slot)
-            queue.ended(job, clock.of(job[1]))
+            if queue.ended(job, clock.of(job[1])):
+                batch.reuse(job[1])
             free.append(slot)
 
 

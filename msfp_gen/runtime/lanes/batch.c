@@ -24,6 +24,9 @@ struct msfp_batch {
     int ready[MSFP_MOST_RUNS], ready_count;
     int waiting[KINDS][MSFP_MOST_RUNS], waiting_count[KINDS];
     lane_work *lanes;
+    msfp_row *spare[MSFP_MOST_RUNS];
+    size_t spare_capacity[MSFP_MOST_RUNS];
+    int spare_count;
 };
 
 static __thread msfp_batch *active; /* a batch stays in the thread that calls msfp_batch_advance while it does */
@@ -116,9 +119,33 @@ void msfp_batch_free(msfp_batch *b)
     for (int i = 0; b && i < MSFP_MOST_RUNS; ++i)
         if (b->strands[i].memory)
             munmap(b->strands[i].memory, stack_size() + page());
+    while (b && b->spare_count)
+        free(b->spare[--b->spare_count]);
     if (b)
         free(b->lanes);
     free(b);
+}
+
+void msfp_batch_reuse(msfp_batch *b, msfp_run *run)
+{
+    if (b->spare_count == MSFP_MOST_RUNS || !run->rows)
+        return;
+    b->spare[b->spare_count] = run->rows;
+    b->spare_capacity[b->spare_count++] = run->row_capacity;
+    run->rows = NULL;
+    run->row_count = run->row_capacity = 0;
+}
+
+/* A run that begins writes its rows where another had its. */
+static void give_spare(msfp_batch *b, msfp_run *run)
+{
+    if (!b->spare_count || b->spare_capacity[b->spare_count - 1] <= run->row_capacity)
+        return;
+    msfp_row *rows = b->spare[--b->spare_count];
+    memcpy(rows, run->rows, run->row_count * sizeof *rows);
+    free(run->rows);
+    run->rows = rows;
+    run->row_capacity = b->spare_capacity[b->spare_count];
 }
 
 int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run)
@@ -129,6 +156,7 @@ int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run)
         if (status)
             return status;
     }
+    give_spare(b, run);
     s->run = run;
     ++b->runs;
     b->ready[b->ready_count++] = slot;

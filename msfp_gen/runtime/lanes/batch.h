@@ -33,6 +33,9 @@ msfp_batch *msfp_batch_new(void); /* NULL: no memory */
 void msfp_batch_free(msfp_batch *b);
 /* Let a started run go on in slot 0 .. MSFP_MOST_RUNS - 1, which is free. 0 or MSFP_E_MEMORY. */
 int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run);
+/* Take the memory for rows of a run whose rows nobody wants any more: the next run writes there, and the system need not
+ * find new pages. */
+void msfp_batch_reuse(msfp_batch *b, msfp_run *run);
 /* Go on for a while or until a run has ended; the slots that have become free. */
 int msfp_batch_advance(msfp_batch *b, long evaluations, int *ended);
 /* Whether the caller is a run of a batch; then a request is answered when this returns. The last MSFP_FEW runs of a batch
