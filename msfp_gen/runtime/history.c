@@ -14,13 +14,16 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6])
     for (int channel = 0; channel < 6; ++channel) {
         const double *c = piece + channel * (MSFP_DEGREE + 1);
         double value = 0.0, rate = 0.0, second = 0.0;
+        int degree = MSFP_DEGREE; /* most pieces are cubic or constant */
+        while (degree > 0 && c[degree] == 0.0)
+            --degree;
         if (orders == 1) {
-            for (int k = MSFP_DEGREE; k >= 0; --k)
+            for (int k = degree; k >= 0; --k)
                 value = value * s + c[k];
             out[0][channel] = value;
             continue;
         }
-        for (int k = MSFP_DEGREE; k >= 0; --k) {
+        for (int k = degree; k >= 0; --k) {
             second = second * s + 2.0 * rate;
             rate = rate * s + value;
             value = value * s + c[k];

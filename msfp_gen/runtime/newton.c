@@ -66,7 +66,7 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
 #if MSFP_BATCH
-    msfp_request request = { &run->parameters, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
+    msfp_request request = { &run->parameters, 0, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
                              s->descend ? s : NULL, run->factors, run->pivots, 0 };
     s->taken = 0;
     if (msfp_batch_asked(&request)) {

@@ -15,12 +15,14 @@ typedef struct {
     void *pointer;
     msfp_run *run;
     msfp_request *request; /* NULL: the run has ended */
+    long values;           /* of its parameters */
 } strand;
 
 struct msfp_batch {
     strand strands[MSFP_MOST_RUNS];
     void *pointer; /* of the stack of who called msfp_batch_advance */
     int current, runs; /* runs: how many there are */
+    long values;       /* how many sets of parameters there have been */
     int ready[MSFP_MOST_RUNS], ready_count;
     int waiting[KINDS][MSFP_MOST_RUNS], waiting_count[KINDS];
     lane_work *lanes;
@@ -157,6 +159,10 @@ int msfp_batch_put(msfp_batch *b, int slot, msfp_run *run)
             return status;
     }
     give_spare(b, run);
+    s->values = ++b->values;
+    for (int i = 0; i < MSFP_MOST_RUNS; ++i)
+        if (b->strands[i].run && !memcmp(&b->strands[i].run->parameters, &run->parameters, sizeof run->parameters))
+            s->values = b->strands[i].values;
     s->run = run;
     ++b->runs;
     b->ready[b->ready_count++] = slot;
@@ -169,6 +175,7 @@ int msfp_batch_asked(msfp_request *request)
         return 0;
     strand *s = &active->strands[active->current];
     s->request = request;
+    request->values = s->values;
     msfp_switch(&s->pointer, active->pointer);
     return 1;
 }
@@ -188,6 +195,7 @@ static int go_on(msfp_batch *b, int *ended)
             b->waiting[kind][b->waiting_count[kind]++] = slot;
         } else
             ended[count++] = slot;
+        s->run = s->request ? s->run : NULL;
     }
     b->runs -= count;
     return count;

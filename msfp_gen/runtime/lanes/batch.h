@@ -11,6 +11,7 @@
 /* An evaluation that a run waits for: the arguments of msfp_condensed, and what becomes of it. */
 typedef struct {
     const msfp_parameters *parameters;
+    long values;                /* runs with the same number have the same parameters; set by msfp_batch_asked */
     const msfp_point *at;
     const msfp_seed *seed;
     msfp_work *work;

@@ -66,6 +66,7 @@ struct lane_work {
         int pivots[DOF][W];
     } newton;
     const msfp_parameters *parameters[W];
+    long values[W]; /* of the parameters that the lanes hold */
     lane residual[DOF], worst, size;
     lane tangent[DOF * DOF], dnormal[NB][DOF];
     lane dx[NB + 1][MSFP_COORDINATES_SIZE * DOF], dbody[NB + 1][MSFP_BODY_SIZE * DOF];

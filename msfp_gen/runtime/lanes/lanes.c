@@ -158,16 +158,29 @@ static void over_normal(lane_work *w, int tangent)
         lane_scatter(to, (const lane *)&(from), COUNT(from));                                                       \
     } while (0)
 
+/* Scenes of one bearing are common: what the lanes hold already stays. */
+static void gather_parameters(lane_work *w, msfp_request *const *r)
+{
+    int same = 1;
+    for (int i = 0; i < W; ++i) {
+        same &= w->values[i] == r[i]->values;
+        w->values[i] = r[i]->values;
+        w->in.weight[i] = r[i]->parameters->weight;
+    }
+    if (same)
+        return;
+    GATHER(w->in.parts, r[i]->parameters->body);
+    GATHER(w->in.top, r[i]->parameters->top);
+    GATHER(w->in.rim_cosine, r[i]->parameters->rim_cosine);
+}
+
 static void gather(lane_work *w, msfp_request *const *r)
 {
     GATHER(w->in.at, r[i]->at->base);
     GATHER(w->in.seed, &r[i]->seed->cq);
     GATHER(w->in.f, r[i]->f);
-    GATHER(w->in.parts, r[i]->parameters->body);
-    GATHER(w->in.top, r[i]->parameters->top);
-    GATHER(w->in.rim_cosine, r[i]->parameters->rim_cosine);
+    gather_parameters(w, r);
     for (int i = 0; i < W; ++i) {
-        w->in.weight[i] = r[i]->parameters->weight;
         w->parameters[i] = r[i]->parameters;
         w->over[i] = r[i]->over_normal ? -1 : 0;
         w->status[i] = MSFP_OK;
