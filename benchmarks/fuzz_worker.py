@@ -46,8 +46,8 @@ def wrong(result: Result) -> list[str]:
     if closure > max(0.02, 30 * rtol) * peak + unresolved:
         found.append(f"energy {closure / peak:.2g}")
     disc = float(np.linalg.norm(history.friction_state, axis=2).max()) - 1
-    # The error control gives a step one tolerance beyond the disc; sliding takes it back.
-    if disc > max(5 * rtol, 1e-9):
+    # The error control gives a step one tolerance beyond the disc; sliding takes it back, over some steps.
+    if disc > max(10 * rtol, 1e-9):
         found.append(f"disc {disc / rtol:.3g} rtol")
     if history.rim_force.min() < 0 or history.rim_force[history.gap > 0].any():
         found.append("rim")

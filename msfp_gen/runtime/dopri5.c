@@ -69,6 +69,31 @@ static void combine(const msfp_state *now, const slope *k, const double *weights
         }
 }
 
+/* The integrals of the energy balance, by Simpson's rule: what the damper of a rim takes is a peak within few steps. */
+static int works(msfp_run *run, double h)
+{
+    msfp_state middle, *next = &run->next;
+    msfp_point at;
+    msfp_work w;
+    double f[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
+    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    memcpy(next->work, run->now.work, sizeof next->work); /* of which nothing is used in the middle */
+    msfp_interpolate(run, 0.5, &middle);
+    msfp_to_point(run, &middle, &at);
+    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(f, at.f, sizeof f);
+#if MSFP_LAW
+    memcpy(w.coefficient, run->work.coefficient, sizeof w.coefficient);
+#endif
+    const int status = msfp_condensed(&run->parameters, &at, &seed, &w, f, residual, NULL);
+    if (status)
+        return status;
+    msfp_powers(&run->parameters, &at, at.f, &w, power);
+    for (int i = 0; i < MSFP_WORKS; ++i)
+        next->work[i] += h / 6.0 * (run->now.power[i] + 4.0 * power[i] + next->power[i]);
+    return MSFP_OK;
+}
+
 static int finish(msfp_run *run, const msfp_point *at, const slope *last, double h)
 {
     msfp_state *next = &run->next;
@@ -87,9 +112,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
     memcpy(next->f, at->f, sizeof next->f);
     memcpy(next->df, last->f, sizeof next->df);
     msfp_powers(&run->parameters, at, at->f, &run->work, next->power);
-    for (int i = 0; i < MSFP_WORKS; ++i) /* steps are far below the scale of the powers: the trapezoid does */
-        next->work[i] = run->now.work[i] + 0.5 * h * (run->now.power[i] + next->power[i]);
-    return MSFP_OK;
+    return works(run, h);
 }
 
 int msfp_step_dopri5(msfp_run *run, double h, double *error)

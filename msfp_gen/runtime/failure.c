@@ -2,7 +2,7 @@
 #include "run.h"
 
 #define PARTING 0.02 /* of weight and load: an interface that carries less is about to part */
-#define RUNAWAY 20.0 /* of weight and load: no blow does that where no step helps, only a normal force without a bound */
+#define RUNAWAY 20.0 /* of weight and load: where no step helps no blow does that, only a normal force without a bound */
 
 #if !MSFP_UPLIFT
 static int named(msfp_run *run, int surface, double value)
@@ -68,20 +68,37 @@ static int parting(msfp_run *run)
     }
     return 0;
 }
+/* Whether a surface carries more than `times` weight and load. */
+static int loaded(msfp_run *run, const msfp_work *w, double times)
+{
+    for (int j = 0; j < NB; ++j)
+        if (w->contact[j][MSFP_CONTACT_N] > times * w->reference) {
+            run->status_surface = j + 1;
+            return 1;
+        }
+    return 0;
+}
+
 /* A mass thrown upwards through slopes and friction: what presses feeds what drives, the normal force grows without a
- * bound in a time that every method finds (Painleve's paradox), and at its end there is no acceleration. */
+ * bound in a time that every method finds (Painleve's paradox), and at its end, where the determinant vanishes, there is
+ * no acceleration. */
 static int jammed(msfp_run *run)
 {
     msfp_point at;
     msfp_work w;
     msfp_row row;
+    msfp_solution now, soon;
     msfp_to_point(run, &run->now, &at);
     msfp_observe(&run->parameters, &at, &w, &row);
-    for (int j = 0; j < NB; ++j)
-        if (row.normal[j] > RUNAWAY * w.reference) {
-            run->status_surface = j + 1;
+    if (loaded(run, &w, RUNAWAY))
+        return 1;
+    if (MSFP_MASSLESS || !loaded(run, &w, 2.0) || msfp_accelerations(&run->parameters, &at, &w, &now))
+        return 0;
+    for (double moment = 1e-9; moment < 2e-7; moment *= 2.0) {
+        moved(run, moment, &at);
+        if (msfp_accelerations(&run->parameters, &at, &w, &soon) || soon.determinant != now.determinant)
             return 1;
-        }
+    }
     return 0;
 }
 

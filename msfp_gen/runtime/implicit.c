@@ -20,7 +20,7 @@ static const int unknown[ND] = MSFP_FREE;
 
 typedef struct {
     const msfp_tableau *method;
-    double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS];
+    double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS], moved[STAGES];
     msfp_stage now; /* the one at work */
 } stages;
 
@@ -92,19 +92,29 @@ static int solve(msfp_run *run, stages *s, int i, double h)
     return status;
 }
 
-/* The integrals of the energy balance as far as a stage. Where stiff springs carry the load, angles have no error to speak
- * of and steps are as long as the motion allows, over which a force times a rate is curved: to the end of a step the
- * embedded weights integrate it, where they are those of the higher order. */
+/* The integrals of the energy balance as far as a stage, by the weights of the method. */
 static void works(const msfp_run *run, const stages *s, int i, double h, double *work)
 {
-    const msfp_tableau *method = s->method;
-    const int embedded = i == method->stages - 1 && method->order <= 3.0;
     memcpy(work, run->now.work, sizeof run->now.work);
     for (int j = 0; j <= i; ++j) {
-        const double weight = (j == i ? method->gamma : method->a[i][j]) - (embedded ? method->e[j] : 0.0);
+        const double weight = j == i ? s->method->gamma : s->method->a[i][j];
         for (int e = 0; e < MSFP_WORKS; ++e)
             work[e] += h * weight * s->power[j][e];
     }
+}
+
+/* Where stiff springs carry the load, angles have no error to speak of and steps are as long as the motion allows, over
+ * which a force times a rate is curved: the embedded weights see that, where theirs is the higher order. Rates that ring
+ * add up to the right way by the method's own weights alone; those that are prescribed never ring. */
+static void refine(const stages *s, double h, int ringing, double *work)
+{
+    const msfp_tableau *method = s->method;
+    for (int j = 0; j < method->stages && method->order <= 3.0; ++j)
+        if (ringing)
+            work[MSFP_WORK_INPUT] -= h * method->e[j] * s->moved[j];
+        else
+            for (int e = 0; e < MSFP_WORKS; ++e)
+                work[e] -= h * method->e[j] * s->power[j][e];
 }
 
 static int stage(msfp_run *run, stages *s, int i, double h)
@@ -120,6 +130,7 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
     msfp_friction_rates(&run->work, s->df[i]);
     msfp_powers(&run->parameters, &s->now.at, s->now.f, &run->work, s->power[i]);
+    s->moved[i] = msfp_moved_power(&run->parameters, &s->now.at, &run->work);
     msfp_heat_stage(run, i, s->now.beta);
     if (run->middles < MSFP_MIDDLES && i == s->method->middle[run->middles]) {
         msfp_middle *m = &run->middle[run->middles++];
@@ -213,6 +224,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
     memcpy(s.power[0], now->power, sizeof s.power[0]);
+    s.moved[0] = now->moved;
     msfp_heat_begin(run);
     double disc = 0.0;
     for (int i = 1; i <= last; ++i) {
@@ -229,6 +241,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->f, s.now.f, sizeof next->f);
     memcpy(next->df, s.df[last], sizeof next->df);
     memcpy(next->power, s.power[last], sizeof next->power);
+    next->moved = s.moved[last];
     works(run, &s, last, h, next->work);
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i <= last; ++i) {
@@ -243,6 +256,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     disc = fmax(disc, leap(now->f, next->f));
     disc = fmax(disc, msfp_heat_error(run, method->e, last + 1, h, beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
+    refine(&s, h, *error > 1.0, next->work);
     if (*error > 1.0) {
         filter(run, &s, dq, dv, df);
         *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));

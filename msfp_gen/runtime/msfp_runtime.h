@@ -265,7 +265,7 @@ typedef struct {
 typedef struct {
     double t;
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
-    double work[MSFP_WORKS], power[MSFP_WORKS];
+    double work[MSFP_WORKS], power[MSFP_WORKS], moved; /* moved: the power of what moves as prescribed */
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
 #endif
@@ -350,6 +350,8 @@ const char *msfp_guard_name(int guard);
 void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
+/* Power of what moves as prescribed, a part of what is put in: the base of the rig, and that of the stack where it turns. */
+double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
 /* The same from an evaluation at hand. */
 void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row);

@@ -108,33 +108,41 @@ static double support_power(const double *t, const msfp_point *at, const double 
 }
 #endif
 
-/* Work of the base on the stack by turning, of the rig's base point, and of the loads. */
-static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
+double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
-    const double *body = w->body[NB], *t = p->top;
-    double relative[3], C[3], V[3], turning[3], axis[3], centre[3], force[3], moment[3], anchor[3];
-    msfp_body_C_get(body, C);
-    msfp_body_V_get(body, V);
-    msfp_body_wp_get(body, turning);
-    msfp_body_t3_get(body, axis);
+    const double *t = p->top;
+    double C[3], V[3], relative[3], turning[3], force[3], moment[3], anchor[3], power = 0.0;
+    msfp_body_C_get(w->body[NB], C);
+    msfp_body_V_get(w->body[NB], V);
     msfp_top_parameters_x0_get(t, anchor);
-    for (int i = 0; i < 3; ++i)
-        relative[i] = V[i] - at->base[1][i];
-    double power = dot3(at->load, relative) + dot3(at->load + 3, turning);
-    power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
     for (int i = 0; i < 2; ++i)
         power += (t[MSFP_TOP_PARAMETERS_K] * (C[i] - anchor[i]) + t[MSFP_TOP_PARAMETERS_C] * V[i]) * at->base[1][i];
-#if MSFP_TURNED
-    power += support_power(t, at, axis, turning);
-#endif
-    *damped = t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning);
-    msfp_body_V_get(w->body[0], centre);
+    msfp_body_V_get(w->body[0], relative);
     msfp_body_wp_get(w->body[0], turning);
     msfp_force_F_get(w->force[0], force);
     msfp_moment_M_get(w->moment[0], moment);
     for (int i = 0; i < 3; ++i)
-        relative[i] = centre[i] - at->base[1][i];
+        relative[i] -= at->base[1][i];
     return power + dot3(force, relative) + dot3(moment, turning);
+}
+
+/* Work of all that moves as prescribed and of the loads. */
+static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
+{
+    const double *body = w->body[NB], *t = p->top;
+    double relative[3], V[3], turning[3], axis[3];
+    msfp_body_V_get(body, V);
+    msfp_body_wp_get(body, turning);
+    msfp_body_t3_get(body, axis);
+    for (int i = 0; i < 3; ++i)
+        relative[i] = V[i] - at->base[1][i];
+    double power = dot3(at->load, relative) + dot3(at->load + 3, turning);
+    power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
+#if MSFP_TURNED
+    power += support_power(t, at, axis, turning);
+#endif
+    *damped = t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning);
+    return power + msfp_moved_power(p, at, w);
 }
 
 /* A body that does not spin on its basis turns about its axis all the same, by psi' sin(theta): the moments that lock

@@ -83,6 +83,7 @@ static int settle(msfp_run *run)
     msfp_friction_rates(&run->work, run->now.df);
     msfp_heat_settle(run);
     msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
+    run->now.moved = msfp_moved_power(&run->parameters, &at, &run->work);
     memset(run->slope, 0, sizeof run->slope);
     run->have_unknowns = 0;
     run->restart = 1;
