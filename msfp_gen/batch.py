@@ -183,7 +183,7 @@ class Queue:
         return leg, run, azimuth, time.perf_counter() - begin
 
     def ended(self, job: tuple[Leg, Any, float, float], wall: float) -> bool:
-        """A run has ended: take its segment, and hand it in (then its rows are read) or let it go on with a wider model."""
+        """A run has ended: hand in what came of its scene, or let that go on with a wider model (False)."""
         leg, run, azimuth, setup = job
         leg.how = (*leg.how, self.how)
         leg.course.took(Segment(self.model, run, azimuth, run.status[0], wall, setup + self.setup))
