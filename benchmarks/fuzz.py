@@ -123,6 +123,8 @@ def table(rows: list[Row], checks: list[Row]) -> Row:
         "sensible": len(sensible), "sensible_ends": dict(Counter(r["status"] for r in sensible).most_common()),
         "sensible_failures": [f"{r['number']} {r['spec']}: {r['message']}" for r in failed],
         "faults": faults(rows, checks),
+        "noted": sum(r["status"] == "ok" and r.get("noted", False) for r in rows),
+        "sensible_noted": sum(r["status"] == "ok" and r.get("noted", False) for r in sensible),
         "longest": round(max(r.get("wall", 0.0) for r in rows), 1),
         "checked": len(verdicts), "no_verdict": len(checks) - len(verdicts),
         "largest_deviation": max((c["deviation"] for c in verdicts), default=None),

@@ -18,10 +18,11 @@ from fuzz_second import Second
 
 from msfp_gen import InputError, RunError, Scene, simulate
 from msfp_gen.result import Result
+from msfp_gen.top import MassTop
 
 MEMORY = 4 << 30  # [bytes] a run that asks for more ends as a named failure, not as a machine without memory
 ROWS = 8  # of a run that the second method goes over
-NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard")
+NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard", "stiff")
 
 
 def not_finite(result: Result) -> list[str]:
@@ -43,7 +44,7 @@ def wrong(result: Result) -> list[str]:
         s.friction * s.radius for s in surfaces)  # fmt: skip
     found = []
     closure = float(np.abs(energy["numerical"]).max())
-    if closure > max(0.02, 30 * rtol) * peak + unresolved:
+    if closure > max(0.03, 30 * rtol) * peak + unresolved and "energy" not in {note.kind for note in result.notes}:
         found.append(f"energy {closure / peak:.2g}")
     disc = float(np.linalg.norm(history.friction_state, axis=2).max()) - 1
     # The error control gives a step one tolerance beyond the disc; sliding takes it back, over some steps.
@@ -75,7 +76,9 @@ def run(scene: Scene) -> dict[str, Any]:
         status, message = "refused", str(error)
     out: dict[str, Any] = {"status": status, "message": message, "wall": time.perf_counter() - begin}
     if result is not None:
+        out["beyond"] = isinstance(scene.top, MassTop) and bool(result.summary["rims_met"])
         out["counts"] = {k: v for k, v in asdict(result.counters).items() if k != "wall_time"}
+        out["noted"] = "energy" in {note.kind for note in result.notes}
         out["not_finite"] = not_finite(result)
         if result.succeeded:
             out["wrong"] = wrong(result)
@@ -139,7 +142,9 @@ def main() -> None:
         if which == "sensible" and not sensible(scene):
             print(json.dumps({"number": number, "status": "passed over"}), flush=True)
             continue
-        print(json.dumps({"number": number, **describe(scene), **run(scene)}), flush=True)
+        row = {"number": number, **describe(scene), **run(scene)}
+        row["sensible"] = row["sensible"] and not row.get("beyond", False)  # a mass that resonates into its rims
+        print(json.dumps(row), flush=True)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ FAILURES = {
     "newton": "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
     "lower the friction or the motion",
     "step": "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
-    "irregular": "the equations lost regularity (the determinant changed sign, or a normal force grows without a bound): "
+    "irregular": "the equations lost regularity (the determinant changed sign, or a normal force has no bound): "
     "tilts and friction are too high for a unique motion here; lower the friction or the motion",
     "uplift": "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion, "
     "or give effects.uplift = true",
@@ -25,6 +25,8 @@ FAILURES = {
     "interrupted": "interrupted",
     "parted": "a body is beside its place by more than the radius of its slider: the stack has come apart; reduce the "
     "motion or raise the load",
+    "stiff": "the explicit method has reached its limit of stability, where its error estimate means nothing; "
+    "use solver.method = 'implicit'",
     "guard": "what the model leaves out would matter from here on",
 }
 # What the number beside a failure is.

@@ -17,7 +17,7 @@ from msfp_gen.build import build_model
 from msfp_gen.checkpoint import EVERY, Checkpoint, Identity, kept_files, segment_file
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.history import Counters
-from msfp_gen.notes import Note, notes_of
+from msfp_gen.notes import Note, balance_of, notes_of
 from msfp_gen.recorded import events_of, history_of, joined
 from msfp_gen.segment import Begin, begin_run
 from msfp_gen.start import at_rest, needs_settling, prelude
@@ -231,15 +231,16 @@ def _result(course: Course, more: dict[str, str]) -> Result:
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
         **more,
     }
+    history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
     return Result(
         scene=scene,
-        history=joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step),
+        history=history,
         events=tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth)),
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
-        notes=tuple(course.notes),
+        notes=tuple(course.notes) + balance_of(scene, history),
     )
 
 

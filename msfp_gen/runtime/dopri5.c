@@ -94,6 +94,19 @@ static int works(msfp_run *run, double h)
     return MSFP_OK;
 }
 
+/* The fastest rate of decay by the last two stages, both at the end of the step, over what the method is stable for; after
+ * Hairer and Wanner, Solving ODEs II, IV.2. Ringing without damping is not seen, nor need it be: its error is. */
+static int at_limit(const slope *sixth, const slope *last, const msfp_point *before, const msfp_point *at, double h)
+{
+    double rates = 0.0, states = 0.0;
+    for (int b = 0; b < NB; ++b)
+        for (int d = 0; d < NQ; ++d) {
+            rates += pow(last->a[b][d] - sixth->a[b][d], 2);
+            states += pow(at->v[b][d] - before->v[b][d], 2);
+        }
+    return h * h * rates > 3.25 * 3.25 * states && states > 0.0;
+}
+
 static int finish(msfp_run *run, const msfp_point *at, const slope *last, double h)
 {
     msfp_state *next = &run->next;
@@ -118,7 +131,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
 int msfp_step_dopri5(msfp_run *run, double h, double *error)
 {
     slope k[STAGES];
-    msfp_point at;
+    msfp_point at, sixth;
     double dq[NB][NQ] = { { 0 } }, dv[NB][NQ] = { { 0 } }, df[NB][2] = { { 0 } };
     run->middles = 0;
     memset(&at, 0, sizeof at);
@@ -135,6 +148,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     memcpy(k[0].a, run->now.a, sizeof k[0].a);
     memcpy(k[0].f, run->now.df, sizeof k[0].f);
     for (int i = 1; i < STAGES; ++i) {
+        sixth = at;
         msfp_point_at(run, run->now.t + c[i] * h, &at);
         combine(&run->now, k, a[i], i, h, &at);
         msfp_heat_prepare(run, a[i], i, h, 0.0, &at);
@@ -153,5 +167,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
                 df[b][d] += h * e[i] * k[i].f[b][d];
         }
     *error = fmax(msfp_error_norm(run, dq, dv, df), msfp_heat_error(run, e, STAGES, h, 0.0));
+    if (*error <= 1.0)
+        run->at_limit = at_limit(&k[STAGES - 2], &k[STAGES - 1], &sixth, &at, h) ? run->at_limit + 1 : 0;
     return finish(run, &at, &k[STAGES - 1], h);
 }

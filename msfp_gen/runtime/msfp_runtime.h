@@ -121,7 +121,8 @@ enum {
     MSFP_E_FINITE,        /* a value is not finite */
     MSFP_E_MEMORY,
     MSFP_E_GUARD,         /* what the model leaves out would matter from here on: see run->guard */
-    MSFP_E_PARTED         /* a body is beside its place by more than its slider is wide: it has left the stack */
+    MSFP_E_PARTED,        /* a body is beside its place by more than its slider is wide: it has left the stack */
+    MSFP_E_STIFF          /* step after step at the limit of stability of the explicit method: its error means nothing */
 };
 
 /* The condensed equations: angular balances with interface forces summed from the top and contact in
@@ -266,6 +267,7 @@ typedef struct {
     double t;
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
     double work[MSFP_WORKS], power[MSFP_WORKS], moved; /* moved: the power of what moves as prescribed */
+    double energy, kinetic;
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
 #endif
@@ -313,6 +315,8 @@ typedef struct {
     } guard;
     double unknowns[MSFP_UNKNOWNS];
     int have_unknowns, determinant, work_sign, restart;
+    double exchanged; /* largest energy so far: balance.c */
+    int at_limit;  /* steps in a row that an explicit method took at its limit of stability */
     int shortened; /* the step at hand is a shorter one after Newton failed */
     long counts[MSFP_COUNTS];
     int status, status_surface, worst_surface;
@@ -352,6 +356,8 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
 /* Power of what moves as prescribed, a part of what is put in: the base of the rig, and that of the stack where it turns. */
 double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
+/* Kinetic, potential and of all springs but friction. */
+double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *kinetic);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
 /* The same from an evaluation at hand. */
 void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row);

@@ -201,6 +201,31 @@ static double rim_energy(const msfp_parameters *p, const double *gap)
     return total;
 }
 
+static double seat_energy(const msfp_work *w)
+{
+    double total = 0.0;
+#if MSFP_UPLIFT
+    for (int j = 0; j < NB; ++j)
+        total += w->seat[j][MSFP_SEAT_STORED];
+#else
+    (void)w;
+#endif
+    return total;
+}
+
+double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *kinetic)
+{
+    double total[3], sliding[NB][MSFP_GAP_SIZE], gap[NB] = { 0.0 };
+    energies(p, at, w, total);
+    for (int j = 0; j < NB; ++j)
+        if (w->rim_sum[j] != 0.0) { /* rarely */
+            msfp_gaps(p, at->q, sliding);
+            gap[j] = sliding[j][MSFP_GAP_G];
+        }
+    *kinetic = total[0];
+    return total[0] + total[1] + restraint_energy(p, at, w) + rim_energy(p, gap) + seat_energy(w);
+}
+
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
     double residual[MSFP_DOF], f[NB][2];
@@ -250,11 +275,9 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     row->potential = total[1];
     row->restraint = restraint_energy(p, at, w);
     row->rim_stored = rim_energy(p, row->gap);
-    row->seat_stored = 0.0;
+    row->seat_stored = seat_energy(w);
 #if MSFP_UPLIFT
-    for (int j = 0; j < NB; ++j) {
+    for (int j = 0; j < NB; ++j)
         row->compression[j] = msfp_compression(p, w, j);
-        row->seat_stored += w->seat[j][MSFP_SEAT_STORED];
-    }
 #endif
 }

@@ -6,6 +6,7 @@
 #include "heat.h"
 
 #define SMALLEST_STEP 1e-9     /* [s], far below any period of a bearing */
+#define AT_LIMIT 500           /* steps in a row; fewer pass by where a rim is met (Hairer and Wanner, Solving ODEs II, IV.2: 15) */
 #define SHORTEST_TO_EVENT 1e-6 /* [s]; an event nearer than this is stepped over: rounding would drown a step to it */
 
 
@@ -13,7 +14,7 @@ static const int unknown[MSFP_ND] = MSFP_FREE;
 
 const char *msfp_status_name(int status)
 {
-    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard", "parted" };
+    static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard", "parted", "stiff" };
     return names[status];
 }
 
@@ -84,6 +85,7 @@ static int settle(msfp_run *run)
     msfp_heat_settle(run);
     msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
     run->now.moved = msfp_moved_power(&run->parameters, &at, &run->work);
+    msfp_balance_begin(run, &at);
     memset(run->slope, 0, sizeof run->slope);
     run->have_unknowns = 0;
     run->restart = 1;
@@ -176,7 +178,9 @@ static int try_step(msfp_run *run, double h, double *error)
         return status;
     if (!(*error < INFINITY))
         return MSFP_E_FINITE;
-    return *error <= 1.0 ? msfp_check_state(run, &run->work, &run->next) : MSFP_OK;
+    if (*error > 1.0)
+        return MSFP_OK;
+    return msfp_balanced(run) ? msfp_check_state(run, &run->work, &run->next) : MSFP_E_STEP;
 }
 
 static double controlled(const msfp_run *run, double error)
@@ -189,8 +193,10 @@ static double controlled(const msfp_run *run, double error)
 /* Shrink after a failure that a shorter step may cure. Returns nonzero when there is no shorter step. */
 static int shrink(msfp_run *run, double h, double factor, int status)
 {
+    /* The moment in which a body leaves is known well enough before steps in flight are nothing but rounding. */
+    const double smallest = status == MSFP_E_PARTED ? SHORTEST_TO_EVENT : SMALLEST_STEP;
     run->h = h * factor;
-    if (run->h >= SMALLEST_STEP * fmax(1.0, run->now.t))
+    if (run->h >= smallest * fmax(1.0, run->now.t))
         return 0;
     run->status = msfp_last_word(run, status);
     return 1;
@@ -205,6 +211,8 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->h = fmax(h * controlled(run, error), cut ? run->h : 0.0);
     run->previous_error = error;
     run->restart = run->shortened = 0;
+    if (run->at_limit >= AT_LIMIT)
+        run->status = msfp_last_word(run, MSFP_E_STIFF);
     const int stop = msfp_record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);

@@ -24,6 +24,9 @@ int msfp_write_row(msfp_run *run, const msfp_state *s);
 /* Time of the next row where rows are wanted at even times. */
 double msfp_next_output(const msfp_run *run);
 int msfp_write_step(msfp_run *run);
+/* Whether the step just made, by an energy that nothing gave it, went over what it cannot have seen. */
+int msfp_balanced(msfp_run *run);
+void msfp_balance_begin(msfp_run *run, const msfp_point *at);
 /* The status of a run that cannot go on for want of a shorter step: that, or what lies behind it. */
 int msfp_last_word(msfp_run *run, int status);
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
