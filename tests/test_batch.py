@@ -76,11 +76,13 @@ import sys; sys.path.insert(0, {tests!r})
 import numpy as np
 from test_batch import alone, mixed
 from msfp_gen import simulate_batch
+from msfp_gen.scenefile import changed_scene
 from support import scene_of
 names = ("fenz-test2", "fenz-test5", "fenz-test1", "fenz-test4")
 planar = [scene_of(n, dict(dimension="planar")) for n in names]
 light = [scene_of(n, dict(sliders="massless", rims=False)) for n in (*names, "becker-circle-50")]
-scenes = [*mixed(), *planar, *light]
+failing = [changed_scene("ridgecrest-clc", {{"motion.scale": scale}}) for scale in (6.0, 8.0)]
+scenes = [*mixed(), *failing, *planar, *light]
 for scene, one in zip(scenes, simulate_batch(scenes, lanes={width})):
     other = alone(scene)
     assert one.provenance["batch"] == "{width} lanes", one.provenance
@@ -119,7 +121,7 @@ def test_lanes_are_refilled_and_order_is_kept() -> None:
 
 def test_a_failure_in_one_lane_leaves_the_others_as_they_are() -> None:
     good = [scene_of("fenz-test2", solver={"rtol": rtol}, output_step=0.2) for rtol in (1e-3, 5e-4, 2e-4, 1e-4)]
-    broken = [changed_scene("ridgecrest-clc", {"motion.scale": 4.0})] * 4
+    broken = [changed_scene("ridgecrest-clc", {"motion.scale": 8.0})] * 4
     together = simulate_batch([scene for pair in zip(good, broken, strict=True) for scene in pair])
     expected = alone(broken[0])
     for one, other in zip(together[0::2], map(alone, good), strict=True):

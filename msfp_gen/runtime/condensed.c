@@ -104,7 +104,7 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
                    double f[MSFP_NB][2], double *residual, double *tangent)
 {
 #if MSFP_BATCH
-    msfp_request request = { p, 0, at, seed, w, f, residual, tangent, 0, INFINITY, MSFP_OK, -1, 0.0, NULL, NULL, NULL, 0 };
+    msfp_request request = { p, 0, at, seed, w, f, residual, tangent, 0, INFINITY, MSFP_OK, -1, 0.0, NULL, NULL, NULL, 0, 0 };
     if (msfp_batch_asked(&request))
         return request.status;
 #endif

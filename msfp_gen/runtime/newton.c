@@ -11,6 +11,7 @@
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
+#define MOST 30      /* steps */
 #define ARRIVED 1e-3 /* a residual above this is never the last */
 
 static const int unknown[ND] = MSFP_FREE;
@@ -67,7 +68,7 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
     ++run->counts[MSFP_COUNT_EVALUATIONS];
 #if MSFP_BATCH
     msfp_request request = { &run->parameters, 0, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
-                             s->descend ? s : NULL, run->factors, run->pivots, 0 };
+                             s->descend ? s : NULL, run->factors, run->pivots, s->descend, 0 };
     s->taken = 0;
     if (msfp_batch_asked(&request)) {
         s->descend = 0;
@@ -212,6 +213,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
     if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
+        s->keep = INFINITY;
         const int status = factorise(run, s);
         if (status)
             return failed(run, status, size);
@@ -229,14 +231,14 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     const double goal = s->goal = s->keep = fmin(ARRIVED, fmax(rounding(s), 1e-2 * run->options.rtol));
     double residual[DOF], step[DOF];
     int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
-    s->descend = good;
+    s->descend = good ? MOST : 0;
     s->taken = 0;
     s->before = INFINITY;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     good = s->taken ? size < 0.1 * s->before : good;
     run->work_sign = 0;
     for (int i = s->taken; size > goal; ++i) {
-        if (i == 30 || !(size < INFINITY))
+        if (i >= MOST || !(size < INFINITY))
             return failed(run, MSFP_E_NEWTON, size);
         ++run->counts[MSFP_COUNT_NEWTON];
         const int fresh = !good;
@@ -248,7 +250,7 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
         }
         const double before = size;
         s->keep = fresh ? ARRIVED : goal;
-        s->descend = !fresh;
+        s->descend = fresh ? 0 : MOST - i - 1;
         s->before = before;
         size = take_step(run, s, residual, step, size, fresh);
         good = size < 0.1 * (s->taken ? s->before : before);

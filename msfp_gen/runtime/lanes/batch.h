@@ -24,7 +24,7 @@ typedef struct {
     msfp_stage *stage;          /* Newton may go on in it; NULL: one evaluation */
     const double *factors;      /* with these */
     const int *pivots;
-    int more;                   /* evaluations beyond the first */
+    int most, more;             /* steps it may take; evaluations beyond the first */
 } msfp_request;
 
 typedef struct msfp_batch msfp_batch;

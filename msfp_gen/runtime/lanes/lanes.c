@@ -307,7 +307,7 @@ static unsigned going_on(const lane_work *w, msfp_request *const *r, int count, 
         const double size = w->status[i] ? INFINITY : w->size[i];
         if (!r[i]->stage || done >> i & 1 || size <= r[i]->stage->goal || !(size < INFINITY || r[i]->stage->taken))
             continue;
-        on |= (unsigned)(size < 0.1 * r[i]->stage->before) << i;
+        on |= (unsigned)(size < 0.1 * r[i]->stage->before && r[i]->stage->taken < r[i]->most) << i;
         *back |= (unsigned)(r[i]->stage->taken && !(size < r[i]->stage->before)) << i;
     }
     return on & ~*back;
