@@ -23,8 +23,8 @@ class Generated:
     stages: dict[str, float]
 
 
-def generate(spec: ModelSpec, module: str) -> Generated:
-    """Derive, lower and emit one model; `module` names the extension.
+def generate(spec: ModelSpec, module: str, batch: bool = False) -> Generated:
+    """Derive, lower and emit one model; `module` names the extension, `batch` asks for kernels of many runs at once.
 
     Returns the text of every generated file, the number of statements and of arithmetic operations of
     the programs (of one body and one surface: C loops over them), and the seconds of each stage.
@@ -42,7 +42,7 @@ def generate(spec: ModelSpec, module: str) -> Generated:
     done()
     kernels = tuple(lower(program) for program in equations.programs)
     done()
-    files = emit(equations, kernels, module)
+    files = emit(equations, kernels, module, batch)
     done()
     stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), marks, marks[1:], strict=False)}
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)

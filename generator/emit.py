@@ -167,8 +167,13 @@ def lanes(surfaces: int) -> int:
     return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
-    """Render all generated files: {file name: text}."""
+LANE_FUNCTIONS = ("forward", "upright", "top_wrench", "interface_force", "surface_local", "contact", "moment_to_world",
+                  "angular_balance")  # fmt: skip
+"""Programs of one evaluation of the condensed equations, which a batch runs for several bearings at once."""
+
+
+def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: bool = False) -> dict[str, str]:
+    """Render all generated files: {file name: text}; with those of a batch where one is wanted."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = resources.files("msfp_gen.templates")
@@ -204,10 +209,12 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "flows": spec.effects.flows,
         "heat": HEAT_KERNEL if law is not None and law.heats else (),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
+        "batch": batch,
+        "lane_functions": LANE_FUNCTIONS,
     }
     names = {
         "msfp_model.h": "msfp_model.h.jinja",
         "msfp_kernels.h": "msfp_kernels.h.jinja",
         f"{module}.pyx": "module.pyx.jinja",
-    }
+    } | ({"msfp_lane_kernels.h": "msfp_lane_kernels.h.jinja"} if batch else {})
     return {name: environment.get_template(template).render(context, file=name) for name, template in names.items()}

@@ -12,6 +12,7 @@ from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen import presets
+    from msfp_gen.batch import simulate_batch
     from msfp_gen.bearing import Bearing, Body, Surface
     from msfp_gen.build import build_model
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
@@ -47,6 +48,7 @@ _HOMES = {
     "load_scene": "scenefile",
     "presets": "presets",
     "simulate": "simulation",
+    "simulate_batch": "batch",
 }
 
 __all__ = [
@@ -72,6 +74,7 @@ __all__ = [
     "load_scene",
     "presets",
     "simulate",
+    "simulate_batch",
 ]
 
 

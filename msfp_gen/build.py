@@ -21,7 +21,7 @@ from time import perf_counter
 from types import ModuleType
 
 from msfp_gen import cache
-from msfp_gen.compiler import LOG_NAME, compile_extension
+from msfp_gen.compiler import FLAGS, LANES, LOG_NAME, compile_extension
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.layout import Effects, Layout, ModelSpec
 from msfp_gen.model import Model
@@ -29,7 +29,7 @@ from msfp_gen.model import Model
 Progress = Callable[[str, float], None]
 GENERATED = 0.13  # share of a build that deriving, lowering and emitting takes; the rest is the compiler
 
-_models: dict[ModelSpec, Model] = {}
+_models: dict[tuple[ModelSpec, int], Model] = {}
 _models_lock = threading.Lock()
 
 
@@ -55,13 +55,17 @@ class BuildInfo:
     key: str = ""
 
 
-def build_model(layout: Layout, effects: Effects | None = None, *, progress: Progress | None = None) -> Model:
+def build_model(
+    layout: Layout, effects: Effects | None = None, *, lanes: int = 0, progress: Progress | None = None
+) -> Model:
     """The compiled model of a layout: derived, emitted and compiled once, then imported from the cache.
 
     Parameters
     ----------
     layout, effects
         What determines the equations; `effects=None` means `Effects()`.
+    lanes
+        How many runs a batch takes side by side: 8, 4 or 2 (`batch.lanes_here`); 0: a model for one run at a time.
     progress
         Called with what is being done and how much of the build is done, 0 to 1; None: silent.
 
@@ -75,15 +79,15 @@ def build_model(layout: Layout, effects: Effects | None = None, *, progress: Pro
     """
     spec = ModelSpec(layout, Effects() if effects is None else effects)
     with _models_lock:
-        if spec not in _models:
-            _models[spec] = _load_model(spec, progress)
-        return _models[spec]
+        if (spec, lanes) not in _models:
+            _models[spec, lanes] = _load_model(spec, lanes, progress)
+        return _models[spec, lanes]
 
 
-def prepare(spec: ModelSpec, progress: Progress | None = None) -> BuildInfo:
+def prepare(spec: ModelSpec, progress: Progress | None = None, lanes: int = 0) -> BuildInfo:
     """Make sure that the cache holds the model, and say where; imports nothing of it."""
     begin = perf_counter()
-    entry = cache.Entry.of(spec)
+    entry = cache.Entry.of(spec, lanes)
     manifest, built = entry.find(), False
     if manifest is None:
         say = progress or _silent
@@ -140,9 +144,10 @@ def load_extension(path: Path, module: str) -> ModuleType:
     return extension
 
 
-def runtime_sources() -> dict[str, str]:
-    """The hand-written C that is compiled with every model: file name -> text."""
-    files = sorted((cache.PACKAGE / "runtime").glob("*.[ch]"))
+def runtime_sources(lanes: int = 0) -> dict[str, str]:
+    """The hand-written C that is compiled with every model, or with one for batches: file name -> text."""
+    folder = cache.PACKAGE / "runtime"
+    files = sorted(folder.rglob("*.[ch]") if lanes else folder.glob("*.[ch]"))
     return {path.name: path.read_text(encoding="utf-8") for path in files}
 
 
@@ -151,12 +156,16 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
     from msfp_gen.generator import generate
 
     say(f"deriving and emitting {entry.spec.key}", 0.0)
-    generated = generate(entry.spec, entry.module)
-    sources = {**runtime_sources(), **generated.files}
+    lanes = entry.lanes
+    generated = generate(entry.spec, entry.module, batch=True) if lanes else generate(entry.spec, entry.module)
+    sources = {**runtime_sources(lanes), **generated.files}
+    width = f"-DMSFP_WIDTH={lanes}"
+    extra = dict.fromkeys(sources, (width, *FLAGS["lanes"], *LANES[lanes])) if lanes else {}
     begin = perf_counter()
     extension = compile_extension(
         sources, entry.module, folder, lambda done, count: say(f"compiling {entry.module} ({done} of {count} files)",
                                                                GENERATED + (1 - GENERATED) * done / count),
+        extra,
     )  # fmt: skip
     manifest = cache.Manifest(
         module=entry.module, spec=entry.spec.key, key=entry.key, inputs=entry.inputs, extension=extension.name,
@@ -168,9 +177,9 @@ def _make(entry: cache.Entry, folder: Path, say: Progress) -> cache.Manifest:
     return manifest
 
 
-def _load_model(spec: ModelSpec, progress: Progress | None) -> Model:
+def _load_model(spec: ModelSpec, lanes: int, progress: Progress | None) -> Model:
     begin = perf_counter()
-    info = prepare(spec, progress)
+    info = prepare(spec, progress, lanes)
     extension = load_extension(info.path, info.module)
     return Model(spec, extension, replace(info, seconds=perf_counter() - begin))
 

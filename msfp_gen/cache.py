@@ -19,7 +19,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler
+from msfp_gen.compiler import EXTENSION_SUFFIX, FLAGS, LANES, find_compiler
 from msfp_gen.errors import InputError
 from msfp_gen.layout import ModelSpec
 from msfp_gen.version import __version__
@@ -85,9 +85,9 @@ def cache_root() -> Path:
     return user_cache_path("msfp-gen") / "models"
 
 
-def module_name(spec: ModelSpec) -> str:
-    """Name of the extension module, `msfp_<n>_<m>_<p>`."""
-    return f"msfp_{spec.layout.name}"
+def module_name(spec: ModelSpec, lanes: int = 0) -> str:
+    """Name of the extension module, `msfp_<n>_<m>_<p>`, and `_lanes<width>` where it is made for batches."""
+    return f"msfp_{spec.layout.name}" + (f"_lanes{lanes}" if lanes else "")
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,11 @@ class Entry:
     inputs: dict[str, Any]
     key: str
     folder: Path
+    lanes: int = 0
 
     @classmethod
-    def of(cls, spec: ModelSpec) -> Entry:
-        """The entry of a model; costs some milliseconds."""
+    def of(cls, spec: ModelSpec, lanes: int = 0) -> Entry:
+        """The entry of a model, or of the same for batches of so many lanes; costs some milliseconds."""
         compiler = find_compiler()
         inputs = {
             "manifest": 2,
@@ -117,9 +118,11 @@ class Entry:
             "compiler": [*compiler.command, compiler.path, compiler.version],
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
         }
+        if lanes:
+            inputs["lanes"] = [str(lanes), *LANES[lanes]]
         key = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-        module = module_name(spec)
-        return cls(spec, module, inputs, key, cache_root() / f"{module}-{key[:20]}")
+        module = module_name(spec, lanes)
+        return cls(spec, module, inputs, key, cache_root() / f"{module}-{key[:20]}", lanes)
 
     def find(self) -> Manifest | None:
         """The manifest of the built model; None if it is not built or, with a warning, if it is damaged."""

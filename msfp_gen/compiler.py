@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -34,12 +34,21 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "c": (
         "-std=c99", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-O2", "-fno-math-errno", "-fno-trapping-math",
         "-ffp-contract=off",
-        *shlex.split(os.environ.get("MSFP_GEN_CFLAGS", "")),
     ),
+    # A batch agrees with one run at a time to rounding: a product and a sum may be one operation, a quotient a product.
+    "lanes": ("-O3", "-ffp-contract=fast", "-freciprocal-math", "-Wno-psabi"),
+    "user": tuple(shlex.split(os.environ.get("MSFP_GEN_CFLAGS", ""))),
     # Cython's own output is not ours to keep free of warnings, and it is not where the time goes.
     "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
     "libraries": ("-lm",),
 }
+
+LANES: dict[int, tuple[str, ...]] = {
+    8: ("-march=x86-64-v4",),
+    4: ("-march=x86-64-v3",),
+    2: (),
+}
+"""Runs side by side in a vector -> what tells the compiler of the vectors: AVX-512, AVX2, and what every x86-64 has."""
 
 # What the first line that explains a failure looks like: gcc and clang, Cython, the linker.
 FAILURES = (
@@ -97,8 +106,9 @@ def check_headers() -> Path:
 
 
 def compile_extension(
-    sources: dict[str, str], module: str, folder: Path, progress: Callable[[int, int], None] | None = None
-) -> Path:
+    sources: dict[str, str], module: str, folder: Path, progress: Callable[[int, int], None] | None = None,
+    extra: Mapping[str, tuple[str, ...]] | None = None,
+) -> Path:  # fmt: skip
     """Write `sources` into `folder` and build the extension `module` there.
 
     Parameters
@@ -111,6 +121,8 @@ def compile_extension(
         A folder of the caller's; sources, `build.log` and the extension stay there, also after a failure.
     progress
         Called with how many C files are compiled, and how many there are.
+    extra
+        File name -> flags that this file alone takes as well.
 
     Returns
     -------
@@ -129,7 +141,8 @@ def compile_extension(
         (folder / name).write_text(text, encoding="utf-8")
     log = Log(folder)
     units = sorted(name for name in sources if name.endswith(".c"))
-    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler)] for name in units)]
+    more = extra or {}
+    chains = [_wrapper(module, compiler, include), *([_unit(name, compiler, more.get(name, ()))] for name in units)]
     for done in _at_once(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
@@ -193,8 +206,8 @@ def _at_once(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> I
             raise
 
 
-def _unit(name: str, compiler: Compiler) -> Step:
-    return Step(name, (*compiler.command, *FLAGS["c"], "-c", name, "-o", _object(name)))
+def _unit(name: str, compiler: Compiler, extra: tuple[str, ...]) -> Step:
+    return Step(name, (*compiler.command, *FLAGS["c"], *extra, *FLAGS["user"], "-c", name, "-o", _object(name)))
 
 
 def _wrapper(module: str, compiler: Compiler, include: Path) -> list[Step]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -31,21 +32,42 @@ def load_scene(source: str | Path) -> Scene:
 
     Raises InputError of one line that names the file, the path of the field, the value and the remedy.
     """
+    return changed_scene(source, {})
+
+
+def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
+    """The same with some fields changed: dotted path, such as `motion.scale`, -> value. Raises InputError likewise."""
     known = catalogue.descriptions("scene")
     if str(source) in known:
-        return scene_from_table(catalogue.scene_table(str(source)))
+        return scene_from_table(_changed(catalogue.scene_table(str(source)), changes))
     path = Path(source)
     if not is_file(path):
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        return scene_from_table(_toml(path.read_text(encoding="utf-8-sig")), path.parent)
+        return scene_from_table(_changed(_toml(path.read_text(encoding="utf-8-sig")), changes), path.parent)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
+    """A table with fields set that dotted paths name; that they are fields of a scene is for the schema to say."""
+    table = deepcopy(table)
+    for path, value in changes.items():
+        *way, last = path.split(".")
+        inner: Any = table
+        for name in way:
+            if name == "bearing" and isinstance(inner.get(name), str):  # a preset, which may have changes
+                inner[name] = {"preset": inner[name]}
+            inner = inner.setdefault(name, {})
+            if not isinstance(inner, dict):
+                raise InputError(f"{path} = {value!r}: {name} is {inner!r} here, which has no fields to change")
+        inner[last] = value
+    return table
 
 
 def _toml(text: str) -> Table:

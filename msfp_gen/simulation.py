@@ -84,26 +84,61 @@ def simulate(
     """
     if checkpoint is not None and not resume:
         _refuse_leftovers(checkpoint)
-    given, scene = scene, _settled(scene)
-    choice = scene.choice
-    effects: Effects | None = choice.effects
-    segments: list[Segment] = []
-    notes: list[Note] = []
-    while effects is not None:
+    course = Course.of(scene, strict)
+    while course.effects is not None:
+        segments = course.segments
         keep = None if checkpoint is None else segment_file(checkpoint, len(segments))
         again = resume and keep is not None and (keep.exists() or not (segments or kept_files(keep)))
-        segment = _segment(scene, effects, segments, progress, (keep, every, again), strict)
-        segments.append(segment)
-        effects = None if strict else widened(scene, effects, segment)
-        said = {note.kind for note in notes if not note.action}
-        notes += [note for note in notes_of(scene, segment, effects) if note.action or note.kind not in said]
-    last = segments[-1]
-    if not len(last.run.rows):
-        raise RunError(_message(scene, last), status=last.status)
-    result = _result(given, segments, tuple(notes))
+        course.took(_segment(course, progress, (keep, every, again)))
+    result = course.result()
     if not result.succeeded:
-        raise RunError(result.message, status=last.status, result=result)
+        raise RunError(result.message, status=result.status, result=result)
     return result
+
+
+@dataclass(eq=False)
+class Course:
+    """A scene on its way: the segments that have ended, and the effects of the next; None once it has ended for good.
+
+    given: the scene as it was given; scene: with its plates turned. notes: what has been said until now.
+    """
+
+    given: Scene
+    scene: Scene
+    strict: bool
+    effects: Effects | None
+    segments: list[Segment]
+    notes: list[Note]
+
+    @classmethod
+    def of(cls, scene: Scene, strict: bool = False) -> Course:
+        """The course of a scene, which has not begun. Raises as `simulate`."""
+        settled = _settled(scene)
+        return cls(scene, settled, strict, settled.choice.effects, [], [])
+
+    def begin(self, model: Model) -> tuple[Any, float]:
+        """The run of the next segment with a model that has its effects, and the azimuth of its frame."""
+        scene, before, choice = self.scene, self.segments[-1:], self.scene.choice
+        at = Begin.of(before[0].model, before[0].run, before[0].azimuth) if before else None
+        end = min(scene.end, choice.plane_until) if model.effects.dimension == "planar" else scene.end
+        return begin_run(scene, model, choice, end, at, stopping(scene, model.effects, self.strict))
+
+    def took(self, segment: Segment) -> None:
+        """Take a segment that has ended, and find what comes next."""
+        assert self.effects is not None
+        self.segments.append(segment)
+        following = None if self.strict else widened(self.scene, self.effects, segment)
+        said = {note.kind for note in self.notes if not note.action}
+        noted = notes_of(self.scene, segment, following)
+        self.notes += [note for note in noted if note.action or note.kind not in said]
+        self.effects = following
+
+    def result(self, **provenance: str) -> Result:
+        """What came of it; RunError where there is not one row."""
+        last = self.segments[-1]
+        if not len(last.run.rows):
+            raise RunError(_message(self.scene, last), status=last.status)
+        return _result(self, provenance)
 
 
 def _settled(scene: Scene) -> Scene:
@@ -125,23 +160,16 @@ def _refuse_leftovers(checkpoint: str | Path) -> None:
         )
 
 
-def _segment(
-    scene: Scene,
-    effects: Effects,
-    before: list[Segment],
-    progress: Progress | None,
-    keeping: tuple[Path | None, float, bool],
-    strict: bool,
-) -> Segment:
+def _segment(course: Course, progress: Progress | None, keeping: tuple[Path | None, float, bool]) -> Segment:
     """Run with one set of effects from where the segments before ended, as far as it goes."""
-    _check(scene, effects)
+    scene, effects = course.scene, course.effects
+    assert effects is not None
+    check(scene, effects)
     begin = time.perf_counter()
     model = build_model(scene.bearing.layout, effects)
     path, every, resume = keeping
     kept = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
-    at = Begin.of(before[-1].model, before[-1].run, before[-1].azimuth) if before else None
-    end = min(scene.end, scene.choice.plane_until) if effects.dimension == "planar" else scene.end
-    run, azimuth = begin_run(scene, model, scene.choice, end, at, stopping(scene, effects, strict))
+    run, azimuth = course.begin(model)
     if kept is not None:
         kept.restore(run)
     ready = time.perf_counter()
@@ -150,7 +178,8 @@ def _segment(
     return Segment(model, run, azimuth, status, wall, ready - begin)
 
 
-def _check(scene: Scene, effects: Effects) -> None:
+def check(scene: Scene, effects: Effects) -> None:
+    """InputError where a method cannot take these effects."""
     if effects.sliders == "massless" and scene.solver.method == "dopri5":
         raise InputError(
             "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
@@ -185,9 +214,10 @@ def _message(scene: Scene, segment: Segment) -> str:
     return failures.message(scene, segment.model, segment.run, segment.status, why)
 
 
-def _result(scene: Scene, segments: list[Segment], notes: tuple[Note, ...]) -> Result:
+def _result(course: Course, more: dict[str, str]) -> Result:
     from msfp_gen.result import Result
 
+    scene, segments = course.given, course.segments
     last = segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
@@ -199,6 +229,7 @@ def _result(scene: Scene, segments: list[Segment], notes: tuple[Note, ...]) -> R
         "method": scene.solver.method,
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
+        **more,
     }
     history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
     return Result(
@@ -209,7 +240,7 @@ def _result(scene: Scene, segments: list[Segment], notes: tuple[Note, ...]) -> R
         status=last.status,
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
-        notes=notes + balance_of(scene, history),
+        notes=tuple(course.notes) + balance_of(scene, history),
     )
 
 

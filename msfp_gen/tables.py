@@ -69,6 +69,20 @@ def summary_tables(result: Result) -> list[Table]:
     return tables
 
 
+def batch_table(results: Sequence[Result]) -> Table:
+    """Many runs, one a row: how each ended, its peaks, and how it was run."""
+    rows = [
+        (
+            run["name"] or "unnamed scene", run["status"], f"{run['peak_displacement']['radial'] * 1e3:.2f}",
+            f"{run['peak_top_force']['radial'] * 1e-3:.3f}", str(len(run["rims_met"])), f"{run['wall_time'] * 1e3:.1f}",
+            result.provenance.get("batch", ""),
+        )
+        for result in results for run in (result.summary,)
+    ]  # fmt: skip
+    columns = ("scene", "status", "peak displacement [mm]", "peak force [kN]", "rims met", "time [ms]", "run")
+    return Table(f"{len(results)} runs", columns, rows)
+
+
 def build_table(info: BuildInfo) -> Table:
     """What a build cost, what it holds and where it lies."""
     stages = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in info.stages.items())

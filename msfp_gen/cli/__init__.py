@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import benching, building, drawing, judging, records, reporting, running, storing
+from msfp_gen.cli import batching, benching, building, drawing, judging, records, reporting, running, storing
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import heard
 from msfp_gen.errors import MsfpError
@@ -25,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 # In the order in which help lists the commands.
-for group in (running, drawing, judging, benching, reporting, records, building, storing):
+for group in (running, batching, drawing, judging, benching, reporting, records, building, storing):
     app.add_typer(group.app)
 
 

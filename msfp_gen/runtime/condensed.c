@@ -2,6 +2,9 @@
 #include <math.h>
 #include <string.h>
 #include "stack.h"
+#if MSFP_BATCH
+#include "batch.h"
+#endif
 
 static const int unknown[ND] = MSFP_FREE;
 
@@ -56,8 +59,8 @@ static void forces(const msfp_parameters *p, msfp_work *w, double *residual, dou
     }
 }
 
-MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                   double f[MSFP_NB][2], double *residual, double *tangent)
+MSFP_WIDE static int alone(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                           double f[MSFP_NB][2], double *residual, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
     if (!seed->same_base)
@@ -95,6 +98,17 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
         w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
     }
     return MSFP_OK;
+}
+
+int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                   double f[MSFP_NB][2], double *residual, double *tangent)
+{
+#if MSFP_BATCH
+    msfp_request request = { p, 0, at, seed, w, f, residual, tangent, 0, INFINITY, MSFP_OK, -1, 0.0, NULL, NULL, NULL, 0, 0 };
+    if (msfp_batch_asked(&request))
+        return request.status;
+#endif
+    return alone(p, at, seed, w, f, residual, tangent);
 }
 
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)

@@ -23,6 +23,13 @@ extern "C" {
 #endif
 #define MSFP_INLINE MSFP_INLINED static inline
 
+#if MSFP_BATCH
+/* The library's fmax, without a call: a batch is compiled for the processor at hand. */
+#include <math.h>
+MSFP_INLINE double msfp_larger(double a, double b) { return a > b || b != b ? a : b; }
+#define fmax msfp_larger
+#endif
+
 /* ---- values: a bearing and its top ------------------------------------------------------- */
 
 #ifndef MSFP_LAW /* the friction coefficient is constant */

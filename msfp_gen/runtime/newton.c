@@ -2,6 +2,9 @@
 #include <math.h>
 #include <string.h>
 #include "newton.h"
+#if MSFP_BATCH
+#include "batch.h"
+#endif
 
 #define DOF MSFP_DOF
 #define NB MSFP_NB
@@ -13,6 +16,9 @@
 #else
 #define FLOWS(s) 0
 #endif
+
+#define MOST 30      /* steps */
+#define ARRIVED 1e-3 /* a residual above this is never the last */
 
 static const int unknown[ND] = MSFP_FREE;
 
@@ -68,10 +74,27 @@ static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
     return size;
 }
 
-/* Residual over N, its largest entry relative to its natural size, and the tangent (or NULL). Returns a status. */
+/* Residual over N, its largest entry relative to its natural size and the tangent (or NULL). Returns a status. */
 static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual, double *tangent, double *size)
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
+#if MSFP_BATCH
+    msfp_request request = { &run->parameters, 0, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
+                             s->descend ? s : NULL, run->factors, run->pivots, s->descend, 0 };
+    s->taken = 0;
+    if (!FLOWS(s) && msfp_batch_asked(&request)) {
+        s->descend = 0;
+        run->counts[MSFP_COUNT_NEWTON] += s->taken;
+        run->counts[MSFP_COUNT_EVALUATIONS] += request.more;
+        if (request.more)
+            place(s);
+        if (!request.status) {
+            *size = request.size;
+            run->worst_surface = request.worst < 0 ? run->worst_surface : request.worst / ND + 1;
+        }
+        return request.status;
+    }
+#endif
     const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
     if (status)
         return status;
@@ -105,6 +128,7 @@ static int factorise(msfp_run *run, msfp_stage *s, double *residual, double *siz
     place(s);
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
     run->factored_beta = 0.0;
+    s->descend = 0;
     const int status = evaluate(run, s, &run->work, residual, run->factors, size);
     if (status)
         return status;
@@ -139,6 +163,8 @@ static double take_step(msfp_run *run, msfp_stage *s, double *residual, double *
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
 {
     double residual[DOF], step[DOF];
+    s->goal = s->keep = 0.0;
+    s->descend = 0;
     const double with_inertia = s->seed.ca;
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
@@ -214,6 +240,7 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
     if (run->work_sign && run->determinant == 0)
         run->determinant = run->work_sign;
     if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
+        s->keep = INFINITY;
         double residual[DOF];
         const int status = factorise(run, s, residual, &size);
         if (status)
@@ -235,31 +262,45 @@ static int trusted(const msfp_run *run, const msfp_stage *s)
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    double goal = fmin(1e-3, fmax(rounding(s), (FLOWS(s) ? 0.3 : 1e-2) * run->options.rtol));
+    double goal = fmin(ARRIVED, fmax(rounding(s), (FLOWS(s) ? 0.3 : 1e-2) * run->options.rtol));
     double residual[DOF], step[DOF], size = INFINITY;
     int fresh = !trusted(run, s), status = MSFP_OK;
+    s->goal = s->keep = goal;
+    s->descend = fresh ? 0 : MOST;
+    s->taken = 0;
+    s->before = INFINITY;
     run->work_sign = 0;
+    if (!fresh)
+        size = msfp_stage_residual(run, s, &run->work, residual);
+    const int taken = s->taken;
+    if (taken && size > goal && size < INFINITY && size >= 0.1 * s->before) {
+        ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
+        fresh = 1;
+    }
     if (fresh)
         status = factorise(run, s, residual, &size);
-    else
-        size = msfp_stage_residual(run, s, &run->work, residual);
-    if (status && status != MSFP_E_IRREGULAR) /* a guess for which forces cannot be formed */
+    if (status && !taken && status != MSFP_E_IRREGULAR) /* a guess for which forces cannot be formed */
         status = MSFP_E_NEWTON;
-    for (int i = 0; size > goal; ++i) {
-        if (status || i == 30 || !(size < INFINITY))
+    for (int i = taken; size > goal; ++i) {
+        if (status || i >= MOST || !(size < INFINITY))
             return failed(run, status ? status : MSFP_E_NEWTON, size);
-        if (i == 10)
-            goal = fmax(goal, jump(run, s));
+        if (i >= 10)
+            s->goal = goal = fmax(goal, jump(run, s));
         ++run->counts[MSFP_COUNT_NEWTON];
         const double before = size;
+        s->keep = fresh ? ARRIVED : goal;
+        s->descend = fresh ? 0 : MOST - i - 1;
+        s->before = before;
         size = take_step(run, s, residual, step, size, fresh);
-        if (fresh && size < 1e-3 && drowned(s, step))
+        if (fresh && size < ARRIVED && drowned(s, step))
             break;
-        fresh = size > goal && size >= 0.1 * before;
+        i += s->taken;
+        fresh = size > goal && size >= 0.1 * (s->taken ? s->before : before);
         if (fresh) {
             ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
             status = factorise(run, s, residual, &size);
         }
     }
+    s->descend = 0;
     return regular(run, s, size);
 }

@@ -8,6 +8,11 @@ typedef struct {
     double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
     double beta;
     double inertia; /* 1; 0 leaves all inertia out */
+    double goal;    /* residual at which Newton has arrived */
+    double keep;    /* residual up to which an evaluation may be the last: a batch leaves no other in the work area */
+    int descend;    /* how many steps a batch may take from the next evaluation on, with the factors at hand; 0: none .. */
+    int taken;      /* .. and how many steps it then took, .. */
+    double before;  /* .. the residual before the evaluation, or before the last of those steps */
     msfp_seed seed;
     msfp_point at;
     double f[MSFP_NB][2];

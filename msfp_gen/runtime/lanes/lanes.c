@@ -1,0 +1,365 @@
+/* lanes.c: the condensed equations of several runs at once: kinematics.c and condensed.c with a run in every lane. */
+#define _DEFAULT_SOURCE /* posix_memalign */
+#include "lane_surface.h"
+#include <stdlib.h>
+
+static const int unknown[ND] = MSFP_FREE;
+enum { BALANCED = MSFP_PLANAR ? 1 : 3 }; /* components of a turning */
+
+static void coordinates_of(lane *x, const lane *q, const lane *v, const lane *a)
+{
+    const lane *orders[3] = { q, v, a };
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < BALANCED; ++i)
+            x[coordinate(order, i)] = orders[order][MSFP_PLANAR ? 1 : i];
+}
+
+/* The base, from the inertial frame at r_01. */
+static void base(lane_work *w)
+{
+    lane ground[MSFP_BODY_SIZE], e[3][3];
+    memset(ground, 0, sizeof ground);
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            e[i][k] = lane_of(i == k);
+    lane_body_t1_put(ground, e[0]);
+    lane_body_t2_put(ground, e[1]);
+    lane_body_t3_put(ground, e[2]);
+    lane_body_C_put(ground, w->in.at.base[0]);
+    lane_body_V_put(ground, w->in.at.base[1]);
+    lane_body_A_put(ground, w->in.at.base[2]);
+    coordinates_of(w->out.x[0], w->in.at.base[0] + 3, w->in.at.base[1] + 3, w->in.at.base[2] + 3);
+    lane_forward(w->in.parts.body[0], ground, w->out.x[0], w->out.body[0]);
+}
+
+/* Columns of the unknowns themselves; those of other bodies are zero from the beginning. */
+static void seeds(lane_work *w)
+{
+    const lane factors[3] = { w->in.seed.cq, w->in.seed.cv, w->in.seed.ca };
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i)
+            for (int order = 0; order < 3; ++order)
+                w->dx[k + 1][field(order, i) * DOF + k * ND + i] = factors[order];
+}
+
+/* A body moves with the unknowns of those below it and its own; columns of those above stay zero. */
+static void stack_up(lane_work *w, int tangent)
+{
+    base(w);
+    for (int k = 1; k <= NB; ++k) {
+        coordinates_of(w->out.x[k], w->in.at.q[k - 1], w->in.at.v[k - 1], w->in.at.a[k - 1]);
+        if (tangent)
+            lane_forward_tangent(k * ND, w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
+        else
+            lane_forward(w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k]);
+    }
+}
+
+static void top(lane_work *w, int tangent)
+{
+    static const lane zero[6 * DOF];
+    lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
+    lane_force_F_put(force, w->in.at.load);
+    lane_moment_M_put(moment, w->in.at.load + 3);
+#if MSFP_TURNED
+    lane support[MSFP_SUPPORT_SIZE], upright[MSFP_UPRIGHT_SIZE];
+    for (int order = 0; order < 2; ++order)
+        for (int i = 0; i < PAIR; ++i)
+            support[order * PAIR + i] = w->in.at.support[order][MSFP_PLANAR ? 1 : i];
+    lane_upright(support, upright);
+#endif
+    if (tangent) {
+        lane_top_wrench_tangent(DOF, w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench, w->dbody[NB], w->dx[NB],
+                                zero, zero, dwrench);
+        memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);
+        memcpy(w->dmoment[NB], dwrench + VECTOR * DOF, sizeof w->dmoment[NB]);
+    } else
+        lane_top_wrench(w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench);
+    memcpy(w->out.force[NB], wrench, sizeof w->out.force[NB]);
+    memcpy(w->out.moment[NB], wrench + VECTOR, sizeof w->out.moment[NB]);
+    w->more.reference = w->in.weight + lane_abs(w->in.at.load[0]) + lane_abs(w->in.at.load[1]) + lane_abs(w->in.at.load[2]);
+}
+
+static void forces(lane_work *w, int tangent)
+{
+    for (int j = NB - 1; j >= 0; --j)
+        if (tangent)
+            lane_interface_force_tangent(DOF, w->in.parts.body[j + 1], w->out.body[j + 1], w->out.force[j + 1], w->out.force[j], w->dbody[j + 1],
+                                         w->dforce[j + 1], w->dforce[j]);
+        else
+            lane_interface_force(w->in.parts.body[j + 1], w->out.body[j + 1], w->out.force[j + 1], w->out.force[j]);
+}
+
+static void balances(lane_work *w, int tangent)
+{
+    lane out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    for (int k = 1; k <= NB; ++k) {
+        if (tangent) {
+            lane_angular_balance_tangent(DOF, w->in.parts.body[k], w->out.body[k], w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k],
+                                         w->out.moment[k], out, w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], w->dmoment[k], dout);
+            memcpy(w->tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
+        } else
+            lane_angular_balance(w->in.parts.body[k], w->out.body[k], w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k], w->out.moment[k], out);
+        memcpy(w->residual + (k - 1) * ND, out, NA * sizeof *out);
+        w->more.lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? lane_of(0.0) : out[MSFP_ANGULAR_SIZE - 1];
+    }
+}
+
+/* msfp_residual_scale, and the largest entry by it. */
+static void measure(lane_work *w)
+{
+    w->size = lane_of(0.0);
+    w->worst = lane_of(-1.0);
+    for (int k = 0; k < NB; ++k) {
+        const lane *par = w->in.parts.surface[k];
+        const lane met = MSFP_RIMS ? lane_abs(w->out.rim[k][MSFP_RIM_FC]) : lane_of(0.0);
+        const lane pressed = lane_min(w->out.contact[k][MSFP_CONTACT_N], 1e3 * w->more.reference) + met;
+        const lane natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+        const lane scale = lane_max(natural, lane_of(1e-12));
+        for (int i = k * ND; i < (k + 1) * ND; ++i) {
+            const lane one = lane_abs(w->residual[i]) / scale;
+            const lane_mask larger = ~(one <= w->size);
+            w->size = lane_choose(larger, one, w->size);
+            w->worst = lane_choose(larger, lane_of(i), w->worst);
+        }
+    }
+}
+
+/* Residual and tangent over N where that is asked for: newton.c has why. */
+static void over_normal(lane_work *w, int tangent)
+{
+    for (int k = 0; k < NB; ++k) {
+        const lane normal = lane_choose(w->over, w->out.contact[k][MSFP_CONTACT_N], lane_of(1.0)), inverse = 1.0 / normal;
+        for (int i = k * ND; i < (k + 1) * ND; ++i) {
+            w->residual[i] /= normal;
+            for (int c = 0; c < DOF && tangent; ++c) {
+                const lane change = lane_choose(w->over, w->residual[i] * w->dnormal[k][c], lane_of(0.0));
+                w->tangent[i * DOF + c] = inverse * (w->tangent[i * DOF + c] - change);
+            }
+        }
+    }
+}
+
+/* ---- from the runs and back ------------------------------------------------------------------------------------- */
+
+#define COUNT(type) ((int)(sizeof(type) / sizeof(lane)))
+#define GATHER(to, pointer)                                                                                         \
+    do {                                                                                                            \
+        const double *from[W];                                                                                      \
+        for (int i = 0; i < W; ++i)                                                                                 \
+            from[i] = (const double *)(pointer);                                                                    \
+        lane_gather((lane *)&(to), from, COUNT(to));                                                                \
+    } while (0)
+#define SCATTER(from, wanted, pointer)                                                                              \
+    do {                                                                                                            \
+        double *to[W];                                                                                              \
+        for (int i = 0; i < W; ++i)                                                                                 \
+            to[i] = (wanted) ? (double *)(pointer) : NULL;                                                          \
+        lane_scatter(to, (const lane *)&(from), COUNT(from));                                                       \
+    } while (0)
+
+/* Scenes of one bearing are common: what the lanes hold already stays. */
+static void gather_parameters(lane_work *w, msfp_request *const *r)
+{
+    int same = 1;
+    for (int i = 0; i < W; ++i) {
+        same &= w->values[i] == r[i]->values;
+        w->values[i] = r[i]->values;
+        w->in.weight[i] = r[i]->parameters->weight;
+    }
+    if (same)
+        return;
+    GATHER(w->in.parts, r[i]->parameters->body);
+    GATHER(w->in.top, r[i]->parameters->top);
+    GATHER(w->in.rim_cosine, r[i]->parameters->rim_cosine);
+}
+
+static void gather(lane_work *w, msfp_request *const *r)
+{
+    GATHER(w->in.at, r[i]->at->base);
+    GATHER(w->in.seed, &r[i]->seed->cq);
+    GATHER(w->in.f, r[i]->f);
+    gather_parameters(w, r);
+    for (int i = 0; i < W; ++i) {
+        w->parameters[i] = r[i]->parameters;
+        w->over[i] = r[i]->over_normal ? -1 : 0;
+        w->status[i] = MSFP_OK;
+    }
+}
+
+/* Runs that fill a vector up come last and get nothing. */
+static void scatter(lane_work *w, msfp_request *const *r, int count, int tangent)
+{
+    int full = 0;
+    for (int i = 0; i < count; ++i) {
+        r[i]->status = w->status[i];
+        r[i]->size = w->size[i];
+        r[i]->worst = (int)w->worst[i];
+        full += w->status[i] != MSFP_OK || w->size[i] <= r[i]->keep;
+    }
+#define KEPT (i < count && (w->status[i] != MSFP_OK || w->size[i] <= r[i]->keep))
+    SCATTER(w->in.f, i < count, r[i]->f);
+    SCATTER(w->residual, i < count, r[i]->residual);
+    if (tangent)
+        SCATTER(w->tangent, i < count, r[i]->tangent);
+    if (!full)
+        return;
+    SCATTER(w->out, KEPT, r[i]->work->x);
+    SCATTER(w->more, KEPT, r[i]->work->rim_sum);
+    for (int i = 0; i < count; ++i)
+        for (int j = 0; j < NB && KEPT; ++j)
+            r[i]->work->rim_active[j] = w->rim_active[j][i];
+#undef KEPT
+}
+
+static void evaluate(lane_work *w, int tangent)
+{
+    if (tangent)
+        seeds(w);
+    stack_up(w, tangent);
+    top(w, tangent);
+    forces(w, tangent);
+    if (tangent)
+        lane_surfaces_columns(w);
+    else
+        lane_surfaces(w);
+    balances(w, tangent);
+    measure(w);
+    over_normal(w, tangent);
+}
+
+/* ---- Newton goes on while the factors at hand serve: take_step of newton.c ---------------------------------------- */
+
+/* What a step takes; runs that take none get another's. */
+static void gather_newton(lane_work *w, msfp_request *const *r)
+{
+    const msfp_request *some = NULL, *of[W];
+    for (int i = 0; i < W; ++i)
+        some = r[i]->stage ? r[i] : some;
+    for (int i = 0; i < W; ++i) {
+        of[i] = r[i]->stage ? r[i] : some;
+        w->newton.inertia[i] = of[i]->stage->inertia;
+        for (int k = 0; k < DOF; ++k)
+            w->newton.pivots[k][i] = of[i]->pivots[k];
+    }
+    GATHER(w->newton.Q, of[i]->stage->Q);
+    GATHER(w->newton.V, of[i]->stage->V);
+    GATHER(w->newton.factors, of[i]->factors);
+}
+
+/* msfp_lu_solve: x of the residual. */
+static void solve(const lane_work *w, lane *x)
+{
+    const lane *matrix = w->newton.factors;
+    memcpy(x, w->residual, sizeof w->residual);
+    for (int k = 0; k < DOF; ++k)
+        for (int run = 0; run < W; ++run) {
+            const int from = w->newton.pivots[k][run];
+            const double swap = x[from][run];
+            x[from][run] = x[k][run];
+            x[k][run] = swap;
+        }
+    for (int i = 1; i < DOF; ++i)
+        for (int j = 0; j < i; ++j)
+            x[i] -= matrix[i * DOF + j] * x[j];
+    for (int i = DOF - 1; i >= 0; --i) {
+        for (int j = i + 1; j < DOF; ++j)
+            x[i] -= matrix[i * DOF + j] * x[j];
+        x[i] *= matrix[i * DOF + i];
+    }
+}
+
+static lane_mask mask_of(unsigned bits)
+{
+    lane_mask mask = { 0 };
+    for (int run = 0; run < W; ++run)
+        mask[run] = bits >> run & 1 ? -1 : 0;
+    return mask;
+}
+
+/* Rates after a step of the runs `on`, and after the last step taken back of the runs `back`; angles and accelerations
+ * follow. */
+static void move(lane_work *w, unsigned on, unsigned back)
+{
+    const lane_mask forward = mask_of(on), backward = mask_of(back), moved = forward | backward;
+    const lane beta = w->in.seed.beta;
+    lane x[DOF];
+    solve(w, x);
+    for (int k = 0; k < NB; ++k) {
+        for (int i = 0; i < ND; ++i) {
+            lane *step = &w->newton.step[k * ND + i], *v = &w->in.at.v[k][unknown[i]];
+            *step = lane_choose(forward, x[k * ND + i], *step);
+            *v = lane_choose(forward, *v - *step, lane_choose(backward, *v + *step, *v));
+            const lane a = w->newton.inertia * (*v - w->newton.V[k][unknown[i]]) / beta;
+            w->in.at.a[k][unknown[i]] = lane_choose(moved, a, w->in.at.a[k][unknown[i]]);
+        }
+        for (int d = 0; d < MSFP_NQ; ++d)
+            w->in.at.q[k][d] = lane_choose(moved, w->newton.Q[k][d] + beta * w->in.at.v[k][d], w->in.at.q[k][d]);
+    }
+}
+
+/* Which runs take a step (bits), and in *back which have to take one back, after which they are done. */
+static unsigned going_on(const lane_work *w, msfp_request *const *r, int count, unsigned done, unsigned *back)
+{
+    unsigned on = 0;
+    *back = 0;
+    for (int i = 0; i < count; ++i) {
+        const double size = w->status[i] ? INFINITY : w->size[i];
+        if (!r[i]->stage || done >> i & 1 || size <= r[i]->stage->goal || !(size < INFINITY || r[i]->stage->taken))
+            continue;
+        on |= (unsigned)(size < 0.1 * r[i]->stage->before && r[i]->stage->taken < r[i]->most) << i;
+        *back |= (unsigned)(r[i]->stage->taken && !(size < r[i]->stage->before)) << i;
+    }
+    return on & ~*back;
+}
+
+/* Newton's method with old factors, in the runs that may, as long as it is worth a vector. */
+static void descend(lane_work *w, msfp_request *const *r, int count)
+{
+    unsigned back, done = 0, ever = 0;
+    for (;;) {
+        unsigned on = going_on(w, r, count, done, &back);
+        if (!back && 2 * __builtin_popcount(on) < count)
+            break;
+        if (!ever)
+            gather_newton(w, r);
+        ever |= on;
+        for (int i = 0; i < count; ++i) {
+            r[i]->more += (on | back) >> i & 1;
+            if (on >> i & 1) {
+                ++r[i]->stage->taken;
+                r[i]->stage->before = w->size[i];
+            }
+            if ((on | back) >> i & 1)
+                w->status[i] = MSFP_OK;
+        }
+        move(w, on, back);
+        done |= back;
+        w->asked = mask_of(on | back);
+        evaluate(w, 0);
+    }
+    if (ever)
+        SCATTER(w->in.at.v, ever >> i & 1, r[i]->stage->at.v);
+}
+
+void msfp_lanes(lane_work *w, msfp_request *const *requests, int count)
+{
+    msfp_request *all[W];
+    const int tangent = requests[0]->tangent != NULL;
+    for (int i = 0; i < W; ++i)
+        all[i] = requests[i < count ? i : 0];
+    gather(w, all);
+    w->asked = mask_of(LANE_BITS);
+    evaluate(w, tangent);
+    if (!tangent)
+        descend(w, all, count);
+    scatter(w, all, count, tangent);
+}
+
+lane_work *msfp_lanes_new(void)
+{
+    void *memory = NULL;
+    if (posix_memalign(&memory, 64, sizeof(lane_work)))
+        return NULL;
+    return memset(memory, 0, sizeof(lane_work));
+}
