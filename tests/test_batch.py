@@ -266,3 +266,54 @@ def test_the_command_says_what_failed(capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["batch", "fenz-test1", "--vary", "solver.max_steps=5,100000"]) == 1
     out, err = capsys.readouterr()
     assert "steps" in out and "error: 1 of 2 runs did not reach their end; the first: fenz-test1" in err
+
+
+SINES = r"""
+#include <stdio.h>
+#include "lane.h"
+static double ulps(double got, long double expected)
+{
+    int exponent;
+    frexp((double)expected, &exponent);
+    return (double)(fabsl((long double)got - expected) / ldexpl(1.0L, exponent - 53));
+}
+int main(void)
+{
+    double worst[3] = { 0.0 }, state = 0.5;
+    const double reach[3] = { 0.785, 10.0, 9.9e4 };
+    for (int range = 0; range < 3; ++range)
+        for (int n = 0; n < 200000; ++n) {
+            lane x, s, c;
+            LANES_ALL {
+                state = state * 3.99 * (1.0 - state); /* anywhere in (0, 1) */
+                x[lane_index] = (2.0 * state - 1.0) * reach[range];
+            }
+            s = lane_sin(x);
+            c = lane_cos(x);
+            LANES_ALL {
+                const long double exact = x[lane_index];
+                const double off = fmax(ulps(s[lane_index], sinl(exact)), ulps(c[lane_index], cosl(exact)));
+                worst[range] = fmax(worst[range], off);
+            }
+        }
+    lane odd = lane_of(0.0);
+    odd[1] = -1.6e5;
+    const lane s = lane_sin(odd), c = lane_cos(odd), none = lane_sin(lane_of(NAN));
+    const int ends = s[0] == 0.0 && c[0] == 1.0 && isnan(s[1]) && isnan(c[1]) && isnan(none[0]);
+    printf("%g %g %g %d\n", worst[0], worst[1], worst[2], ends);
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_sines_of_lanes_are_within_units_in_the_last_place(width: int, tmp_path: Path) -> None:
+    from msfp_gen.cache import PACKAGE
+    from msfp_gen.compiler import FLAGS, LANES, find_compiler
+
+    (tmp_path / "sines.c").write_text(SINES)
+    flags = [*FLAGS["c"], *FLAGS["lanes"], *LANES[width], f"-DMSFP_WIDTH={width}", f"-I{PACKAGE / 'runtime' / 'lanes'}"]
+    subprocess.run([*find_compiler().command, *flags, "sines.c", "-o", "sines", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "sines"], text=True, capture_output=True, check=True)
+    small, usual, large, ends = done.stdout.split()
+    assert float(small) < 1.2 and float(usual) < 2.0 and float(large) < 3.0 and ends == "1"

@@ -1,8 +1,8 @@
 /* lane.h: numbers of several runs side by side, and the functions that equations take of them.
  *
  * A `lane` is one vector register of the processor that the file is compiled for: MSFP_WIDTH runs. Sums, products,
- * quotients and square roots are those of IEEE 754, as for one run; sine and cosine are polynomials that differ from the
- * library's by their rounding (tests/test_batch_c.py says by how much), or the library's own where MSFP_EXACT is defined.
+ * quotients and square roots are those of IEEE 754, as for one run; sine and cosine are polynomials, within 2 units in
+ * the last place up to 10 rad and 3 beyond (tests/test_batch.py), or the library's own where MSFP_EXACT is defined.
  */
 #ifndef MSFP_LANE_H
 #define MSFP_LANE_H
