@@ -125,7 +125,7 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
         const double pressed = (normal < most ? normal : most) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
         const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
-            scale[k * ND + i] = (i < NA ? natural : pressed) + 1e-12;
+            scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
     }
 }
 
