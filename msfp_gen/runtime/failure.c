@@ -104,6 +104,8 @@ static int jammed(msfp_run *run)
 
 int msfp_last_word(msfp_run *run, int status)
 {
+    if (status == MSFP_E_FINITE) /* the state is: it is the next one that has no solution */
+        status = MSFP_E_NEWTON;
     return parting(run) ? MSFP_E_UPLIFT : jammed(run) ? MSFP_E_IRREGULAR : status;
 }
 #else
