@@ -231,7 +231,7 @@ def explicit_rate(bearing: Bearing, top: Top) -> float:
     """Steps a second that stability of an explicit method asks for: the fastest stuck mode over 3 [1/s].
 
     A slider turns against mu N R^2/d_y and its rims, k R^2; the lightest body has the least inertia about a sphere
-    centre, J + m (R - z)^2. A damper that holds the tilt of a light plate is faster still.
+    centre, J + m (R - z)^2. A damper on a light plate is faster still.
     """
     load, worst = load_of(top) + 1.0, 1.0
     stiffness = max(s.friction * load / s.yield_displacement for s in bearing.surfaces)
@@ -243,8 +243,9 @@ def explicit_rate(bearing: Bearing, top: Top) -> float:
         inertia = min(body.moments)
         turning = (2 * stiffness * (radius * 0.1) ** 2 + held + 2 * load * radius) / inertia
         worst = max(worst, np.sqrt(2 * stiffness / body.mass + turning))
-    decay = getattr(top, "rotational_damping", 0.0) / min(bearing.bodies[-1].moments)
-    return float(max(worst, decay))
+    plate = bearing.bodies[-1]
+    turning = getattr(top, "rotational_damping", 0.0) / min(plate.moments)
+    return float(max(worst, turning, getattr(top, "damping", 0.0) / plate.mass))
 
 
 def wide(bearing: Bearing) -> bool:
@@ -284,6 +285,7 @@ def sensible(scene: Scene) -> bool:
             solver.method == "implicit" or (effects.spin, effects.friction) == ("locked", "constant")
         )  # others are stiff
         and scene.initial_state is None
+        and not (isinstance(top, MassTop) and effects.sliders == "massless")  # inertia through slopes alone
         and (not effects.uplift or wide(bearing))  # sliders that do not tip
         and 1e-5 <= solver.rtol <= 1e-3
         and (solver.method == "implicit" or scene.end * explicit_rate(bearing, top) <= EXPLICIT_STEPS)

@@ -113,8 +113,8 @@ static void refine(const stages *s, double h, int ringing, double *work)
         if (ringing)
             work[MSFP_WORK_INPUT] -= h * method->e[j] * s->moved[j];
         else
-            for (int e = 0; e < MSFP_WORKS; ++e)
-                work[e] -= h * method->e[j] * s->power[j][e];
+            for (int e = 0; e < MSFP_WORKS; ++e) /* what stuck friction stores rings whatever the angles do */
+                work[e] -= e == MSFP_WORK_FRICTION_STORED ? 0.0 : h * method->e[j] * s->power[j][e];
 }
 
 static int stage(msfp_run *run, stages *s, int i, double h)
@@ -144,17 +144,19 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     return MSFP_OK;
 }
 
-/* Y, Z beyond the unit disc are integration error. How far a step takes them out counts like any other error; being out
- * from before does not, since no shorter step would mend it: sliding brings them back. */
+/* Y, Z beyond the unit disc are integration error. How far a step takes them out counts like any other error, the more so
+ * the further out they are; being out from before does not, since no shorter step would mend it: sliding brings them back. */
 static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 {
+    const double rtol = run->options.rtol;
     double worst = 0.0;
     for (int j = 0; j < NB; ++j) {
         const double *now = run->now.f[j];
         const double before = fmax(1.0, sqrt(now[0] * now[0] + now[1] * now[1]));
-        worst = fmax(worst, sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - before);
+        const double room = fmax(0.05, 1.0 - 0.2 * (before - 1.0) / rtol);
+        worst = fmax(worst, (sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - before) / (rtol * room));
     }
-    return worst / run->options.rtol;
+    return worst;
 }
 
 /* A step over a whole reversal has an estimate that may be anything, and nothing to interpolate inside it: Y, Z go half
