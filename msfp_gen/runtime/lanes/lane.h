@@ -17,7 +17,7 @@ typedef long long lane_mask __attribute__((vector_size(8 * MSFP_WIDTH), aligned(
 #define LANE_INLINE __attribute__((always_inline)) static inline
 
 /* A statement may be a number without any lane in it: less a vector of zeros it is one, and nothing else changes. */
-#define LANE(name, value) const lane name = (value) - (lane){ 0 }
+#define LANE(name, value) const lane name __attribute__((unused)) = (value) - (lane){ 0 }
 #define PUT(place, value) place = (value) - (lane){ 0 }
 
 LANE_INLINE lane lane_of(double x) { return x - (lane){ 0 }; }
