@@ -319,8 +319,11 @@ def test_sines_of_lanes_are_within_units_in_the_last_place(width: int, tmp_path:
     assert float(small) < 1.2 and float(usual) < 2.0 and float(large) < 3.0 and ends == "1"
 
 
-@pytest.mark.parametrize("effects", [Effects(), Effects(dimension="planar", spin="patch"), Effects(spin="free", rims=False),
-                                     Effects(sliders="massless", top_rotation=True)], ids=str)  # fmt: skip
+MODELS = (Effects(), Effects(dimension="planar", spin="patch"), Effects(spin="free", rims=False),
+          Effects(sliders="massless", top_rotation=True))  # fmt: skip
+
+
+@pytest.mark.parametrize("effects", MODELS, ids=str)
 def test_the_c_of_a_batch_compiles_without_a_warning(effects: Effects, tmp_path: Path) -> None:
     from msfp_gen.build import runtime_sources
     from msfp_gen.compiler import FLAGS, LANES, find_compiler
