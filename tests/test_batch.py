@@ -319,7 +319,7 @@ def test_sines_of_lanes_are_within_units_in_the_last_place(width: int, tmp_path:
     assert float(small) < 1.2 and float(usual) < 2.0 and float(large) < 3.0 and ends == "1"
 
 
-MODELS = (Effects(), Effects(dimension="planar", spin="patch"), Effects(spin="free", rims=False),
+MODELS = (Effects(spin="patch"), Effects(dimension="planar", bouc_wen="isotropic"), Effects(spin="free", rims=False),
           Effects(sliders="massless", top_rotation=True))  # fmt: skip
 
 

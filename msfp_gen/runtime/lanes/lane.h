@@ -44,6 +44,13 @@ LANE_INLINE lane lane_abs(lane x) { return (lane)((lane_mask)x & ~(lane_mask)lan
 LANE_INLINE lane lane_max(lane x, lane y) { return lane_choose(y > x, y, x); }
 LANE_INLINE lane lane_min(lane x, lane y) { return lane_choose(y < x, y, x); }
 
+/* Powers that are no products are rare: run by run. */
+LANE_INLINE lane lane_pow(lane x, double exponent)
+{
+    LANES_ALL x[lane_index] = pow(x[lane_index], exponent);
+    return x;
+}
+
 LANE_INLINE lane lane_step(lane x) { return lane_choose(x > 0.0, lane_of(1.0), lane_of(0.0)); }
 
 /* A bit for every lane. */

@@ -8,11 +8,13 @@
 #define sin lane_sin
 #define cos lane_cos
 #define sqrt lane_sqrt
+#define pow lane_pow
 #define fabs lane_abs
 #define msfp_step lane_step
 #include "msfp_lane_kernels.h"
 #undef fabs
 #undef sqrt
+#undef pow
 #undef cos
 #undef sin
 
