@@ -210,7 +210,7 @@ def case(seed: int, number: int, short: bool = False) -> Case:
     duration = None
     if explicit:
         duration = min(motion.duration, EXPLICIT_STEPS / 6 / explicit_rate(bearing, top))
-    solver = Solver(method="dopri5" if explicit else "implicit", rtol=rtol, max_steps=40_000)
+    solver = Solver(method="dopri5" if explicit else "implicit", rtol=rtol, max_steps=100_000)
     scene = Scene(bearing, motion, top, effects, solver, duration=duration, initial_state=start,
                   output_step=draw.one([None, None, 0.01]) if motion.duration > 0.1 and not explicit else None,
                   name=f"fuzz-{seed}-{number}")  # fmt: skip
@@ -281,12 +281,9 @@ def sensible(scene: Scene) -> bool:
         and demand <= (0.8 if isinstance(top, RigTop) else 0.4) * reach(bearing)  # within capacity
         and np.abs(peak[:, :2]).max() <= 1.0 * GRAVITY
         and (effects.uplift or np.abs(peak[:, 2]).max() <= 0.3 * GRAVITY)  # the load stays above zero
-        and (
-            solver.method == "implicit" or (effects.spin, effects.friction) == ("locked", "constant")
-        )  # others are stiff
+        and solver.method == "implicit"  # the explicit one is there for comparison
         and scene.initial_state is None
         and not (isinstance(top, MassTop) and effects.sliders == "massless")  # inertia through slopes alone
         and (not effects.uplift or wide(bearing))  # sliders that do not tip
         and 1e-5 <= solver.rtol <= 1e-3
-        and (solver.method == "implicit" or scene.end * explicit_rate(bearing, top) <= EXPLICIT_STEPS)
     )

@@ -160,6 +160,10 @@ def gap(b: Blocks) -> Program:
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     x: Symbols = p.read(b.rim_coordinates, "x", active=False)
+    if x["psi"] == 0:  # planar
+        s = p.let(par["R"] * sp.Abs(x["theta"]))
+        p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
+        return p
     cos_theta = p.let(sp.cos(x["theta"]))
     across = p.let(norm(p.let(sp.sin(x["theta"])), p.let(sp.sin(x["psi"]) * cos_theta)))
     s = p.let(par["R"] * ArcTan2(across, p.let(sp.cos(x["psi"]) * cos_theta)))

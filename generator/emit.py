@@ -206,6 +206,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         "scalars": scalar_quantities,
         "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields) + (law is not None),
         "law": law,
+        "flows": spec.effects.flows,
         "heat": HEAT_KERNEL if law is not None and law.heats else (),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
         "batch": batch,

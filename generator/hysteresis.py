@@ -27,3 +27,9 @@ HYSTERESIS = {
         lambda yu, zv, step: (step(yu + zv),) * 2,
     ),
 }
+
+
+def grows_alone(law: str) -> bool:
+    """Whether in the plane, where Z v = 0, the switch is on exactly while Y u > 0: then (3.18) integrates to tanh."""
+    switches = HYSTERESIS[law].switches
+    return all(switches(yu, 0.0, lambda x: float(x > 0.0))[0] == float(yu > 0.0) for yu in (-1.0, 1.0))

@@ -177,6 +177,35 @@ def inertia_share(scene: Scene) -> float:
     return max(body.mass for body in scene.bearing.bodies) * peak / rest if rest > 0 else inf
 
 
+def quasistatic(scene: Scene) -> bool:
+    """Whether no force depends on a rate, to the tolerance: massless sliders in the plane then need no integration.
+
+    There must be no mass on top, and dampers must carry little of the friction: rates are known to a hundredth.
+    """
+    if scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
+        return False
+    return damping_share(scene) <= min(1e-3, 1e3 * scene.solver.rtol)
+
+
+def damping_share(scene: Scene) -> float:
+    """Force of the dampers over friction, if everything moved as the base does; inf where there is no friction.
+
+    The top plate turns no faster than a surface slides over its radius, nor than its spring lets friction turn it
+    while friction turns over, within d_y.
+    """
+    surfaces, rig = scene.bearing.surfaces, scene.top
+    speed = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 1)[:, :3], axis=1).max())
+    friction = min(surface.friction for surface in surfaces) * least_load(scene)
+    if friction <= 0:
+        return inf
+    share = max(surface.rim_damping for surface in surfaces) * speed / friction
+    if isinstance(rig, RigTop):
+        free = min(surface.radius for surface in surfaces) ** 2 * friction
+        held = rig.rotational_stiffness * min(surface.yield_displacement for surface in surfaces)
+        share += rig.damping * speed / friction + rig.rotational_damping * speed / max(free, held)
+    return share
+
+
 def inertia_limit(scene: Scene, error: float) -> float:
     """Share of N that changes the friction force by the asked error: error times the largest friction coefficient."""
     return error * max(surface.friction for surface in scene.bearing.surfaces)

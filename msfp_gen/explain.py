@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.bearing import Surface
+from msfp_gen.choice import damping_share, quasistatic
 from msfp_gen.fields import Choice, Quantity, ruled_fields
 from msfp_gen.law_numbers import numbers
 from msfp_gen.layout import Effects
@@ -161,12 +162,19 @@ def _solver(scene: Scene) -> Table:
     return Table("solver", (), [
         ("method", f"{solver.method}: {METHODS[solver.method]}"),
         ("rtol", f"{solver.rtol:g}"),
+        ("steps", _steps(scene)),
         ("tolerance of angles", f"{solver.angle_tolerance:g} rad"),
         ("longest step", "what the motion resolves" if solver.max_step is None else f"{solver.max_step:g} s"),
         ("rows", "every step" if scene.output_step is None else f"every {scene.output_step:g} s"),
         ("start", "centred, at rest" if scene.initial_state is None else "given"),
         ("ends at", " or ".join(ends)),
     ])  # fmt: skip
+
+
+def _steps(scene: Scene) -> str:
+    if not (scene.modelled.flows and quasistatic(scene)):
+        return "integrated"
+    return f"exact whatever their length: no masses, and dampers carry {100 * damping_share(scene):.2g}% of friction"
 
 
 def _value(value: object) -> str:

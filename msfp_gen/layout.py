@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from msfp_gen.errors import InputError
 from msfp_gen.fields import Choice, Quantity, check_fields
 from msfp_gen.generator.friction_laws import FRICTION, Law, law_of
-from msfp_gen.generator.hysteresis import HYSTERESIS
+from msfp_gen.generator.hysteresis import HYSTERESIS, grows_alone
 
 _COUNT = Quantity("", least=0, whole=True)
 
@@ -122,6 +122,12 @@ class Effects:
     def law(self) -> Law | None:
         """The law of the friction coefficient; None where it is constant."""
         return law_of(self.friction, self.friction_law)
+
+    @property
+    def flows(self) -> bool:
+        """Whether Y follows slip in closed form, so that a model without masses needs no integration."""
+        quasistatic = self.dimension == "planar" and self.sliders == "massless" and not self.uplift
+        return quasistatic and self.law is None and grows_alone(self.bouc_wen)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.choice import UNLOADED, Choice, answer_time, inertia_limit, resting_load
+from msfp_gen.choice import UNLOADED, Choice, answer_time, inertia_limit, quasistatic, resting_load
 from msfp_gen.drive import plane_of
 from msfp_gen.errors import InputError
 from msfp_gen.history import Array
@@ -120,6 +120,7 @@ def begin_run(
         stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
         stop_all_rims=bool(stop and stop.all_rims),
         stop_at_knots=_sampled(scene.motion),
+        quasistatic=quasistatic(scene),
         stop_at_loads=scene.load is not None and not np.any(scene.load.coefficients[:, :, 2:]),
         **_watches(scene, model.effects, choice, stops),
         **more,

@@ -121,7 +121,8 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
         const double met = 0.0;
 #endif
         /* Rates far off make N, and what is measured by it, a number without a meaning. */
-        const double pressed = fmin(w->contact[k][MSFP_CONTACT_N], 1e3 * w->reference) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        const double normal = w->contact[k][MSFP_CONTACT_N], most = 1e3 * w->reference;
+        const double pressed = (normal < most ? normal : most) + met + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
         const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
         for (int i = 0; i < ND; ++i)
             scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
@@ -164,7 +165,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 {
     double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
     int pivots[DOF], good = 0;
-    msfp_seed seed = { 0.0, 0.0, 1.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { .ca = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
     out->determinant = 1;

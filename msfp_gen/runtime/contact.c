@@ -157,6 +157,44 @@ MSFP_INLINE int friction_stage(const double *par, surfaces *all, double beta, do
     return MSFP_E_NEWTON;
 }
 
+#if MSFP_FLOW
+/* Slip per turn (3.19), over d_y: in the plane it does not depend on where the normal is. */
+MSFP_INLINE double reach(const double *par, int s)
+{
+    return -par[MSFP_SURFACE_PARAMETERS_SIGN * LANES + s] * par[MSFP_SURFACE_PARAMETERS_R * LANES + s]
+           / par[MSFP_SURFACE_PARAMETERS_DY * LANES + s];
+}
+
+/* Y after the slip of the step, and what follows from it; slope: dY/d(rate of turning). */
+MSFP_INLINE int flow_stage(const double *par, surfaces *all, const msfp_seed *seed, double *slope)
+{
+    double finite = 0.0;
+    for (int s = 0; s < LANES; ++s) {
+        const int j = s < NB ? s : NB - 1;
+        const double slip = reach(par, s) * (seed->beta * all->local[MSFP_LOCAL_DWY * LANES + s] + seed->turn[j]);
+        const double Y = all->f[s] = msfp_flown(all->before[s], slip);
+        slope[s] = reach(par, s) * seed->beta * (Y * slip > 0.0 ? 1.0 - Y * Y : 1.0);
+        finite += Y;
+    }
+    msfp_contact_lanes(par, all->local, all->f, all->out);
+    return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
+}
+
+/* As `condense`, with Y following the slip of the step. */
+MSFP_INLINE void condense_flow(const double *par, surfaces *all, const double *slope, double *condensed)
+{
+    double jacobian[ROWS * MSFP_LOCAL * LANES];
+    msfp_contact_jacobian(par, all->local, all->f, all->out, jacobian);
+    for (int r = 0; r <= MOMENT; ++r) {
+        const double *row = jacobian + (r < MOMENT ? r : MOMENT + OWN) * MSFP_LOCAL * LANES;
+        for (int k = 0; k < INPUTS; ++k)
+            for (int s = 0; s < LANES; ++s)
+                condensed[(r * INPUTS + k) * LANES + s] =
+                    row[k * LANES + s] + (k == MSFP_LOCAL_DWY ? row[INPUTS * LANES + s] * slope[s] : 0.0);
+    }
+}
+#endif
+
 /* Jacobian of the moment and of N with Y, Z following their stage formula and mu its law: [MOMENT + 1][INPUTS], in lanes.
  * The matrix of the local unknowns is near the identity plus what friction dissipates: no pivots. */
 MSFP_INLINE void condense(const double *par, surfaces *all, double beta, double *condensed)
@@ -196,6 +234,16 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
 {
     surfaces all;
     gather(w, seed, f, &all);
+#if MSFP_FLOW
+    if (seed->flow) {
+        double slope[LANES];
+        const int status = flow_stage(&p->lanes[0][0], &all, seed, slope);
+        if (status == MSFP_OK && condensed)
+            condense_flow(&p->lanes[0][0], &all, slope, condensed);
+        scatter(&all, w, f);
+        return status;
+    }
+#endif
     const int status = friction_stage(&p->lanes[0][0], &all, seed->beta, fmax(seed->accuracy, 1e-12));
     if (status == MSFP_OK && condensed)
         condense(&p->lanes[0][0], &all, seed->beta, condensed);

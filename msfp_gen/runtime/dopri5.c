@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "msfp_model.h"
+#include "run.h"
 #include "heat.h"
 
 #define NB MSFP_NB
@@ -76,7 +77,7 @@ static int works(msfp_run *run, double h)
     msfp_point at;
     msfp_work w;
     double f[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(next->work, run->now.work, sizeof next->work); /* of which nothing is used in the middle */
     msfp_interpolate(run, 0.5, &middle);
     msfp_to_point(run, &middle, &at);
@@ -111,7 +112,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
 {
     msfp_state *next = &run->next;
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
     const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, f, residual, NULL);
@@ -119,6 +120,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
         return status;
     next->t = run->now.t + h;
     msfp_heat_finish(run);
+    run->reached = *at;
     memcpy(next->q, at->q, sizeof next->q);
     memcpy(next->v, at->v, sizeof next->v);
     memcpy(next->a, last->a, sizeof next->a);

@@ -11,7 +11,7 @@ void msfp_event_values(msfp_run *run, const msfp_state *s, double *g)
     msfp_row row;
     int met = 0;
     for (int j = 0; j < NB; ++j) { /* no arc tangent while the rim is away */
-        g[j] = (cos(s->q[j][0]) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        g[j] = ((MSFP_PLANAR ? 1.0 : cos(s->q[j][0])) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
         met |= g[j] <= 0.0;
     }
     if (met) {

@@ -93,8 +93,10 @@ static finding inertial(msfp_run *run, double h)
             const double change = velocity[i] - run->guard.velocity[k - 1][i];
             square += change * change;
         }
-        const double force = run->parameters.body[k][MSFP_BODY_PARAMETERS_M] * sqrt(square) / fmax(h, run->options.guard_time);
-        consider(&worst, force / run->work.contact[k - 1][MSFP_CONTACT_N], run->options.guard_inertia, k);
+        const double most = run->options.guard_inertia * run->work.contact[k - 1][MSFP_CONTACT_N];
+        const double mass = run->parameters.body[k][MSFP_BODY_PARAMETERS_M], time = fmax(h, run->options.guard_time);
+        if (mass * mass * square > most * most * time * time)
+            consider(&worst, mass * sqrt(square) / time / run->work.contact[k - 1][MSFP_CONTACT_N], run->options.guard_inertia, k);
     }
     return worst;
 }

@@ -1,5 +1,19 @@
 /* history.c: prescribed histories (base motion, loads) as piecewise polynomials. */
+#include <string.h>
 #include "msfp_model.h"
+
+static void hold(msfp_history *h, int i)
+{
+    const double *piece = h->coefficients + (size_t)i * 6 * (MSFP_DEGREE + 1);
+    for (int channel = 0; channel < 6; ++channel)
+        for (int k = 0; k <= MSFP_DEGREE; ++k)
+            h->powers[k][channel] = piece[channel * (MSFP_DEGREE + 1) + k];
+    h->held = i + 1;
+    h->degree = MSFP_DEGREE;
+    for (int blank = 1; h->degree > 0 && blank; h->degree -= blank)
+        for (int channel = 0; channel < 6; ++channel)
+            blank = blank && h->powers[h->degree][channel] == 0.0;
+}
 
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6])
 {
@@ -9,29 +23,21 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6])
     while (i > 0 && t < h->knots[i])
         --i;
     h->last = i;
+    if (h->held != i + 1)
+        hold(h, i);
     const double s = t - h->knots[i];
-    const double *piece = h->coefficients + (size_t)i * 6 * (MSFP_DEGREE + 1);
-    for (int channel = 0; channel < 6; ++channel) {
-        const double *c = piece + channel * (MSFP_DEGREE + 1);
-        double value = 0.0, rate = 0.0, second = 0.0;
-        int degree = MSFP_DEGREE; /* most pieces are cubic or constant */
-        while (degree > 0 && c[degree] == 0.0)
-            --degree;
-        if (orders == 1) {
-            for (int k = degree; k >= 0; --k)
-                value = value * s + c[k];
-            out[0][channel] = value;
-            continue;
+    double value[6] = { 0.0 }, rate[6] = { 0.0 }, second[6] = { 0.0 };
+    for (int k = h->degree; k >= 0; --k)
+        for (int channel = 0; channel < 6; ++channel) {
+            if (orders > 1) {
+                second[channel] = second[channel] * s + 2.0 * rate[channel];
+                rate[channel] = rate[channel] * s + value[channel];
+            }
+            value[channel] = value[channel] * s + h->powers[k][channel];
         }
-        for (int k = degree; k >= 0; --k) {
-            second = second * s + 2.0 * rate;
-            rate = rate * s + value;
-            value = value * s + c[k];
-        }
-        out[0][channel] = value;
-        if (orders > 1)
-            out[1][channel] = rate;
-        if (orders > 2)
-            out[2][channel] = second;
-    }
+    memcpy(out[0], value, sizeof value);
+    if (orders > 1)
+        memcpy(out[1], rate, sizeof rate);
+    if (orders > 2)
+        memcpy(out[2], second, sizeof second);
 }

@@ -219,6 +219,9 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     s.now.inertia = 1.0;
     s.now.seed.cq = s.now.seed.beta = beta;
     s.now.seed.cv = 1.0;
+#if MSFP_FLOW
+    s.now.seed.flow = 0;
+#endif
     s.now.seed.ca = 1.0 / beta;
     s.now.seed.accuracy = 1e-5 * run->options.rtol;
     memset(&s.now.at, 0, sizeof s.now.at);
@@ -237,6 +240,8 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     }
     next->t = now->t + h;
     msfp_heat_finish(run);
+    memcpy(s.now.at.f, s.now.f, sizeof s.now.f);
+    run->reached = s.now.at;
     memcpy(next->q, s.now.at.q, sizeof next->q);
     memcpy(next->v, s.now.at.v, sizeof next->v);
     memcpy(next->a, s.now.at.a, sizeof next->a);

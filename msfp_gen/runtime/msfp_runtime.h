@@ -82,6 +82,10 @@ typedef struct {
     double accuracy; /* of Y, Z; 0: all there is */
     double fp[MSFP_NB][2];
     int same_base; /* the base is where the last evaluation in this work area had it */
+#if MSFP_FLOW
+    int flow;             /* Y follows the slip of the whole step from fp, exactly: beta v + turn is what a body turns in it */
+    double turn[MSFP_NB];
+#endif
 } msfp_seed;
 
 /* Everything one evaluation leaves behind, with tangents [field][column]. */
@@ -189,6 +193,8 @@ typedef struct {
     const double *knots;        /* [pieces + 1] */
     const double *coefficients; /* [pieces][6][MSFP_DEGREE + 1], ascending powers of t - knot */
     int last;                   /* piece found last: the search starts there */
+    int held, degree;           /* the piece, counted from 1, whose coefficients are at hand with channels side by side */
+    double powers[MSFP_DEGREE + 1][6];
 } msfp_history;
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
@@ -207,6 +213,7 @@ typedef struct {
     int stop_all_rims;
     int stop_at_knots;            /* the acceleration of the base has a kink at every knot: land on each */
     int stop_at_loads;            /* the load has a kink at every knot: likewise */
+    int quasistatic;              /* no force depends on rates, to the tolerance: quasistatic.c where the model allows */
     double start_time;            /* a run that goes on from another, with its origin and its heat */
     const double *origin;         /* [3] r_01 - r_nn at the start of the whole; NULL: where this one starts */
     const double *heat;           /* [NB][MSFP_HEAT]; NULL: none */
@@ -283,6 +290,15 @@ typedef struct {
 } msfp_middle;
 #define MSFP_MIDDLES 3 /* at most */
 
+#if MSFP_FLOW
+/* What a step without integration wants to know of the state it starts from (now) and ends at (next), and of the step
+ * that led there: coordinates before it, its length (0: none since the start or a jump), powers before it. */
+typedef struct {
+    double q[MSFP_NB], h, power[MSFP_WORKS], jerk[MSFP_NB], span;
+    double load[6], top[3], tilt, normal[MSFP_NB]; /* r_nn seen from the base, rotation about E2 */
+} msfp_passage;
+#endif
+
 typedef struct {
     msfp_parameters parameters;
     msfp_history motion, load;
@@ -292,6 +308,7 @@ typedef struct {
     const double *jumps;
     int jump_count;
     msfp_options options;
+    msfp_point reached; /* where the evaluation that ended the last step was made, base and load included */
     /* What a checkpoint keeps begins here: no pointers until `rows`. What is above follows from the scene. */
     int next_jump;
     msfp_state now, next;
@@ -306,6 +323,9 @@ typedef struct {
     double h, previous_error, output_time;
     double start[3]; /* r_01 - r_nn at the start */
     double events_now[MSFP_EVENTS]; /* event functions at the present state */
+#if MSFP_FLOW
+    msfp_passage passage, passing; /* as of now, as of next */
+#endif
     double factors[MSFP_DOF * MSFP_DOF], factored_beta; /* LU of the last tangent of a step, and its beta; 0: none */
     int pivots[MSFP_DOF];
     double slope[MSFP_NB][MSFP_NQ]; /* of the accelerations over the last step, where it goes on */
@@ -352,6 +372,10 @@ const char *msfp_guard_name(int guard);
 /* Between the files of the runtime. */
 /* Friction of one surface: mu N f . slip, added to what Y, Z store and what is lost (3.16)-(3.18). */
 void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
+/* All but those of friction. */
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS]);
+/* Of the load on the top plate, in the frame of the base. */
+double msfp_load_power(const msfp_point *at, const msfp_work *w);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
 /* Power of what moves as prescribed, a part of what is put in: the base of the rig, and that of the stack where it turns. */
@@ -370,6 +394,12 @@ double msfp_order(int method);
 /* One step of size h from run->now to run->next: 0 and the error norm, or a status. */
 int msfp_step_implicit(msfp_run *run, double h, double *error);
 int msfp_step_dopri5(msfp_run *run, double h, double *error);
+/* Whether steps need no integration, and one of them (quasistatic.c). */
+double msfp_foreseen(const msfp_run *run, double h);
+/* A state to go on from without a step before it. */
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
+int msfp_is_quasistatic(const msfp_run *run);
+int msfp_step_quasistatic(msfp_run *run, double h, double *error);
 
 #ifdef __cplusplus
 }

@@ -11,6 +11,12 @@
 #define ND MSFP_ND
 #define NQ MSFP_NQ
 
+#if MSFP_FLOW
+#define FLOWS(s) ((s)->seed.flow)
+#else
+#define FLOWS(s) 0
+#endif
+
 #define MOST 30      /* steps */
 #define ARRIVED 1e-3 /* a residual above this is never the last */
 
@@ -18,12 +24,18 @@ static const int unknown[ND] = MSFP_FREE;
 
 static void place(msfp_stage *s)
 {
-    for (int k = 0; k < NB; ++k)
+    if (FLOWS(s)) { /* the plane, no masses */
+        for (int k = 0; k < NB; ++k)
+            s->at.q[k][unknown[0]] = s->Q[k][unknown[0]] + s->beta * s->at.v[k][unknown[0]];
+        return;
+    }
+    const double rate = s->inertia / s->beta;
+    for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
             s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
-    for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i)
-            s->at.a[k][unknown[i]] = s->inertia * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]) / s->beta;
+            s->at.a[k][unknown[i]] = rate * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]);
+    }
 }
 
 /* Newton works on moments over N, which has the same root: the balance of a light slider is N times a lever that
@@ -62,7 +74,7 @@ static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
     return size;
 }
 
-/* Residual over N, its largest entry relative to its natural size (or NULL), and the tangent (or NULL). Returns a status. */
+/* Residual over N, its largest entry relative to its natural size and the tangent (or NULL). Returns a status. */
 static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual, double *tangent, double *size)
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
@@ -70,13 +82,13 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
     msfp_request request = { &run->parameters, 0, &s->at, &s->seed, w, s->f, residual, tangent, 1, s->keep, MSFP_OK, -1, INFINITY,
                              s->descend ? s : NULL, run->factors, run->pivots, s->descend, 0 };
     s->taken = 0;
-    if (msfp_batch_asked(&request)) {
+    if (!FLOWS(s) && msfp_batch_asked(&request)) {
         s->descend = 0;
         run->counts[MSFP_COUNT_NEWTON] += s->taken;
         run->counts[MSFP_COUNT_EVALUATIONS] += request.more;
         if (request.more)
             place(s);
-        if (size && !request.status) {
+        if (!request.status) {
             *size = request.size;
             run->worst_surface = request.worst < 0 ? run->worst_surface : request.worst / ND + 1;
         }
@@ -87,8 +99,7 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
     if (status)
         return status;
     s->seed.same_base = 1;
-    if (size)
-        *size = size_of(run, w, residual);
+    *size = size_of(run, w, residual);
     over_normal(w, residual);
     if (tangent)
         tangent_over_normal(w, residual, tangent);
@@ -111,13 +122,14 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor)
             s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
 }
 
-/* Factors of the tangent at the present rates. */
-static int factorise(msfp_run *run, msfp_stage *s)
+/* Factors of the tangent at the present rates, with the residual there and its size. */
+static int factorise(msfp_run *run, msfp_stage *s, double *residual, double *size)
 {
-    double residual[DOF];
+    place(s);
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
     run->factored_beta = 0.0;
-    const int status = evaluate(run, s, &run->work, residual, run->factors, NULL);
+    s->descend = 0;
+    const int status = evaluate(run, s, &run->work, residual, run->factors, size);
     if (status)
         return status;
     run->work_sign = msfp_lu(run->factors, DOF, run->pivots);
@@ -157,7 +169,7 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
-        if (factorise(run, s))
+        if (factorise(run, s, residual, &size))
             break;
         size = take_step(run, s, residual, step, size, 1);
     }
@@ -174,6 +186,21 @@ static double rounding(const msfp_stage *s)
         for (int d = 3; d < NQ; ++d)
             speed = fmax(speed, fabs(s->at.v[k][d]));
     return fmax(1e-10, 2e-12 * speed / s->beta);
+}
+
+/* A rim with a damper is met with a jump of its force, c dg/dt, and the balance may lie within: where a gap is as small as
+ * the spring makes of that, no residual below the jump is asked for. */
+static double jump(const msfp_run *run, const msfp_stage *s)
+{
+    double worst = 0.0;
+    for (int j = 0; j < NB && MSFP_RIMS; ++j) {
+        const double *par = run->parameters.surface[j], *q = s->at.q[j], *v = s->at.v[j];
+        const double gap = (cos(q[0]) * cos(q[1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        const double force = par[MSFP_SURFACE_PARAMETERS_CC] * par[MSFP_SURFACE_PARAMETERS_R] * hypot(v[0], v[1]);
+        if (fabs(gap) * par[MSFP_SURFACE_PARAMETERS_KC] <= 10.0 * force)
+            worst = fmax(worst, force / (run->work.contact[j][MSFP_CONTACT_N] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01)));
+    }
+    return fmin(worst, 1e-4);
 }
 
 /* Whether a step of Newton is below the last digits of the rates. Over a short time those are accelerations, and times a
@@ -214,7 +241,8 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
         run->determinant = run->work_sign;
     if (run->work_sign && run->work_sign != run->determinant) { /* perhaps of a guess far off: what counts is the solution's */
         s->keep = INFINITY;
-        const int status = factorise(run, s);
+        double residual[DOF];
+        const int status = factorise(run, s, residual, &size);
         if (status)
             return failed(run, status, size);
     }
@@ -223,40 +251,55 @@ static int regular(msfp_run *run, msfp_stage *s, double size)
     return failed(run, MSFP_E_IRREGULAR, size);
 }
 
+/* Whether the factors at hand may serve a stage to begin with. */
+static int trusted(const msfp_run *run, const msfp_stage *s)
+{
+    return !FLOWS(s) && fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
+}
+
 /* Factors serve as long as they reduce the residual tenfold: other stages, other steps of like size. The switches of
  * friction and rims make Newton semi-smooth. The sign of the determinant is looked at with every factorisation; while
  * old factors contract the residual the tangent has theirs. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s)
 {
-    const double goal = s->goal = s->keep = fmin(ARRIVED, fmax(rounding(s), 1e-2 * run->options.rtol));
-    double residual[DOF], step[DOF];
-    int good = fabs(run->factored_beta - s->beta) < 0.2 * s->beta;
-    s->descend = good ? MOST : 0;
+    double goal = fmin(ARRIVED, fmax(rounding(s), (FLOWS(s) ? 0.3 : 1e-2) * run->options.rtol));
+    double residual[DOF], step[DOF], size = INFINITY;
+    int fresh = !trusted(run, s), status = MSFP_OK;
+    s->goal = s->keep = goal;
+    s->descend = fresh ? 0 : MOST;
     s->taken = 0;
     s->before = INFINITY;
-    double size = msfp_stage_residual(run, s, &run->work, residual);
-    good = s->taken ? size < 0.1 * s->before : good;
     run->work_sign = 0;
-    for (int i = s->taken; size > goal; ++i) {
-        if (i >= MOST || !(size < INFINITY))
-            return failed(run, MSFP_E_NEWTON, size);
+    if (!fresh)
+        size = msfp_stage_residual(run, s, &run->work, residual);
+    const int taken = s->taken;
+    if (taken && size > goal && size < INFINITY && size >= 0.1 * s->before) {
+        ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
+        fresh = 1;
+    }
+    if (fresh)
+        status = factorise(run, s, residual, &size);
+    if (status && !taken && status != MSFP_E_IRREGULAR) /* a guess for which forces cannot be formed */
+        status = MSFP_E_NEWTON;
+    for (int i = taken; size > goal; ++i) {
+        if (status || i >= MOST || !(size < INFINITY))
+            return failed(run, status ? status : MSFP_E_NEWTON, size);
+        if (i >= 10)
+            s->goal = goal = fmax(goal, jump(run, s));
         ++run->counts[MSFP_COUNT_NEWTON];
-        const int fresh = !good;
-        if (fresh) {
-            run->counts[MSFP_COUNT_FRESH_TANGENTS] += i > 0;
-            const int status = factorise(run, s);
-            if (status)
-                return failed(run, status, size);
-        }
         const double before = size;
         s->keep = fresh ? ARRIVED : goal;
         s->descend = fresh ? 0 : MOST - i - 1;
         s->before = before;
         size = take_step(run, s, residual, step, size, fresh);
-        good = size < 0.1 * (s->taken ? s->before : before);
-        i += s->taken;
         if (fresh && size < ARRIVED && drowned(s, step))
             break;
+        i += s->taken;
+        fresh = size > goal && size >= 0.1 * (s->taken ? s->before : before);
+        if (fresh) {
+            ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
+            status = factorise(run, s, residual, &size);
+        }
     }
     s->descend = 0;
     return regular(run, s, size);

@@ -108,6 +108,16 @@ static double support_power(const double *t, const msfp_point *at, const double 
 }
 #endif
 
+double msfp_load_power(const msfp_point *at, const msfp_work *w)
+{
+    double V[3], turning[3], power = 0.0;
+    msfp_body_V_get(w->body[NB], V);
+    msfp_body_wp_get(w->body[NB], turning);
+    for (int i = 0; i < 3; ++i)
+        power += at->load[i] * (V[i] - at->base[1][i]) + at->load[3 + i] * turning[i];
+    return power;
+}
+
 double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     const double *t = p->top;
@@ -130,13 +140,11 @@ double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const ms
 static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
 {
     const double *body = w->body[NB], *t = p->top;
-    double relative[3], V[3], turning[3], axis[3];
+    double V[3], turning[3], axis[3];
     msfp_body_V_get(body, V);
     msfp_body_wp_get(body, turning);
     msfp_body_t3_get(body, axis);
-    for (int i = 0; i < 3; ++i)
-        relative[i] = V[i] - at->base[1][i];
-    double power = dot3(at->load, relative) + dot3(at->load + 3, turning);
+    double power = msfp_load_power(at, w);
     power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
 #if MSFP_TURNED
     power += support_power(t, at, axis, turning);
@@ -158,18 +166,23 @@ static double lock_power(const msfp_work *w)
     return power;
 }
 
-void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS])
 {
     double total[3];
     energies(p, at, w, total);
     memset(power, 0, MSFP_WORKS * sizeof *power);
     power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
     power[MSFP_WORK_SEAT] = seat_power(w);
-    for (int j = 0; j < NB; ++j) {
-        msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
+    for (int j = 0; j < NB; ++j)
         if (w->rim_sum[j] != 0.0)
             power[MSFP_WORK_RIM] += rim_power(p, at, w, j);
-    }
+}
+
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+{
+    msfp_other_powers(p, at, w, power);
+    for (int j = 0; j < NB; ++j)
+        msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
 }
 
 static double restraint_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
@@ -229,7 +242,7 @@ double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_wo
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
     double residual[MSFP_DOF], f[NB][2];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
 #if MSFP_LAW
@@ -250,7 +263,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     for (int j = 0; j < NB; ++j) {
         const double *contact = w->contact[j];
         row->normal[j] = contact[MSFP_CONTACT_N];
-        row->angles[j][0] = atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
+        row->angles[j][0] = MSFP_PLANAR ? 0.0 : atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
         row->angles[j][1] = atan2(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = sliding[j][MSFP_GAP_G];

@@ -206,19 +206,27 @@ static int write_between(msfp_run *run, double last)
     return MSFP_OK;
 }
 
+/* The end of the step: the evaluation that ended it is still there. */
+static int write_reached(msfp_run *run)
+{
+    msfp_row *row = new_row(run);
+    if (!row)
+        return MSFP_E_MEMORY;
+    msfp_record(&run->parameters, &run->reached, &run->work, row);
+    row->time = run->next.t;
+    memcpy(row->work, run->next.work, sizeof row->work);
+    return MSFP_OK;
+}
+
 int msfp_write_step(msfp_run *run)
 {
     const double last = run->next.t * (1.0 + 1e-14);
-    if (run->options.output_step <= 0.0) { /* the evaluation that ended the step is still there */
-        msfp_row *row = new_row(run);
-        msfp_point at;
-        if (!row)
-            return MSFP_E_MEMORY;
-        msfp_to_point(run, &run->next, &at);
-        msfp_record(&run->parameters, &at, &run->work, row);
-        row->time = run->next.t;
-        memcpy(row->work, run->next.work, sizeof row->work);
-        return MSFP_OK;
+    if (run->options.output_step <= 0.0)
+        return write_reached(run);
+    if (run->next.t == run->output_time && msfp_is_quasistatic(run)) {
+        const int status = write_reached(run);
+        run->output_time = msfp_next_output(run);
+        return status;
     }
     return run->output_time <= last ? write_between(run, last) : MSFP_OK;
 }

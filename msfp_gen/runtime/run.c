@@ -65,7 +65,7 @@ static int settle(msfp_run *run)
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
     double f[NB][2], residual[MSFP_DOF];
-    msfp_seed seed = { 0.0, 0.0, 0.0, 0.0, 0.0, { { 0 } }, 0 };
+    msfp_seed seed = { 0 };
     msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
     if (!MSFP_MASSLESS) {
@@ -89,6 +89,7 @@ static int settle(msfp_run *run)
     memset(run->slope, 0, sizeof run->slope);
     run->have_unknowns = 0;
     run->restart = 1;
+    msfp_quasistatic_begin(run, &at);
     return msfp_check_state(run, &run->work, &run->now);
 }
 
@@ -166,6 +167,8 @@ static double target(const msfp_run *run)
         end = fmin(end, next_knot(&run->load, run->now.t));
     if (run->next_jump < run->jump_count)
         end = fmin(end, run->jumps[run->next_jump]);
+    if (run->options.output_step > 0.0 && msfp_is_quasistatic(run)) /* a step is as cheap as a row */
+        end = fmin(end, run->output_time);
     return end;
 }
 
@@ -173,7 +176,9 @@ static int try_step(msfp_run *run, double h, double *error)
 {
     run->status_surface = 0;
     run->status_value = 0.0;
-    const int status = run->options.method == MSFP_DOPRI5 ? msfp_step_dopri5(run, h, error) : msfp_step_implicit(run, h, error);
+    const int status = run->options.method == MSFP_DOPRI5 ? msfp_step_dopri5(run, h, error)
+                       : msfp_is_quasistatic(run)           ? msfp_step_quasistatic(run, h, error)
+                                                            : msfp_step_implicit(run, h, error);
     if (status)
         return status;
     if (!(*error < INFINITY))
@@ -219,6 +224,9 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     if (run->status)
         return 0;
     run->now = run->next;
+#if MSFP_FLOW
+    run->passage = run->passing;
+#endif
     if (run->options.stop_at_knots && at_knot(run)) /* a kink */
         memset(run->slope, 0, sizeof run->slope);
     memcpy(run->events_now, after, sizeof run->events_now);
@@ -243,6 +251,8 @@ static int one_step(msfp_run *run)
     double h = run->h;
     if (run->options.max_step > 0.0)
         h = fmin(h, run->options.max_step);
+    if (msfp_is_quasistatic(run))
+        h = msfp_foreseen(run, h);
     h = h > 0.999 * left ? left : h > 0.5 * left ? 0.5 * left : h;
     for (int relocations = 0;; ++relocations) {
         const int status = try_step(run, h, &error);

@@ -41,6 +41,48 @@ static inline int field(int order, int i)
     return coordinate(order, i);
 }
 
+#if MSFP_FLOW
+/* Y after a slip (over d_y) from Y: (3.18) integrated. Friction that goes back is a line, dY = ds/d_y; friction that grows
+ * is dY = (1 - Y^2) ds/d_y, so Y = tanh. */
+MSFP_INLINE double msfp_flown(double Y, double slip)
+{
+    const double sign = slip < 0.0 ? -1.0 : 1.0;
+    double y = sign * Y, far = fabs(slip);
+    if (y < 0.0) {
+        if (far <= -y)
+            return sign * (y + far);
+        far += y;
+        y = 0.0;
+    }
+    if (y == 1.0) /* it has slid for long */
+        return sign;
+    const double left = (1.0 - y) * exp(-2.0 * far);
+    return sign * (1.0 + y - left) / (1.0 + y + left);
+}
+
+/* Slip per turn (3.19), over d_y: in the plane it does not depend on where the normal is. */
+MSFP_INLINE double msfp_reach(const double *par)
+{
+    return -par[MSFP_SURFACE_PARAMETERS_SIGN] * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
+}
+
+/* What friction has lost on the way, over mu N d_y: the integral of Y^3 in slip while it grows. */
+MSFP_INLINE double msfp_flow_loss(double Y, double slip)
+{
+    double y = slip < 0.0 ? -Y : Y, far = fabs(slip);
+    if (y < 0.0) {
+        if (far <= -y)
+            return 0.0;
+        far += y;
+        y = 0.0;
+    }
+    if (y == 1.0)
+        return far;
+    const double left = (1.0 - y) * exp(-2.0 * far), end = (1.0 + y - left) / (1.0 + y + left);
+    return far + log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
+}
+#endif
+
 /* kinematics.c */
 void msfp_ground(const msfp_point *at, double *body);
 void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w); /* body 0, for the others to start from */

@@ -89,7 +89,7 @@ MSFP_INLINE double rim_share(const msfp_work *w, int j)
 /* Contact force and slip of surface j in the basis of the body below; what the rim adds to the moment. */
 MSFP_INLINE void approach(const msfp_parameters *p, msfp_work *w, int j, double *dlocal, double *dmoment /* NULL: no tangent */)
 {
-    double drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL] = { 0 }, drf[VECTOR * DOF], rim[VECTOR];
+    double drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL], drf[VECTOR * DOF], rim[VECTOR]; /* drim: only where the rim is met */
     msfp_rim_force(p, w, j, dlocal ? drim : NULL);
     const double share = rim_share(w, j);
     for (int i = 0; i < VECTOR; ++i)

@@ -197,8 +197,8 @@ def test_loose_sliders_hop_until_one_has_left_its_place(rtol: float) -> None:
     a slider is beside its cup: when that is depends on chaos, what it is does not."""
     from test_uplift import shaken
 
-    scene = shaken(1.4, sideways=0.02, duration=1.3, rtol=rtol)
+    scene = shaken(1.4, sideways=0.02, duration=2.0, rtol=rtol)
     error = failure_of(replace(scene, bearing=scene.bearing.replace(friction=1e-3)))
     assert error.status == "parted" and isinstance(error.result, Result)
-    assert 1.1 < error.result.history.time[-1] < 1.3
+    assert 1.1 < error.result.history.time[-1] < 2.0
     assert error.result.history.normal_force[-1].max() < 1.0  # in flight

@@ -123,9 +123,9 @@ def test_slow_push_into_every_rim_follows_the_reference(stiffness: float) -> Non
 
 
 @pytest.mark.parametrize("layout", [(2, 1, 0), (2, 0, 1)], ids=["bowl", "cap"])
-@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize(("rtol", "most"), [(1e-3, 1.2e-2), (1e-4, 4e-3), (1e-5, 4e-3)])
 def test_energy_put_in_through_a_stiff_rig_is_what_rim_and_friction_have(
-    layout: tuple[int, int, int], rtol: float
+    layout: tuple[int, int, int], rtol: float, most: float
 ) -> None:
     """Rig and rim carry the load, angles have no error to speak of and steps are long. The default used to be off by
     0.9 to 3.7 %: force times a prescribed rate is curved over such a step, which second order does not see."""
@@ -136,7 +136,7 @@ def test_energy_put_in_through_a_stiff_rig_is_what_rim_and_friction_have(
     )
     run = simulate(scene)
     assert run.history.rim_force.max() > 5e3
-    assert run.summary["energy"]["closure_error"] < 7e-3
+    assert run.summary["energy"]["closure_error"] < most
 
 
 def twin(**values: float) -> Bearing:

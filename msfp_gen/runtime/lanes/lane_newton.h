@@ -60,7 +60,7 @@ static lane_mask mask_of(unsigned bits)
 static void move(lane_work *w, unsigned on, unsigned back)
 {
     const lane_mask forward = mask_of(on), backward = mask_of(back), moved = forward | backward;
-    const lane beta = w->in.seed.beta;
+    const lane beta = w->in.seed.beta, rate = w->newton.inertia / beta;
     lane x[DOF];
     solve(w, x);
     for (int k = 0; k < NB; ++k) {
@@ -68,7 +68,7 @@ static void move(lane_work *w, unsigned on, unsigned back)
             lane *step = &w->newton.step[k * ND + i], *v = &w->in.at.v[k][unknown[i]];
             *step = lane_choose(forward, x[k * ND + i], *step);
             *v = lane_choose(forward, *v - *step, lane_choose(backward, *v + *step, *v));
-            const lane a = w->newton.inertia * (*v - w->newton.V[k][unknown[i]]) / beta;
+            const lane a = rate * (*v - w->newton.V[k][unknown[i]]);
             w->in.at.a[k][unknown[i]] = lane_choose(moved, a, w->in.at.a[k][unknown[i]]);
         }
         for (int d = 0; d < MSFP_NQ; ++d)
