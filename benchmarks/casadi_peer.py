@@ -163,7 +163,7 @@ def timed(scene: Scene, numbers: dict[tuple[str, int, str], float], unknowns: An
     built = build_model(scene.bearing.layout, scene.effects).info.folder
     sizes = [f"-DN={x.numel()}", f"-DP={p.numel()}", "-I", str(built), "-w"]
     sources = [str(folder / "main.c"), str(folder / "newton.c"), str(built / "linear.c")]
-    subprocess.run([*find_compiler().command, *FLAGS["c"], *flags, *sizes, *sources, "-o", str(folder / "peer"), "-lm"], check=True)
+    subprocess.run([*find_compiler().command, *FLAGS["c"], *FLAGS["user"], *flags, *sizes, *sources, "-o", str(folder / "peer"), "-lm"], check=True)
     values = [*unknowns, *(numbers[key] for _, *rest in stack.given for key in [tuple(rest)])]
     done = subprocess.run([folder / "peer"], input=" ".join(repr(float(v)) for v in values), text=True, capture_output=True, check=True)
     words = done.stdout.split()

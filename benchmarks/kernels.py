@@ -46,7 +46,7 @@ def compiled(main: Path, target: Path, folder: Path | None = None) -> Path:
     """A program of `main` and the sources of a built model, with the flags that built it."""
     units = [] if folder is None else [str(p) for p in folder.glob("*.c") if not p.name.startswith("msfp_")]
     found = [] if folder is None else ["-I", str(folder)]
-    command = [*find_compiler().command, *FLAGS["c"], *found, str(main), *units, "-o", str(target), "-lm"]
+    command = [*find_compiler().command, *FLAGS["c"], *FLAGS["user"], *found, str(main), *units, "-o", str(target), "-lm"]
     subprocess.run(command, check=True)
     return target
 

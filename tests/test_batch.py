@@ -317,3 +317,23 @@ def test_sines_of_lanes_are_within_units_in_the_last_place(width: int, tmp_path:
     done = subprocess.run([tmp_path / "sines"], text=True, capture_output=True, check=True)
     small, usual, large, ends = done.stdout.split()
     assert float(small) < 1.2 and float(usual) < 2.0 and float(large) < 3.0 and ends == "1"
+
+
+MODELS = (Effects(spin="patch"), Effects(dimension="planar", bouc_wen="isotropic"), Effects(spin="free", rims=False),
+          Effects(sliders="massless", top_rotation=True))  # fmt: skip
+
+
+@pytest.mark.parametrize("effects", MODELS, ids=str)
+def test_the_c_of_a_batch_compiles_without_a_warning(effects: Effects, tmp_path: Path) -> None:
+    from msfp_gen.build import runtime_sources
+    from msfp_gen.compiler import FLAGS, LANES, find_compiler
+    from msfp_gen.generator import generate
+    from msfp_gen.layout import Layout, ModelSpec
+
+    for name, text in (runtime_sources(8) | generate(ModelSpec(Layout.tfp(), effects), "model", True).files).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    for width, more in LANES.items():
+        flags = [*FLAGS["c"], *FLAGS["lanes"], *more, f"-DMSFP_WIDTH={width}", "-Werror", "-fsyntax-only"]
+        units = ["lanes.c", "batch.c", "newton.c", "condensed.c"]
+        done = subprocess.run([*find_compiler().command, *flags, *units], cwd=tmp_path, text=True, capture_output=True)
+        assert done.stderr == ""

@@ -32,7 +32,7 @@ def _compiler() -> str:
     from msfp_gen.compiler import FLAGS, find_compiler
 
     try:
-        return f"{find_compiler().version}, {' '.join(f for f in FLAGS['c'] if f[1:2] in 'Om')}"
+        return f"{find_compiler().version}, {' '.join(f for f in (*FLAGS['c'], *FLAGS['user']) if f[1:2] in 'Om')}"
     except CompileError:
         return "none found"
 

@@ -17,7 +17,7 @@ typedef long long lane_mask __attribute__((vector_size(8 * MSFP_WIDTH), aligned(
 #define LANE_INLINE __attribute__((always_inline)) static inline
 
 /* A statement may be a number without any lane in it: less a vector of zeros it is one, and nothing else changes. */
-#define LANE(name, value) const lane name = (value) - (lane){ 0 }
+#define LANE(name, value) const lane name __attribute__((unused)) = (value) - (lane){ 0 }
 #define PUT(place, value) place = (value) - (lane){ 0 }
 
 LANE_INLINE lane lane_of(double x) { return x - (lane){ 0 }; }
@@ -43,6 +43,13 @@ LANE_INLINE lane lane_abs(lane x) { return (lane)((lane_mask)x & ~(lane_mask)lan
 /* The larger one; the first where the second is no number. */
 LANE_INLINE lane lane_max(lane x, lane y) { return lane_choose(y > x, y, x); }
 LANE_INLINE lane lane_min(lane x, lane y) { return lane_choose(y < x, y, x); }
+
+/* Powers that are no products are rare: run by run. */
+LANE_INLINE lane lane_pow(lane x, double exponent)
+{
+    LANES_ALL x[lane_index] = pow(x[lane_index], exponent);
+    return x;
+}
 
 LANE_INLINE lane lane_step(lane x) { return lane_choose(x > 0.0, lane_of(1.0), lane_of(0.0)); }
 

@@ -8,11 +8,13 @@
 #define sin lane_sin
 #define cos lane_cos
 #define sqrt lane_sqrt
+#define pow lane_pow
 #define fabs lane_abs
 #define msfp_step lane_step
 #include "msfp_lane_kernels.h"
 #undef fabs
 #undef sqrt
+#undef pow
 #undef cos
 #undef sin
 
@@ -72,5 +74,22 @@ struct lane_work {
     lane dx[NB + 1][MSFP_COORDINATES_SIZE * DOF], dbody[NB + 1][MSFP_BODY_SIZE * DOF];
     lane dforce[NB + 1][VECTOR * DOF], dmoment[NB + 1][MOMENT * DOF];
 };
+
+/* Numbers of every run i from where `pointer` says, into lanes; and back to the runs where that is `wanted`. */
+#define COUNT(type) ((int)(sizeof(type) / sizeof(lane)))
+#define GATHER(to, pointer)                                                                                         \
+    do {                                                                                                            \
+        const double *from[W];                                                                                      \
+        for (int i = 0; i < W; ++i)                                                                                 \
+            from[i] = (const double *)(pointer);                                                                    \
+        lane_gather((lane *)&(to), from, COUNT(to));                                                                \
+    } while (0)
+#define SCATTER(from, wanted, pointer)                                                                              \
+    do {                                                                                                            \
+        double *to[W];                                                                                              \
+        for (int i = 0; i < W; ++i)                                                                                 \
+            to[i] = (wanted) ? (double *)(pointer) : NULL;                                                          \
+        lane_scatter(to, (const lane *)&(from), COUNT(from));                                                       \
+    } while (0)
 
 #endif
