@@ -93,6 +93,13 @@ static int settle(msfp_run *run)
     return msfp_check_state(run, &run->work, &run->now);
 }
 
+/* A history as its maker describes it; what is at hand of it is ours. */
+static void take(msfp_history *own, const msfp_history *given)
+{
+    *own = *given;
+    own->last = own->held = 0;
+}
+
 int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
 #if MSFP_TURNED
                    const msfp_history *support,
@@ -102,10 +109,10 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
 {
     memset(run, 0, sizeof *run);
     run->parameters = *p;
-    run->motion = *motion;
-    run->load = *load;
+    take(&run->motion, motion);
+    take(&run->load, load);
 #if MSFP_TURNED
-    run->support = *support;
+    take(&run->support, support);
 #endif
     run->jumps = jumps;
     run->jump_count = jump_count;
