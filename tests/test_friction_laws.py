@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from reference import friction_laws as reference
-from support import Array, bearing_of, differences, model_of, scene_of
+from support import Array, bearing_of, differences, failure_of, model_of, scene_of
 from test_emission import warnings_of
 from test_equations import inputs, sensible
 
@@ -242,12 +242,14 @@ def test_all_methods_agree() -> None:
     scene = scene_of("fenz-test2", {"dimension": "planar"}, motion=Motion.harmonic(0.02, 1.0, cycles=0.5),
                      output_step=0.01)  # fmt: skip
     scene = lawful(scene, "pvt", reference_pressure=P_REF)
-    runs = [simulate(replace(scene, solver=Solver(method=method, rtol=1e-5))).history for method in
-            ("implicit", "esdirk4", "dopri5")]  # fmt: skip
+    runs = [simulate(replace(scene, solver=Solver(method=method, rtol=3e-6))).history for method in
+            ("implicit", "esdirk4")]  # fmt: skip
     for name in ("top_force", "temperature", "friction_coefficient"):
         first, *others = (getattr(run, name) for run in runs)
         for other in others:
             assert np.abs(first - other)[1:].max() < 2e-3 * np.ptp(first, axis=0).max(), name
+    explicit = failure_of(replace(scene, solver=Solver(method="dopri5", rtol=1e-5)))
+    assert explicit.status == "stiff", "friction that follows velocity relaxes faster than it can step"
 
 
 @pytest.mark.parametrize("solver", [{}, {"rtol": 1e-3}])

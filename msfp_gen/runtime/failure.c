@@ -79,6 +79,16 @@ static int loaded(msfp_run *run, const msfp_work *w, double times)
     return 0;
 }
 
+static int runaway(msfp_run *run)
+{
+    msfp_point at;
+    msfp_work w;
+    msfp_row row;
+    msfp_to_point(run, &run->now, &at);
+    msfp_observe(&run->parameters, &at, &w, &row);
+    return loaded(run, &w, RUNAWAY);
+}
+
 /* A mass thrown upwards through slopes and friction: what presses feeds what drives, the normal force grows without a
  * bound in a time that every method finds (Painleve's paradox), and at its end, where the determinant vanishes, there is
  * no acceleration. */
@@ -90,8 +100,6 @@ static int jammed(msfp_run *run)
     msfp_solution now, soon;
     msfp_to_point(run, &run->now, &at);
     msfp_observe(&run->parameters, &at, &w, &row);
-    if (loaded(run, &w, RUNAWAY))
-        return 1;
     if (MSFP_MASSLESS || !loaded(run, &w, 2.0) || msfp_accelerations(&run->parameters, &at, &w, &now))
         return 0;
     for (double moment = 1e-9; moment < 2e-7; moment *= 2.0) {
@@ -104,9 +112,11 @@ static int jammed(msfp_run *run)
 
 int msfp_last_word(msfp_run *run, int status)
 {
+    if (status == MSFP_E_ANGLE) /* whatever else is true there */
+        return status;
     if (status == MSFP_E_FINITE) /* the state is: it is the next one that has no solution */
         status = MSFP_E_NEWTON;
-    return parting(run) ? MSFP_E_UPLIFT : jammed(run) ? MSFP_E_IRREGULAR : status;
+    return runaway(run) ? MSFP_E_IRREGULAR : parting(run) ? MSFP_E_UPLIFT : jammed(run) ? MSFP_E_IRREGULAR : status;
 }
 #else
 int msfp_last_word(msfp_run *run, int status)

@@ -96,8 +96,8 @@ static int integrate(const msfp_parameters *p)
     double load_coefficients[6][MSFP_DEGREE + 1] = { { 0 } };
     wave(0.01, 2.0, knots, coefficients);
     load_coefficients[2][0] = -LOAD;
-    const msfp_history motion = { PIECES, knots, &coefficients[0][0][0], 0 };
-    const msfp_history load = { 1, load_knots, &load_coefficients[0][0], 0 };
+    const msfp_history motion = { .pieces = PIECES, .knots = knots, .coefficients = &coefficients[0][0][0] };
+    const msfp_history load = { .pieces = 1, .knots = load_knots, .coefficients = &load_coefficients[0][0] };
     msfp_options options;
     memset(&options, 0, sizeof options);
     options.method = MSFP_IMPLICIT;

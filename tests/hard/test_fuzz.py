@@ -128,4 +128,4 @@ def test_a_residual_is_measured_by_the_force_of_its_rim_too() -> None:
     error = failure_of(scene)
     assert error.status == "uplift" and isinstance(error.result, Result)
     last = error.result.history
-    assert last.rim_force[-1].max() > 3 * last.normal_force[-1].min()
+    assert (last.rim_force.max(axis=1) > 3 * last.normal_force.min(axis=1)).any()

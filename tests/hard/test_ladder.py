@@ -205,7 +205,7 @@ def test_loose_sliders_hop_until_one_has_left_its_place(rtol: float) -> None:
 
 
 def test_a_balance_may_lie_within_the_jump_of_a_rims_damper() -> None:
-    """A rim with a damper is met with a jump of force, and where the balance lies within it no residual is zero: Newton went
-    to and fro over 2e-8 of friction for ever, at 186 s of this run."""
+    """A rim with a damper is met with a jump of force, and where the balance lies within it no residual is zero: Newton
+    went to and fro over 2e-8 of friction for ever, at 186 s of this run."""
     scene = scene_of("fenz-test4", {"dimension": "planar", "sliders": "massless"}, {"method": "esdirk4", "rtol": 1e-7})
     assert simulate(scene).succeeded
