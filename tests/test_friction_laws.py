@@ -242,7 +242,7 @@ def test_all_methods_agree() -> None:
     scene = scene_of("fenz-test2", {"dimension": "planar"}, motion=Motion.harmonic(0.02, 1.0, cycles=0.5),
                      output_step=0.01)  # fmt: skip
     scene = lawful(scene, "pvt", reference_pressure=P_REF)
-    runs = [simulate(replace(scene, solver=Solver(method=method, rtol=3e-6))).history for method in
+    runs = [simulate(replace(scene, solver=Solver(method=method, rtol=1e-6))).history for method in
             ("implicit", "esdirk4")]  # fmt: skip
     for name in ("top_force", "temperature", "friction_coefficient"):
         first, *others = (getattr(run, name) for run in runs)
