@@ -177,12 +177,12 @@ def inertia_share(scene: Scene) -> float:
     return max(body.mass for body in scene.bearing.bodies) * peak / rest if rest > 0 else inf
 
 
-def quasistatic(scene: Scene) -> bool:
-    """Whether no force depends on a rate, to the tolerance: massless sliders in the plane then need no integration.
+def quasistatic(scene: Scene, effects: Effects) -> bool:
+    """Whether a model with these effects needs no integration: no force depends on a rate, to the tolerance.
 
     There must be no mass on top, and dampers must carry little of the friction: rates are known to a hundredth.
     """
-    if scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
+    if not effects.flows or scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
         return False
     return damping_share(scene) <= min(1e-3, 1e3 * scene.solver.rtol)
 

@@ -172,7 +172,7 @@ def _solver(scene: Scene) -> Table:
 
 
 def _steps(scene: Scene) -> str:
-    if not (scene.modelled.flows and quasistatic(scene)):
+    if not quasistatic(scene, scene.modelled):
         return "integrated"
     return f"exact whatever their length: no masses, and dampers carry {100 * damping_share(scene):.2g}% of friction"
 

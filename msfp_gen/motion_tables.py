@@ -6,6 +6,7 @@ Each class is the table of one kind; its rules serve the scene reader, and `buil
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -36,7 +37,7 @@ class Paths(Text):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotionTable:
+class MotionTable(ABC):
     """What every kind may hold: a name, how long the base rests at its end [s], and a table of how it turns."""
 
     kind: ClassVar[str]
@@ -56,8 +57,9 @@ class MotionTable:
             text = str(error)
             raise InputError(text if text.startswith("motion") else f"motion.{text}") from None
 
+    @abstractmethod
     def _motion(self) -> Motion:
-        raise NotImplementedError
+        """The motion that the fields describe, before it is held or turned."""
 
     def _values(self, *without: str) -> dict[str, Any]:
         skipped = {"hold", "rotation", *without}

@@ -120,7 +120,7 @@ def begin_run(
         stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
         stop_all_rims=bool(stop and stop.all_rims),
         stop_at_knots=_sampled(scene.motion),
-        quasistatic=quasistatic(scene),
+        quasistatic=quasistatic(scene, model.effects),
         stop_at_loads=scene.load is not None and not np.any(scene.load.coefficients[:, :, 2:]),
         **_watches(scene, model.effects, choice, stops),
         **more,

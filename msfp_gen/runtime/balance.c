@@ -41,9 +41,7 @@ int msfp_balanced(msfp_run *run)
 {
     msfp_state *next = &run->next;
     const msfp_state *now = &run->now;
-    msfp_point at;
-    msfp_to_point(run, next, &at);
-    next->energy = msfp_energy(&run->parameters, &at, &run->work, &next->kinetic) + stored(run, next);
+    next->energy = msfp_energy(&run->parameters, &run->reached, &run->work, &next->kinetic) + stored(run, next);
     const double made = next->energy - now->energy - (left(next) - left(now));
     double most = fmax(run->exchanged, now->kinetic);
     for (int i = 0; i < MSFP_WORKS; ++i)

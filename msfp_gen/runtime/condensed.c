@@ -148,14 +148,16 @@ void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
     }
 }
 
-/* Largest residual relative to its natural size. */
-static double size_of(const msfp_parameters *p, const msfp_work *w, const double *residual)
+double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst)
 {
     double scale[DOF], size = 0.0;
     msfp_residual_scale(p, w, scale);
     for (int i = 0; i < DOF; ++i) {
         const double one = fabs(residual[i]) / scale[i];
-        size = one <= size ? size : one;
+        if (one <= size)
+            continue;
+        size = one < INFINITY ? one : INFINITY; /* a number that is none stays the largest */
+        *worst = i;
     }
     return size;
 }
@@ -164,7 +166,7 @@ static double size_of(const msfp_parameters *p, const msfp_work *w, const double
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
 {
     double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
-    int pivots[DOF], good = 0;
+    int pivots[DOF], good = 0, worst;
     msfp_seed seed = { .ca = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
     memcpy(f, at->f, sizeof f);
@@ -175,7 +177,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
         if (status)
             return status;
         seed.same_base = 1;
-        out->residual = size_of(p, w, residual);
+        out->residual = msfp_residual_size(p, w, residual, &worst);
         if (!(out->residual < INFINITY))
             return MSFP_E_FINITE;
         /* Converged, or at the floor that rounding leaves; a step is taken all the same, for the determinant. */

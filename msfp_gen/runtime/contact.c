@@ -158,25 +158,19 @@ MSFP_INLINE int friction_stage(const double *par, surfaces *all, double beta, do
 }
 
 #if MSFP_FLOW
-/* Slip per turn (3.19), over d_y: in the plane it does not depend on where the normal is. */
-MSFP_INLINE double reach(const double *par, int s)
-{
-    return -par[MSFP_SURFACE_PARAMETERS_SIGN * LANES + s] * par[MSFP_SURFACE_PARAMETERS_R * LANES + s]
-           / par[MSFP_SURFACE_PARAMETERS_DY * LANES + s];
-}
-
 /* Y after the slip of the step, and what follows from it; slope: dY/d(rate of turning). */
-MSFP_INLINE int flow_stage(const double *par, surfaces *all, const msfp_seed *seed, double *slope)
+MSFP_INLINE int flow_stage(const msfp_parameters *p, surfaces *all, const msfp_seed *seed, double *slope)
 {
     double finite = 0.0;
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
-        const double slip = reach(par, s) * (seed->beta * all->local[MSFP_LOCAL_DWY * LANES + s] + seed->turn[j]);
+        const double reach = msfp_reach(p->surface[j]);
+        const double slip = reach * (seed->beta * all->local[MSFP_LOCAL_DWY * LANES + s] + seed->turn[j]);
         const double Y = all->f[s] = msfp_flown(all->before[s], slip);
-        slope[s] = reach(par, s) * seed->beta * (Y * slip > 0.0 ? 1.0 - Y * Y : 1.0);
+        slope[s] = reach * seed->beta * (Y * slip > 0.0 ? 1.0 - Y * Y : 1.0);
         finite += Y;
     }
-    msfp_contact_lanes(par, all->local, all->f, all->out);
+    msfp_contact_lanes(&p->lanes[0][0], all->local, all->f, all->out);
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
 }
 
@@ -237,7 +231,7 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
 #if MSFP_FLOW
     if (seed->flow) {
         double slope[LANES];
-        const int status = flow_stage(&p->lanes[0][0], &all, seed, slope);
+        const int status = flow_stage(p, &all, seed, slope);
         if (status == MSFP_OK && condensed)
             condense_flow(&p->lanes[0][0], &all, slope, condensed);
         scatter(&all, w, f);

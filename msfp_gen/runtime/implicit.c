@@ -161,7 +161,7 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 
 /* A step over a whole reversal has an estimate that may be anything, and nothing to interpolate inside it: Y, Z go half
  * a unit a step at most. As an error, it is cubed for the controller, which takes the cube root. */
-static double leap(const double now[MSFP_NB][2], const double next[MSFP_NB][2])
+double msfp_leap(const double now[MSFP_NB][2], const double next[MSFP_NB][2])
 {
     double worst = 0.0;
     for (int j = 0; j < NB; ++j)
@@ -260,7 +260,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
             for (int d = 0; d < 2; ++d)
                 df[k][d] += h * method->e[i] * s.df[i][k][d];
         }
-    disc = fmax(disc, leap(now->f, next->f));
+    disc = fmax(disc, msfp_leap(now->f, next->f));
     disc = fmax(disc, msfp_heat_error(run, method->e, last + 1, h, beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));
     refine(&s, h, *error > 1.0, next->work);

@@ -137,6 +137,9 @@ int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_se
 /* Natural size of each residual: (N + rim force) R (mu + 1/100) of the surface below; of a force where bodies may part. */
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
 
+/* Largest residual relative to its natural size, and its row (left alone where all are zero); infinite where one is none. */
+double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
+
 /* Accelerations at a given state from the condensed equations; fills at->a. */
 typedef struct {
     int iterations, determinant;

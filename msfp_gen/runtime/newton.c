@@ -61,19 +61,6 @@ static void tangent_over_normal(const msfp_work *w, const double *residual, doub
     }
 }
 
-/* Largest entry of a residual relative to its natural size. */
-static double size_of(msfp_run *run, const msfp_work *w, const double *residual)
-{
-    double scale[DOF], size = 0.0;
-    msfp_residual_scale(&run->parameters, w, scale);
-    for (int i = 0; i < DOF; ++i)
-        if (!(fabs(residual[i]) / scale[i] <= size)) {
-            size = fabs(residual[i]) / scale[i];
-            run->worst_surface = i / ND + 1;
-        }
-    return size;
-}
-
 /* Residual over N, its largest entry relative to its natural size and the tangent (or NULL). Returns a status. */
 static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual, double *tangent, double *size)
 {
@@ -95,11 +82,13 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
         return request.status;
     }
 #endif
+    int worst = -1;
     const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
     if (status)
         return status;
     s->seed.same_base = 1;
-    *size = size_of(run, w, residual);
+    *size = msfp_residual_size(&run->parameters, w, residual, &worst);
+    run->worst_surface = worst < 0 ? run->worst_surface : worst / ND + 1;
     over_normal(w, residual);
     if (tangent)
         tangent_over_normal(w, residual, tangent);

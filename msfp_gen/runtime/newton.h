@@ -29,4 +29,7 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor);
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s);
 int msfp_solve_stage(msfp_run *run, msfp_stage *s);
 
+/* implicit.c: an error where Y, Z go further than half a unit. */
+double msfp_leap(const double now[MSFP_NB][2], const double next[MSFP_NB][2]);
+
 #endif

@@ -110,15 +110,6 @@ static double retraced(const msfp_run *run, double h)
     return worst * worst;
 }
 
-/* Y goes half a unit a step at most, as in implicit.c. */
-static double leap(const msfp_run *run)
-{
-    double worst = 0.0;
-    for (int k = 0; k < NB; ++k)
-        worst = fmax(worst, fabs(run->next.f[k][0] - run->now.f[k][0]) / 0.5);
-    return worst > 1.0 ? worst * worst * worst : 0.0;
-}
-
 /* A step after which no Y has gone further than half a unit and no surface turns back, as far as the motion goes on as it
  * went. */
 double msfp_foreseen(const msfp_run *run, double h)
@@ -222,7 +213,7 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
     if (status)
         return status;
     finish(run, &s, h);
-    *error = fmax(leap(run), retraced(run, h));
+    *error = fmax(msfp_leap(run->now.f, run->next.f), retraced(run, h));
     if (*error <= 1.0)
         count_work(run, &s, h);
     return MSFP_OK;

@@ -42,44 +42,48 @@ static inline int field(int order, int i)
 }
 
 #if MSFP_FLOW
-/* Y after a slip (over d_y) from Y: (3.18) integrated. Friction that goes back is a line, dY = ds/d_y; friction that grows
- * is dY = (1 - Y^2) ds/d_y, so Y = tanh. */
+/* A slip (over d_y) with friction Y along it: what of it is left once friction has come back to zero, where Y then is. 0:
+ * friction does not come so far; it goes back on a line, dY = ds/d_y. */
+MSFP_INLINE int msfp_grows(double *Y, double *slip)
+{
+    if (*Y >= 0.0)
+        return 1;
+    if (*slip <= -*Y) {
+        *Y += *slip;
+        return 0;
+    }
+    *slip += *Y;
+    *Y = 0.0;
+    return 1;
+}
+
+/* Y after a slip (over d_y): (3.18) integrated. Friction that grows is dY = (1 - Y^2) ds/d_y, so Y = tanh. */
 MSFP_INLINE double msfp_flown(double Y, double slip)
 {
     const double sign = slip < 0.0 ? -1.0 : 1.0;
     double y = sign * Y, far = fabs(slip);
-    if (y < 0.0) {
-        if (far <= -y)
-            return sign * (y + far);
-        far += y;
-        y = 0.0;
-    }
-    if (y == 1.0) /* it has slid for long */
-        return sign;
+    if (!msfp_grows(&y, &far) || y == 1.0) /* 1: it has slid for long */
+        return sign * y;
     const double left = (1.0 - y) * exp(-2.0 * far);
     return sign * (1.0 + y - left) / (1.0 + y + left);
-}
-
-/* Slip per turn (3.19), over d_y: in the plane it does not depend on where the normal is. */
-MSFP_INLINE double msfp_reach(const double *par)
-{
-    return -par[MSFP_SURFACE_PARAMETERS_SIGN] * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
 }
 
 /* What friction has lost on the way, over mu N d_y: the integral of Y^3 in slip while it grows. */
 MSFP_INLINE double msfp_flow_loss(double Y, double slip)
 {
     double y = slip < 0.0 ? -Y : Y, far = fabs(slip);
-    if (y < 0.0) {
-        if (far <= -y)
-            return 0.0;
-        far += y;
-        y = 0.0;
-    }
+    if (!msfp_grows(&y, &far))
+        return 0.0;
     if (y == 1.0)
         return far;
     const double left = (1.0 - y) * exp(-2.0 * far), end = (1.0 + y - left) / (1.0 + y + left);
     return far + log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
+}
+
+/* Slip per turn (3.19), over d_y: in the plane it does not depend on where the normal is. */
+MSFP_INLINE double msfp_reach(const double *par)
+{
+    return -par[MSFP_SURFACE_PARAMETERS_SIGN] * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
 }
 #endif
 

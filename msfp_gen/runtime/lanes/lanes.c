@@ -119,7 +119,7 @@ static void measure(lane_work *w)
         for (int i = k * ND; i < (k + 1) * ND; ++i) {
             const lane one = lane_abs(w->residual[i]) / scale;
             const lane_mask larger = ~(one <= w->size);
-            w->size = lane_choose(larger, one, w->size);
+            w->size = lane_choose(larger, lane_choose(one < INFINITY, one, lane_of(INFINITY)), w->size);
             w->worst = lane_choose(larger, lane_of(i), w->worst);
         }
     }
