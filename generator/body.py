@@ -240,6 +240,15 @@ def force_to_world(b: Blocks) -> Program:
     return p
 
 
+def relative_turning(p: Program, above: Symbols, x: Symbols, lower: Symbols) -> Vector:
+    """omega'_above - omega'_below in the basis of the body below: (3.12); `x`, `lower` are coordinates of the two."""
+    sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
+    zero = sp.Integer(0)
+    t2: Vector = (zero, cos_psi, sin_psi)
+    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
+    return add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
+
+
 LEAST_FORCE = sp.Float("1e-6")
 """What a parted surface still carries [N], so that the direction of its force is defined (docs/uplift.md)."""
 
@@ -256,12 +265,8 @@ def to_local(b: Blocks, uplift: bool) -> Program:
     total: Symbols = p.read(b.vector, "tot")
     rim: Symbols = p.read(b.vector, "rim")
     least: Vector = (sp.Integer(0), sp.Integer(0), LEAST_FORCE if uplift else sp.Integer(0))
-    sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
-    zero = sp.Integer(0)
-    t2: Vector = (zero, cos_psi, sin_psi)
-    t3: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))
-    relative = add((x["psi1"], zero, -lower["phi1"]), scale(x["theta1"], t2), scale(x["phi1"], t3))
+    relative = relative_turning(p, above, x, lower)
     contact = subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"])
-    tilt = {"tilt": cos_psi * cos_theta} if "tilt" in b.local.quantities else {}
+    tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.local.quantities else {}
     p.write(b.local, {"p": add(contact, least), "dw": relative, **tilt})
     return p

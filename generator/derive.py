@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.layout import ModelSpec
 
-from . import body, contact, laws, seat, top
+from . import body, columns, contact, laws, seat, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -18,13 +18,13 @@ class Equations:
     spec: ModelSpec
     blocks: Blocks
     programs: tuple[Program, ...]
+    columns: columns.Columns | None = None
+    """Blocks of the tangent's columns, where they are those of rigid bodies on each other."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:
         """Coordinates of one body whose accelerations are unknown."""
-        if self.spec.effects.dimension == "planar":
-            return ("theta",)
-        return ("psi", "theta") if self.spec.effects.spin == "locked" else ("psi", "theta", "phi")
+        return unknowns(self.spec)
 
     @property
     def separations(self) -> tuple[str, ...]:
@@ -32,6 +32,13 @@ class Equations:
         if not self.spec.effects.uplift:
             return ()
         return ("dx", "dz") if self.spec.effects.dimension == "planar" else ("dx", "dy", "dz")
+
+
+def unknowns(spec: ModelSpec) -> tuple[str, ...]:
+    """Coordinates of one body whose accelerations are unknown."""
+    if spec.effects.dimension == "planar":
+        return ("theta",)
+    return ("psi", "theta") if spec.effects.spin == "locked" else ("psi", "theta", "phi")
 
 
 def derive(spec: ModelSpec) -> Equations:
@@ -64,4 +71,7 @@ def derive(spec: ModelSpec) -> Equations:
         programs.append(contact.rim(blocks))
     if effects.uplift:
         programs += [seat.seat_inside(blocks), seat.seat_edge(blocks)]
-    return Equations(spec, blocks, tuple(programs))
+        return Equations(spec, blocks, tuple(programs))
+    carried = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
+    programs += columns.programs(blocks, carried, massless, unknowns(spec))
+    return Equations(spec, blocks, tuple(programs), carried)

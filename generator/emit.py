@@ -168,7 +168,8 @@ def lanes(surfaces: int) -> int:
 
 
 LANE_FUNCTIONS = ("forward", "upright", "top_wrench", "interface_force", "surface_local", "contact", "moment_to_world",
-                  "angular_balance")  # fmt: skip
+                  "angular_balance", "screws", "carried", "felt", "carried_force", "seen_wrench", "force_to_local",
+                  "turning_balance", "own")  # fmt: skip
 """Programs of one evaluation of the condensed equations, which a batch runs for several bearings at once."""
 
 
@@ -186,7 +187,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         autoescape=False,
     )
     spec = equations.spec
-    blocks = [b for f in fields(equations.blocks) if (b := getattr(equations.blocks, f.name)) is not None]
+    rooms = (equations.blocks, equations.columns) if equations.columns else (equations.blocks,)
+    blocks = [b for room in rooms for f in fields(room) if (b := getattr(room, f.name)) is not None]
     law = spec.effects.law
     context = {
         "version": __version__,

@@ -10,6 +10,8 @@ import pytest
 from reference import cases, forces, kinematics, stack
 from support import bearing_of, differences, model_of
 
+from msfp_gen import Top
+
 LAYOUTS = [(2, 1, 0), (2, 0, 1), (3, 1, 1), (3, 2, 0), (5, 2, 2), (5, 3, 1), (7, 3, 3)]
 SPINS = ["locked", "patch", "free"]
 SEEDS = [0, 1]
@@ -209,16 +211,35 @@ def test_report_jacobians_against_differences(layout, spin):
 )
 def test_combined_tangent_of_the_condensed_step(effects, beta):
     """The tangent of the implicit step, seeded with its own factors, against differences of its residual."""
-    layout = (5, 2, 2)
+    against_differences((5, 2, 2), effects, beta)
+
+
+TOPS = (Top.rig(0.0, 1e6, 1e4, 1e7, 1e5), Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7))
+
+
+@pytest.mark.parametrize("top", TOPS, ids=str)
+@pytest.mark.parametrize("effects", [{}, {"spin": "free"}, {"dimension": "planar"}, {"sliders": "massless"}], ids=str)
+@pytest.mark.parametrize("layout", [(2, 1, 0), (4, 2, 1), (5, 1, 3), (11, 5, 5)])
+def test_tangent_in_any_stack_below_any_top(layout, effects, top):
+    """On a base that moves and turns, with every rim met."""
+    against_differences(layout, effects, 1e-3, top=top, base_moves=True, capacity=1e-4)
+
+
+def against_differences(layout, effects, beta, top=None, base_moves=False, capacity=None):
+    """The tangent against differences of the residual."""
     values, state, h, load = sensible(layout, 7)
     model = model_of(layout, **effects)
-    compiled = model.stack(bearing_of(values))
+    bearing = bearing_of(values)
+    if capacity:
+        bearing = bearing.replace(capacity=[capacity] * (layout[0] - 1))
+    compiled = model.stack(bearing, top)
     planar = effects.get("dimension") == "planar"
     keep = np.array([0.0, 1.0, 0.0]) if planar else np.ones(3)
     q, v, a = (np.ascontiguousarray(x * keep) for x in (state.q, state.v, state.a))
     f = np.ascontiguousarray(0.5 * h * [1.0, 0.0 if planar else 1.0])
-    base = np.zeros((3, 6))
-    ld = np.r_[load.force, load.moment] * (np.array([1, 0, 1, 0, 1, 0]) if planar else 1)
+    in_plane = np.array([1, 0, 1, 0, 1, 0]) if planar else np.ones(6)
+    base = np.random.default_rng(1).uniform(-0.1, 0.1, (3, 6)) * in_plane * base_moves
+    ld = np.r_[load.force, load.moment] * in_plane
     cq, cv, ca = 1e-3, 1.0, 1e3
     angles = [1] if planar else [0, 1] if effects.get("spin", "locked") == "locked" else [0, 1, 2]
 
@@ -231,8 +252,11 @@ def test_combined_tangent_of_the_condensed_step(effects, beta):
 
     n = (layout[0] - 1) * len(angles)
     _, _, tangent, _ = compiled.condensed(q, v, a, f, base, ld, cq, cv, ca, beta)
-    want = differences(residual, np.zeros(n), np.full(n, 1e-4))
+    want = differences(residual, np.zeros(n), np.full(n, 1e-5))
     assert np.abs(tangent - want).max() < 1e-7 * np.abs(want).max()
+    if capacity:
+        away = model.stack(bearing_of(values), top).condensed(q, v, a, f, base, ld, cq, cv, ca, beta)[2]
+        assert np.abs(away - tangent).max() > 1e-5 * np.abs(tangent).max(), "rims are met"
 
 
 @pytest.mark.parametrize("plane", ["E1-E3", "E2-E3"])

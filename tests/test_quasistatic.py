@@ -74,7 +74,7 @@ def test_which_models_flow(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_forces_are_those_of_an_integration_to_a_tight_tolerance(name: str) -> None:
     changes = {"output_step": 0.05, "duration": 50.0}
     scene = scene_of(name, {"dimension": "planar", "sliders": "massless"}, **changes)
-    fine = solved(scene, method="esdirk4", rtol=1e-6)
+    fine = solved(scene, method="esdirk4", rtol=1e-7)
     coarse = solved(scene, rtol=1e-3)
     assert coarse.counters.steps < 1.1 * len(coarse.history.time) + 200, "a row is a step"
     assert apart(coarse, fine) < 1e-3

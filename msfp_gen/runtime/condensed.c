@@ -8,95 +8,58 @@
 
 static const int unknown[ND] = MSFP_FREE;
 
-static void seed_columns(msfp_work *w, const msfp_seed *seed)
-{
-    memset(w->dx, 0, sizeof w->dx);
-    memset(w->dbody[0], 0, sizeof w->dbody[0]);
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < ND; ++i) {
-            const double factors[3] = { seed->cq, seed->cv, seed->ca };
-            for (int order = 0; order < 3; ++order)
-                w->dx[k + 1][field(order, i) * DOF + k * ND + i] = factors[order];
-        }
-}
-
-#if MSFP_UPLIFT
-/* What the seat carries and what the motion above asks for are one force: rows of surface j, below its moments. */
-static void part(const msfp_parameters *p, msfp_work *w, int j, const double *asked, const double *dasked, double *residual, double *tangent)
-{
-    msfp_seat(p, w, j, tangent != NULL);
-    for (int i = 0; i < SPACE; ++i) {
-        const int row = j * ND + NA + i;
-        residual[row] = asked[i] - w->force[j][i];
-        for (int c = 0; c < DOF && tangent; ++c)
-            tangent[row * DOF + c] = dasked[i * DOF + c] - w->dforce[j][i * DOF + c];
-    }
-}
-#endif
-
 /* Forces through the surfaces: what the motion asks for, summed from the top down. Where bodies may part, the seats
  * carry them and the sums are rows of the residual. */
-static void forces(const msfp_parameters *p, msfp_work *w, double *residual, double *tangent)
+static void forces(const msfp_parameters *p, msfp_work *w, double *residual)
 {
-    double sum[VECTOR], dsum[VECTOR * DOF];
+    double sum[VECTOR];
     memcpy(sum, w->force[NB], sizeof sum);
-    if (tangent)
-        memcpy(dsum, w->dforce[NB], sizeof dsum);
     for (int j = NB - 1; j >= 0; --j) {
-        double *force = w->force[j], *dforce = w->dforce[j];
-        if (tangent)
-            msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], sum, force, w->dbody[j + 1], dsum, dforce);
-        else
-            msfp_interface_force(p->body[j + 1], w->body[j + 1], sum, force);
-        memcpy(sum, force, sizeof sum);
-        if (tangent)
-            memcpy(dsum, dforce, sizeof dsum);
+        msfp_interface_force(p->body[j + 1], w->body[j + 1], sum, w->force[j]);
+        memcpy(sum, w->force[j], sizeof sum);
 #if MSFP_UPLIFT
-        part(p, w, j, sum, dsum, residual, tangent);
+        msfp_seat(p, w, j);
+        for (int i = 0; i < SPACE; ++i) /* below the moments of surface j */
+            residual[j * ND + NA + i] = sum[i] - w->force[j][i];
 #else
         (void)residual;
 #endif
     }
 }
 
+/* Moment of the surface above body k. */
+static const double *moment_above(const msfp_work *w, int k)
+{
+#if MSFP_UPLIFT
+    if (k < NB)
+        return w->below[k];
+#endif
+    return w->moment[k];
+}
+
 MSFP_WIDE static int alone(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                            double f[MSFP_NB][2], double *residual, double *tangent)
 {
-    double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    double out[MSFP_ANGULAR_SIZE];
+    msfp_slopes slopes;
     if (!seed->same_base)
         msfp_base(p, at, w);
-    if (tangent) {
-        seed_columns(w, seed);
-        msfp_kinematics_tangent(p, at, w);
-        msfp_top_columns(p, at, w, NULL);
-    } else {
-        msfp_kinematics(p, at, w);
-        msfp_top(p, at, w);
-    }
-    forces(p, w, residual, tangent);
+    msfp_kinematics(p, at, w);
+    msfp_top(p, at, w);
+    forces(p, w, residual);
 #if MSFP_LAW
     msfp_surroundings(at, w);
 #endif
-    const int status = msfp_surfaces(p, w, seed, f, tangent != NULL);
+    const int status = msfp_surfaces(p, w, seed, f, tangent ? &slopes : NULL);
     if (status)
         return status;
     for (int k = 1; k <= NB; ++k) {
-        const double *above = w->moment[k], *dabove = w->dmoment[k];
-#if MSFP_UPLIFT
-        if (k < NB) {
-            above = w->below[k];
-            dabove = w->dbelow[k];
-        }
-#endif
-        if (tangent) {
-            msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out,
-                                         w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], dabove, dout);
-            memcpy(tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *tangent);
-        } else
-            msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out);
+        msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], moment_above(w, k), out);
         memcpy(residual + (k - 1) * ND, out, NA * sizeof *residual);
         w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
     }
+    if (tangent)
+        msfp_columns(p, at, seed, w, &slopes, tangent);
     return MSFP_OK;
 }
 

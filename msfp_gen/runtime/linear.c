@@ -5,6 +5,23 @@
 #include <math.h>
 #include "msfp_model.h"
 
+#ifdef __GNUC__
+typedef double whole __attribute__((vector_size(32), aligned(8), may_alias));
+#else
+typedef double whole;
+#endif
+enum { WHOLE = sizeof(whole) / sizeof(double) };
+
+/* to -= factor * from */
+MSFP_INLINE void subtract(double *restrict to, const double *restrict from, double factor, int count)
+{
+    int j = 0;
+    for (; j + WHOLE <= count; j += WHOLE)
+        *(whole *)(to + j) -= factor * *(const whole *)(from + j);
+    for (; j < count; ++j)
+        to[j] -= factor * from[j];
+}
+
 MSFP_INLINE int factors(double *matrix, int n, int *pivots)
 {
     int sign = 1;
@@ -31,13 +48,13 @@ MSFP_INLINE int factors(double *matrix, int n, int *pivots)
             const double factor = matrix[i * n + k] * inverse;
             matrix[i * n + k] = factor;
             if (factor != 0.0)
-                for (int j = k + 1; j < n; ++j)
-                    matrix[i * n + j] -= factor * matrix[k * n + j];
+                subtract(matrix + i * n + k + 1, matrix + k * n + k + 1, factor, n - k - 1);
         }
     }
     return sign;
 }
 
+/* Column by column: a row does not wait for its own sum. */
 MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double *rhs)
 {
     for (int k = 0; k < n; ++k) {
@@ -45,13 +62,13 @@ MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double
         rhs[pivots[k]] = rhs[k];
         rhs[k] = swap;
     }
-    for (int i = 1; i < n; ++i)
-        for (int j = 0; j < i; ++j)
+    for (int j = 0; j < n; ++j)
+        for (int i = j + 1; i < n; ++i)
             rhs[i] -= matrix[i * n + j] * rhs[j];
-    for (int i = n - 1; i >= 0; --i) {
-        for (int j = i + 1; j < n; ++j)
+    for (int j = n - 1; j >= 0; --j) {
+        rhs[j] *= matrix[j * n + j];
+        for (int i = 0; i < j; ++i)
             rhs[i] -= matrix[i * n + j] * rhs[j];
-        rhs[i] *= matrix[i * n + i];
     }
 }
 

@@ -18,6 +18,7 @@
 #endif
 
 #define MOST 30      /* steps */
+#define PATIENT 10   /* steps before a residual may be that of a jump */
 #define ARRIVED 1e-3 /* a residual above this is never the last */
 
 static const int unknown[ND] = MSFP_FREE;
@@ -255,14 +256,14 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     double residual[DOF], step[DOF], size = INFINITY;
     int fresh = !trusted(run, s), status = MSFP_OK;
     s->goal = s->keep = goal;
-    s->descend = fresh ? 0 : MOST;
+    s->descend = fresh ? 0 : PATIENT - 1;
     s->taken = 0;
     s->before = INFINITY;
     run->work_sign = 0;
     if (!fresh)
         size = msfp_stage_residual(run, s, &run->work, residual);
     const int taken = s->taken;
-    if (taken && size > goal && size < INFINITY && size >= 0.1 * s->before) {
+    if (taken && size > goal && size >= 0.1 * s->before) { /* a step that leads to no value has been taken back too */
         ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
         fresh = 1;
     }
@@ -273,12 +274,13 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     for (int i = taken; size > goal; ++i) {
         if (status || i >= MOST || !(size < INFINITY))
             return failed(run, status ? status : MSFP_E_NEWTON, size);
-        if (i >= 10)
+        if (i >= PATIENT)
             s->goal = goal = fmax(goal, jump(run, s));
         ++run->counts[MSFP_COUNT_NEWTON];
         const double before = size;
-        s->keep = fresh ? ARRIVED : goal;
-        s->descend = fresh ? 0 : MOST - i - 1;
+        const int late = i >= PATIENT - 1; /* `jump` looks at the work area */
+        s->keep = late ? INFINITY : fresh ? ARRIVED : goal;
+        s->descend = fresh || late ? 0 : PATIENT - i - 2;
         s->before = before;
         size = take_step(run, s, residual, step, size, fresh);
         if (fresh && size < ARRIVED && drowned(s, step))

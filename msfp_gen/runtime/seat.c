@@ -21,58 +21,73 @@ static void compression(const msfp_work *w, int j, double *along, double *across
     *across = sqrt(square);
 }
 
+/* Whether the compression points into the footprint. */
+static int inside(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    compression(w, j, &along, &across);
+    return across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA];
+}
+
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
 {
     double along, across;
     const double *par = p->surface[j];
     compression(w, j, &along, &across);
-    if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA])
+    if (inside(p, w, j))
         return sqrt(along * along + across * across);
     return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
 }
 
 /* Force of the seat of surface j, into force[j]; zero where it is open or its damping would pull. */
-void msfp_seat(const msfp_parameters *p, msfp_work *w, int j, int tangent)
+void msfp_seat(const msfp_parameters *p, msfp_work *w, int j)
 {
-    double along, across;
-    const double *par = p->surface[j];
-    const int k = slider_of(j);
-    double *seat = w->seat[j], *dseat = w->dseat[j];
-    compression(w, j, &along, &across);
+    double *seat = w->seat[j];
+    seat[MSFP_SEAT_GRIP] = seat[MSFP_SEAT_STORED] = seat[MSFP_SEAT_POWER] = 0.0;
     if (msfp_compression(p, w, j) > 0.0) {
-        if (across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA]) {
-            if (tangent)
-                msfp_seat_inside_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
-            else
-                msfp_seat_inside(par, w->body[k], w->x[j + 1], seat);
-        } else if (tangent)
-            msfp_seat_edge_tangent(par, w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+        if (inside(p, w, j))
+            msfp_seat_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], seat);
         else
-            msfp_seat_edge(par, w->body[k], w->x[j + 1], seat);
-    } else
-        seat[MSFP_SEAT_GRIP] = seat[MSFP_SEAT_STORED] = seat[MSFP_SEAT_POWER] = 0.0;
-    if (seat[MSFP_SEAT_GRIP] <= 0.0) {
-        memset(seat, 0, (VECTOR + MOMENT) * sizeof *seat);
-        if (tangent)
-            memset(dseat, 0, sizeof w->dseat[j]);
+            msfp_seat_edge(p->surface[j], w->body[slider_of(j)], w->x[j + 1], seat);
     }
+    if (seat[MSFP_SEAT_GRIP] <= 0.0)
+        memset(seat, 0, (VECTOR + MOMENT) * sizeof *seat);
     memcpy(w->force[j], seat, sizeof w->force[j]);
-    if (tangent)
-        memcpy(w->dforce[j], dseat, sizeof w->dforce[j]);
+}
+
+/* Columns of its force, into dforce[j], and of its moment; w holds the seat itself. */
+void msfp_seat_columns(const msfp_parameters *p, msfp_work *w, int j)
+{
+    const int k = slider_of(j);
+    double seat[MSFP_SEAT_SIZE], *dseat = w->dseat[j];
+    if (w->seat[j][MSFP_SEAT_GRIP] <= 0.0)
+        memset(dseat, 0, sizeof w->dseat[j]);
+    else if (inside(p, w, j))
+        msfp_seat_inside_tangent(p->surface[j], w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+    else
+        msfp_seat_edge_tangent(p->surface[j], w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
+    memcpy(w->dforce[j], dseat, sizeof w->dforce[j]);
 }
 
 /* The wrench of a surface is (F, M) about the centre of its concave side; on its slider's side the seat adds its moment. */
-void msfp_split_moment(msfp_work *w, int j, int tangent)
+void msfp_split_moment(msfp_work *w, int j)
 {
-    const double *turning = w->seat[j] + VECTOR, *dturning = w->dseat[j] + VECTOR * DOF;
+    const double *turning = w->seat[j] + VECTOR;
     const int above = signs[j] > 0;
     memcpy(w->below[j], w->moment[j], sizeof w->below[j]);
-    double *on = above ? w->moment[j] : w->below[j], *don = above ? w->dmoment[j] : w->dbelow[j];
-    if (tangent)
-        memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
+    double *on = above ? w->moment[j] : w->below[j];
     for (int i = 0; i < MOMENT; ++i) /* moment_below is what the body below receives, reversed */
         on[i] += above ? turning[i] : -turning[i];
-    for (int i = 0; i < MOMENT * DOF && tangent; ++i)
+}
+
+void msfp_split_columns(msfp_work *w, int j)
+{
+    const double *dturning = w->dseat[j] + VECTOR * DOF;
+    const int above = signs[j] > 0;
+    memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
+    double *don = above ? w->dmoment[j] : w->dbelow[j];
+    for (int i = 0; i < MOMENT * DOF; ++i)
         don[i] += above ? dturning[i] : -dturning[i];
 }
 #else

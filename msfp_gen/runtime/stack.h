@@ -96,14 +96,29 @@ void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */);
 
 /* seat.c */
-void msfp_seat(const msfp_parameters *p, msfp_work *w, int j, int tangent);
-void msfp_split_moment(msfp_work *w, int j, int tangent);
+void msfp_seat(const msfp_parameters *p, msfp_work *w, int j);
+void msfp_seat_columns(const msfp_parameters *p, msfp_work *w, int j);
+void msfp_split_moment(msfp_work *w, int j);
+void msfp_split_columns(msfp_work *w, int j);
 
 /* surface.c */
+/* Jacobians of what a surface does in what it is given: moment and N of the contacts, in lanes; rims. */
+typedef struct {
+    double contact[(MOMENT + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+} msfp_slopes;
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
-/* Force, slip, friction and moment of all surfaces. */
-int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], int tangent);
+/* How much of its rim's force a surface presses against: all of it, but no more than it carries itself where bodies may
+ * part; a rim met in flight turns the bodies and presses nothing. */
+double msfp_rim_share(const msfp_work *w, int j);
+/* Moment of surface j on the body above, in the basis of the body below. */
+void msfp_surface_moment(const msfp_work *w, int j, double *moment);
+/* Force, slip, friction and moment of all surfaces; slopes (or NULL): for the tangent. */
+int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], msfp_slopes *slopes);
+
+/* columns.c, parting.c where bodies may part: the tangent, after an evaluation. */
+void msfp_columns(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w, const msfp_slopes *slopes,
+                  double *tangent);
 
 /* contact.c */
 /* Y, Z and the contact of all surfaces; condensed (or NULL): Jacobian of moment and N in what a surface is given, in lanes. */

@@ -72,9 +72,7 @@ void msfp_rim_columns(const msfp_work *w, int j, const double *drim, double *dfo
         }
 }
 
-/* How much of its rim's force a surface presses against: all of it, but no more than it carries itself where bodies may
- * part; a rim met in flight turns the bodies and presses nothing. */
-MSFP_INLINE double rim_share(const msfp_work *w, int j)
+double msfp_rim_share(const msfp_work *w, int j)
 {
     double carried = 0.0, met = 0.0;
     if (!MSFP_UPLIFT || !w->rim_active[j])
@@ -87,58 +85,35 @@ MSFP_INLINE double rim_share(const msfp_work *w, int j)
 }
 
 /* Contact force and slip of surface j in the basis of the body below; what the rim adds to the moment. */
-MSFP_INLINE void approach(const msfp_parameters *p, msfp_work *w, int j, double *dlocal, double *dmoment /* NULL: no tangent */)
+MSFP_INLINE void approach(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 {
-    double drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL], drf[VECTOR * DOF], rim[VECTOR]; /* drim: only where the rim is met */
-    msfp_rim_force(p, w, j, dlocal ? drim : NULL);
-    const double share = rim_share(w, j);
+    double rim[VECTOR];
+    msfp_rim_force(p, w, j, drim);
+    const double share = msfp_rim_share(w, j);
     for (int i = 0; i < VECTOR; ++i)
         rim[i] = share * w->rim[j][i];
-    if (dlocal) {
-        msfp_rim_columns(w, j, drim, drf, dmoment);
-        for (int i = 0; i < VECTOR * DOF; ++i)
-            drf[i] *= share;
-        msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j],
-                                   w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
-    } else
-        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
+    msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
 }
 
-/* Moment of surface j on the body above; condensed: Jacobian of the contact's moment and N, of all surfaces. */
-MSFP_INLINE void turn(msfp_work *w, int j, const double *condensed, const double *dlocal, double *dmoment)
+void msfp_surface_moment(const msfp_work *w, int j, double *moment)
 {
-    double moment[MOMENT];
     for (int r = 0; r < MOMENT; ++r)
         moment[r] = w->contact[j][r] + w->rim[j][VECTOR + r];
-    if (!dlocal) {
-        msfp_moment_to_world(w->body[j], moment, w->moment[j]);
-        return;
-    }
-    memset(w->dnormal[j], 0, sizeof w->dnormal[j]);
-    for (int r = 0; r <= MOMENT; ++r) {
-        double *row = r < MOMENT ? dmoment + r * DOF : w->dnormal[j];
-        for (int k = 0; k < MSFP_LOCAL_SIZE; ++k) {
-            const double slope = condensed[(r * MSFP_LOCAL_SIZE + k) * MSFP_LANES + j];
-            for (int c = 0; c < DOF; ++c)
-                row[c] += slope * dlocal[k * DOF + c];
-        }
-    }
-    msfp_moment_to_world_tangent(w->body[j], moment, w->moment[j], w->dbody[j], dmoment, w->dmoment[j]);
 }
 
-MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], int tangent)
+MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2], msfp_slopes *slopes)
 {
-    double dlocal[NB][MSFP_LOCAL_SIZE * DOF], dmoment[NB][MOMENT * DOF];
-    double condensed[(MOMENT + 1) * MSFP_LOCAL_SIZE * MSFP_LANES];
+    double moment[MOMENT];
     for (int j = 0; j < NB; ++j)
-        approach(p, w, j, tangent ? dlocal[j] : NULL, tangent ? dmoment[j] : NULL);
-    const int status = msfp_contacts(p, w, seed, f, tangent ? condensed : NULL);
+        approach(p, w, j, slopes ? slopes->rim[j] : NULL);
+    const int status = msfp_contacts(p, w, seed, f, slopes ? slopes->contact : NULL);
     if (status)
         return status;
     for (int j = 0; j < NB; ++j) {
-        turn(w, j, condensed, tangent ? dlocal[j] : NULL, dmoment[j]);
+        msfp_surface_moment(w, j, moment);
+        msfp_moment_to_world(w->body[j], moment, w->moment[j]);
 #if MSFP_UPLIFT
-        msfp_split_moment(w, j, tangent);
+        msfp_split_moment(w, j);
 #endif
     }
     return MSFP_OK;

@@ -5,7 +5,7 @@
 #define MSFP_LANE_NEWTON_H
 #include "lane_work.h"
 
-static void evaluate(lane_work *w, int tangent);
+static void evaluate(lane_work *w);
 static const int unknown[ND] = MSFP_FREE;
 
 /* What a step takes; runs that take none get another's. */
@@ -37,13 +37,13 @@ static void solve(const lane_work *w, lane *x)
             x[from][run] = x[k][run];
             x[k][run] = swap;
         }
-    for (int i = 1; i < DOF; ++i)
-        for (int j = 0; j < i; ++j)
+    for (int j = 0; j < DOF; ++j)
+        for (int i = j + 1; i < DOF; ++i)
             x[i] -= matrix[i * DOF + j] * x[j];
-    for (int i = DOF - 1; i >= 0; --i) {
-        for (int j = i + 1; j < DOF; ++j)
+    for (int j = DOF - 1; j >= 0; --j) {
+        x[j] *= matrix[j * DOF + j];
+        for (int i = 0; i < j; ++i)
             x[i] -= matrix[i * DOF + j] * x[j];
-        x[i] *= matrix[i * DOF + i];
     }
 }
 
@@ -114,7 +114,7 @@ static void descend(lane_work *w, msfp_request *const *r, int count)
         move(w, on, back);
         done |= back;
         w->asked = mask_of(on | back);
-        evaluate(w, 0);
+        evaluate(w);
     }
     if (ever)
         SCATTER(w->in.at.v, ever >> i & 1, r[i]->stage->at.v);

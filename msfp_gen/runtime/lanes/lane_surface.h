@@ -5,10 +5,29 @@
 
 #define ROWS (MOMENT + FRICTION + 1) /* rows of the contact's Jacobian: M, dY, dZ, N */
 
+/* ---- what the outside does to the top --------------------------------------------------------------------------- */
+
+LANE_INLINE void lane_outside(const lane_work *w, lane *force, lane *moment)
+{
+    lane_force_F_put(force, w->in.at.load);
+    lane_moment_M_put(moment, w->in.at.load + 3);
+}
+
+#if MSFP_TURNED
+LANE_INLINE void lane_held(const lane_work *w, lane *upright)
+{
+    lane support[MSFP_SUPPORT_SIZE];
+    for (int order = 0; order < 2; ++order)
+        for (int i = 0; i < PAIR; ++i)
+            support[order * PAIR + i] = w->in.at.support[order][MSFP_PLANAR ? 1 : i];
+    lane_upright(support, upright);
+}
+#endif
+
 /* ---- rims: few are met at a time, so run by run ---------------------------------------------------------------- */
 
-/* Rim force of surface j in one run; columns of force and moment where they are asked for. */
-static void lane_rim_met(lane_work *w, int j, int run, lane *drf, lane *dmoment /* NULL: no tangent */)
+/* Rim force of surface j in one run; for a tangent with its Jacobian in angles and rates. */
+static void lane_rim_met(lane_work *w, int j, int run)
 {
 #if MSFP_RIMS
     double x[MSFP_RIM_LOCAL], out[MSFP_RIM_SIZE], drim[MSFP_RIM_SIZE * MSFP_RIM_LOCAL], identity[MSFP_RIM_LOCAL * MSFP_RIM_LOCAL] = { 0 };
@@ -16,7 +35,7 @@ static void lane_rim_met(lane_work *w, int j, int run, lane *drf, lane *dmoment 
         x[i] = w->out.x[j + 1][coordinate(i / PAIR, i % PAIR)][run];
         identity[i * MSFP_RIM_LOCAL + i] = 1.0;
     }
-    if (dmoment)
+    if (w->wanted)
         msfp_rim_tangent(w->parameters[run]->surface[j], x, out, identity, drim);
     else
         msfp_rim(w->parameters[run]->surface[j], x, out);
@@ -26,33 +45,30 @@ static void lane_rim_met(lane_work *w, int j, int run, lane *drf, lane *dmoment 
     w->rim_active[j][run] = 1;
     for (int i = 0; i < MSFP_RIM_SIZE; ++i)
         w->out.rim[j][i][run] = out[i];
-    for (int r = 0; r < (VECTOR + MOMENT) && dmoment; ++r)
-        for (int c = 0; c < DOF; ++c) {
-            double sum = 0.0;
-            for (int i = 0; i < MSFP_RIM_LOCAL; ++i)
-                sum += drim[r * MSFP_RIM_LOCAL + i] * w->dx[j + 1][coordinate(i / PAIR, i % PAIR) * DOF + c][run];
-            (r < VECTOR ? drf + r * DOF : dmoment + (r - VECTOR) * DOF)[c][run] = sum;
-        }
+    if (!w->wanted)
+        return;
+    if (!w->any_rim[j])
+        memset(w->rim_slope[j], 0, sizeof w->rim_slope[j]);
+    w->any_rim[j] = 1;
+    for (int i = 0; i < (VECTOR + MOMENT) * MSFP_RIM_LOCAL; ++i)
+        w->rim_slope[j][i][run] = drim[i];
 #else
-    (void)w, (void)j, (void)run, (void)drf, (void)dmoment;
+    (void)w, (void)j, (void)run;
 #endif
 }
 
-static void lane_rims(lane_work *w, int j, lane *drf, lane *dmoment)
+static void lane_rims(lane_work *w, int j)
 {
     memset(w->out.rim[j], 0, sizeof w->out.rim[j]);
     memset(w->rim_active[j], 0, sizeof w->rim_active[j]);
     w->more.rim_sum[j] = lane_of(0.0);
-    if (dmoment) {
-        memset(drf, 0, VECTOR * DOF * sizeof *drf);
-        memset(dmoment, 0, MOMENT * DOF * sizeof *dmoment);
-    }
+    w->any_rim[j] = 0;
     if (!MSFP_RIMS)
         return;
     const unsigned away = lane_bits(lane_body_cp(w->out.body[j + 1]) * w->out.body[j + 1][MSFP_BODY_CT] > w->in.rim_cosine[j]);
     for (int run = 0; run < W && away != LANE_BITS; ++run)
         if (!(away >> run & 1))
-            lane_rim_met(w, j, run, drf, dmoment);
+            lane_rim_met(w, j, run);
 }
 
 /* ---- friction: Y, Z by their stage formula ---------------------------------------------------------------------- */
@@ -172,51 +188,25 @@ LANE_INLINE void lane_condense(const lane_work *w, int j, lane *condensed)
 
 /* ---- one surface ------------------------------------------------------------------------------------------------ */
 
+LANE_INLINE void lane_surface_moment(const lane_work *w, int j, lane *moment)
+{
+    for (int r = 0; r < MOMENT; ++r)
+        moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
+}
+
 /* Moments of all surfaces on the bodies above. */
 LANE_INLINE void lane_surfaces(lane_work *w)
 {
+    lane moment[MOMENT];
     for (int j = 0; j < NB; ++j) {
-        lane_rims(w, j, NULL, NULL);
+        lane_rims(w, j);
         lane_surface_local(w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j], w->out.local[j]);
     }
     lane_friction(w);
     for (int j = 0; j < NB; ++j) {
-        lane moment[MOMENT];
-        for (int r = 0; r < MOMENT; ++r)
-            moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
+        lane_surface_moment(w, j, moment);
         lane_moment_to_world(w->out.body[j], moment, w->out.moment[j]);
     }
-}
-
-/* Columns of the moment and of N of surface j from those of what it is given. */
-LANE_INLINE void lane_turn_columns(lane_work *w, int j, const lane *dlocal, lane *dmoment)
-{
-    lane moment[MOMENT], condensed[(MOMENT + 1) * INPUTS];
-    lane_condense(w, j, condensed);
-    for (int r = 0; r < MOMENT; ++r)
-        moment[r] = w->out.contact[j][r] + w->out.rim[j][VECTOR + r];
-    for (int r = 0; r <= MOMENT; ++r)
-        for (int c = 0; c < DOF; ++c) {
-            lane sum = r < MOMENT ? dmoment[r * DOF + c] : lane_of(0.0);
-            for (int k = 0; k < INPUTS; ++k)
-                sum += condensed[r * INPUTS + k] * dlocal[k * DOF + c];
-            *(r < MOMENT ? &dmoment[r * DOF + c] : &w->dnormal[j][c]) = sum;
-        }
-    lane_moment_to_world_tangent(DOF, w->out.body[j], moment, w->out.moment[j], w->dbody[j], dmoment, w->dmoment[j]);
-}
-
-/* The same with columns. */
-LANE_INLINE void lane_surfaces_columns(lane_work *w)
-{
-    lane drf[VECTOR * DOF], dlocal[NB][INPUTS * DOF], dmoment[NB][MOMENT * DOF];
-    for (int j = 0; j < NB; ++j) {
-        lane_rims(w, j, drf, dmoment[j]);
-        lane_surface_local_tangent(DOF, w->out.body[j], w->out.body[j + 1], w->out.x[j + 1], w->out.x[j], w->out.force[j], w->out.rim[j],
-                                   w->out.local[j], w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal[j]);
-    }
-    lane_friction(w);
-    for (int j = 0; j < NB; ++j)
-        lane_turn_columns(w, j, dlocal[j], dmoment[j]);
 }
 
 #endif

@@ -62,6 +62,7 @@ struct lane_work {
     } more; /* of msfp_work, behind rim_active */
     int rim_active[NB][W], status[W];
     lane_mask over;  /* where residual and tangent are wanted over N */
+    int wanted;      /* a tangent */
     lane_mask asked; /* runs that are evaluated; the others have been, and what Y, Z they have stays */
     struct {
         lane Q[NB][MSFP_NQ], V[NB][MSFP_NQ], inertia, factors[DOF * DOF], step[DOF];
@@ -71,8 +72,8 @@ struct lane_work {
     long values[W]; /* of the parameters that the lanes hold */
     lane residual[DOF], worst, size;
     lane tangent[DOF * DOF], dnormal[NB][DOF];
-    lane dx[NB + 1][MSFP_COORDINATES_SIZE * DOF], dbody[NB + 1][MSFP_BODY_SIZE * DOF];
-    lane dforce[NB + 1][VECTOR * DOF], dmoment[NB + 1][MOMENT * DOF];
+    lane rim_slope[NB][(VECTOR + MOMENT) * MSFP_RIM_LOCAL]; /* of rims that some run has met */
+    int any_rim[NB];
 };
 
 /* Numbers of every run i from where `pointer` says, into lanes; and back to the runs where that is `wanted`. */

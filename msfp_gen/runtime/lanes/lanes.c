@@ -1,7 +1,7 @@
 /* lanes.c: the condensed equations of several runs at once: kinematics.c and condensed.c with a run in every lane. */
 #define _DEFAULT_SOURCE /* posix_memalign */
 #include "lane_newton.h"
-#include "lane_surface.h"
+#include "lane_columns.h"
 #include <stdlib.h>
 
 enum { BALANCED = MSFP_PLANAR ? 1 : 3 }; /* components of a turning */
@@ -32,74 +32,34 @@ static void base(lane_work *w)
     lane_forward(w->in.parts.body[0], ground, w->out.x[0], w->out.body[0]);
 }
 
-/* Columns of the unknowns themselves; those of other bodies are zero from the beginning. */
-static void seeds(lane_work *w)
-{
-    const lane factors[3] = { w->in.seed.cq, w->in.seed.cv, w->in.seed.ca };
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < ND; ++i)
-            for (int order = 0; order < 3; ++order)
-                w->dx[k + 1][field(order, i) * DOF + k * ND + i] = factors[order];
-}
-
-/* A body moves with the unknowns of those below it and its own; columns of those above stay zero. */
-static void stack_up(lane_work *w, int tangent)
+static void stack_up(lane_work *w)
 {
     base(w);
     for (int k = 1; k <= NB; ++k) {
         coordinates_of(w->out.x[k], w->in.at.q[k - 1], w->in.at.v[k - 1], w->in.at.a[k - 1]);
-        if (tangent)
-            lane_forward_tangent(k * ND, w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
-        else
-            lane_forward(w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k]);
+        lane_forward(w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k]);
     }
 }
 
-static void top(lane_work *w, int tangent)
+static void top(lane_work *w)
 {
-    static const lane zero[6 * DOF];
-    lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
-    lane_force_F_put(force, w->in.at.load);
-    lane_moment_M_put(moment, w->in.at.load + 3);
+    lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE];
+    lane_outside(w, force, moment);
 #if MSFP_TURNED
-    lane support[MSFP_SUPPORT_SIZE], upright[MSFP_UPRIGHT_SIZE];
-    for (int order = 0; order < 2; ++order)
-        for (int i = 0; i < PAIR; ++i)
-            support[order * PAIR + i] = w->in.at.support[order][MSFP_PLANAR ? 1 : i];
-    lane_upright(support, upright);
+    lane upright[MSFP_UPRIGHT_SIZE];
+    lane_held(w, upright);
 #endif
-    if (tangent) {
-        lane_top_wrench_tangent(DOF, w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench, w->dbody[NB], w->dx[NB],
-                                zero, zero, dwrench);
-        memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);
-        memcpy(w->dmoment[NB], dwrench + VECTOR * DOF, sizeof w->dmoment[NB]);
-    } else
-        lane_top_wrench(w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench);
+    lane_top_wrench(w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench);
     memcpy(w->out.force[NB], wrench, sizeof w->out.force[NB]);
     memcpy(w->out.moment[NB], wrench + VECTOR, sizeof w->out.moment[NB]);
     w->more.reference = w->in.weight + lane_abs(w->in.at.load[0]) + lane_abs(w->in.at.load[1]) + lane_abs(w->in.at.load[2]);
 }
 
-static void forces(lane_work *w, int tangent)
+static void balances(lane_work *w)
 {
-    for (int j = NB - 1; j >= 0; --j)
-        if (tangent)
-            lane_interface_force_tangent(DOF, w->in.parts.body[j + 1], w->out.body[j + 1], w->out.force[j + 1], w->out.force[j], w->dbody[j + 1],
-                                         w->dforce[j + 1], w->dforce[j]);
-        else
-            lane_interface_force(w->in.parts.body[j + 1], w->out.body[j + 1], w->out.force[j + 1], w->out.force[j]);
-}
-
-static void balances(lane_work *w, int tangent)
-{
-    lane out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    lane out[MSFP_ANGULAR_SIZE];
     for (int k = 1; k <= NB; ++k) {
-        if (tangent) {
-            lane_angular_balance_tangent(DOF, w->in.parts.body[k], w->out.body[k], w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k],
-                                         w->out.moment[k], out, w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], w->dmoment[k], dout);
-            memcpy(w->tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
-        } else
-            lane_angular_balance(w->in.parts.body[k], w->out.body[k], w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k], w->out.moment[k], out);
+        lane_angular_balance(w->in.parts.body[k], w->out.body[k], w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k], w->out.moment[k], out);
         memcpy(w->residual + (k - 1) * ND, out, NA * sizeof *out);
         w->more.lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? lane_of(0.0) : out[MSFP_ANGULAR_SIZE - 1];
     }
@@ -126,13 +86,13 @@ static void measure(lane_work *w)
 }
 
 /* Residual and tangent over N where that is asked for: newton.c has why. */
-static void over_normal(lane_work *w, int tangent)
+static void over_normal(lane_work *w)
 {
     for (int k = 0; k < NB; ++k) {
         const lane normal = lane_choose(w->over, w->out.contact[k][MSFP_CONTACT_N], lane_of(1.0)), inverse = 1.0 / normal;
         for (int i = k * ND; i < (k + 1) * ND; ++i) {
             w->residual[i] /= normal;
-            for (int c = 0; c < DOF && tangent; ++c) {
+            for (int c = 0; c < DOF && w->wanted; ++c) {
                 const lane change = lane_choose(w->over, w->residual[i] * w->dnormal[k][c], lane_of(0.0));
                 w->tangent[i * DOF + c] = inverse * (w->tangent[i * DOF + c] - change);
             }
@@ -172,7 +132,7 @@ static void gather(lane_work *w, msfp_request *const *r)
 }
 
 /* Runs that fill a vector up come last and get nothing. */
-static void scatter(lane_work *w, msfp_request *const *r, int count, int tangent)
+static void scatter(lane_work *w, msfp_request *const *r, int count)
 {
     int full = 0;
     for (int i = 0; i < count; ++i) {
@@ -184,7 +144,7 @@ static void scatter(lane_work *w, msfp_request *const *r, int count, int tangent
 #define KEPT (i < count && (w->status[i] != MSFP_OK || w->size[i] <= r[i]->keep))
     SCATTER(w->in.f, i < count, r[i]->f);
     SCATTER(w->residual, i < count, r[i]->residual);
-    if (tangent)
+    if (w->wanted)
         SCATTER(w->tangent, i < count, r[i]->tangent);
     if (!full)
         return;
@@ -196,34 +156,32 @@ static void scatter(lane_work *w, msfp_request *const *r, int count, int tangent
 #undef KEPT
 }
 
-static void evaluate(lane_work *w, int tangent)
+static void evaluate(lane_work *w)
 {
-    if (tangent)
-        seeds(w);
-    stack_up(w, tangent);
-    top(w, tangent);
-    forces(w, tangent);
-    if (tangent)
-        lane_surfaces_columns(w);
-    else
-        lane_surfaces(w);
-    balances(w, tangent);
+    stack_up(w);
+    top(w);
+    for (int j = NB - 1; j >= 0; --j)
+        lane_interface_force(w->in.parts.body[j + 1], w->out.body[j + 1], w->out.force[j + 1], w->out.force[j]);
+    lane_surfaces(w);
+    balances(w);
+    if (w->wanted)
+        lane_tangent(w);
     measure(w);
-    over_normal(w, tangent);
+    over_normal(w);
 }
 
 void msfp_lanes(lane_work *w, msfp_request *const *requests, int count)
 {
     msfp_request *all[W];
-    const int tangent = requests[0]->tangent != NULL;
+    w->wanted = requests[0]->tangent != NULL;
     for (int i = 0; i < W; ++i)
         all[i] = requests[i < count ? i : 0];
     gather(w, all);
     w->asked = mask_of(LANE_BITS);
-    evaluate(w, tangent);
-    if (!tangent)
+    evaluate(w);
+    if (!w->wanted)
         descend(w, all, count);
-    scatter(w, all, count, tangent);
+    scatter(w, all, count);
 }
 
 lane_work *msfp_lanes_new(void)
