@@ -1,14 +1,18 @@
 """Scenes side by side against one after the other, on one core: `python benchmarks/batch.py` (docs/performance.md).
 
 Every scene is another one: records scaled otherwise, cyclic tests with other amplitudes. The time is that of the loops
-in C alone, for `simulate` and for the batch, in CPU seconds; both take the same scenes, in turn, and the best of some
-rounds counts. The ratio comes last. Answers are compared at even times: the largest difference of horizontal force over the
-largest force.
+in C alone, in CPU seconds; all take the same scenes, in turn, and the best of some rounds counts. Three ways: with one
+number an instruction (`simulate` compiled without vectors but for its factorisation), `simulate` as it is, whose vectors
+hold the surfaces of one bearing, and side by side in lanes. The ratios come last. Answers are compared at even times: the
+largest difference of horizontal force over the largest force. `--alike`: the same scene every time, so that runs keep step.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,10 +33,11 @@ STUDIES = {
 }
 
 
-def scenes_of(name: str, count: int) -> list[Scene]:
-    """Versions of a preset."""
+def scenes_of(name: str, count: int, alike: bool = False) -> list[Scene]:
+    """Versions of a preset; or the one in the middle, again and again."""
     field, values = STUDIES[name]
-    return [changed_scene(name, {field: float(value)}) for value in values[:count]]
+    chosen = [values[len(values) // 2]] * count if alike else values[:count]
+    return [changed_scene(name, {field: float(value)}) for value in chosen]
 
 
 def serial(scenes: Sequence[Scene], model: Model) -> float:
@@ -79,29 +84,56 @@ def apart(scenes: Sequence[Scene], width: int) -> list[float]:
     return found
 
 
+class Scalar:
+    """`serial` in a process of its own, where models are compiled without vectors: one number an instruction."""
+
+    def __init__(self, *arguments: str) -> None:
+        flags = f"{os.environ.get('MSFP_GEN_CFLAGS', '')} -fno-tree-vectorize"
+        self.process = subprocess.Popen([sys.executable, __file__, *arguments, "--serial"], text=True, bufsize=1,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                        env={**os.environ, "MSFP_GEN_CFLAGS": flags})  # fmt: skip
+
+    def seconds(self) -> float:
+        """CPU seconds of one round."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write("go\n")
+        return float(self.process.stdout.readline())
+
+
+def answer(scenes: Sequence[Scene], model: Model) -> None:
+    """The other end of `Scalar`: a round for every line."""
+    for _ in sys.stdin:
+        print(serial(scenes, model), flush=True)
+
+
 def main() -> None:
     """Print a row for every study."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lanes", type=int, help="runs side by side; not given: what this processor has")
     parser.add_argument("--scenes", type=int, default=64, help="scenes of each study")
+    parser.add_argument("--alike", action="store_true", help="the same scene every time")
+    parser.add_argument("--study", choices=STUDIES, help="this one only")
+    parser.add_argument("--serial", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
+    if given.serial:
+        scenes = scenes_of(given.study, given.scenes, given.alike)
+        return answer(scenes, build_model(scenes[0].bearing.layout, scenes[0].modelled))
     width = chosen_width(given.lanes)
     if not width:
         raise InputError("no lanes here: a batch would run one scene at a time")
-    print(f"{given.scenes} scenes each, {width} lanes, one core\n")
-    print("| study | one at a time [ms a scene] | in lanes [ms a scene] | forces apart, median | most | ratio |")
-    print("|---|---|---|---|---|---|")
-    for name in STUDIES:
-        scenes = scenes_of(name, given.scenes)
+    print(f"{given.scenes} scenes each, {width} lanes, one core; milliseconds a scene\n")
+    print("| study | one lane | simulate | batch | forces apart, median | most | batch over simulate | over one lane |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name in [given.study] if given.study else STUDIES:
+        scenes = scenes_of(name, given.scenes, given.alike)
         layout, effects = scenes[0].bearing.layout, scenes[0].modelled
         one, many = build_model(layout, effects), build_model(layout, effects, lanes=width)
-        best = [np.inf, np.inf]
-        for _ in range(ROUNDS):
-            for i, (run, model) in enumerate(((serial, one), (together, many))):
-                best[i] = min(best[i], run(scenes, model) / len(scenes))
+        scalar = Scalar("--study", name, "--scenes", str(given.scenes), *(["--alike"] if given.alike else []))
+        rounds = [(scalar.seconds(), serial(scenes, one), together(scenes, many)) for _ in range(ROUNDS)]
+        lane, alone, batch = (1e3 * min(times) / len(scenes) for times in zip(*rounds, strict=True))
         off = apart(scenes, width)
-        print(f"| {name} | {best[0] * 1e3:.2f} | {best[1] * 1e3:.2f} | {np.median(off):.0e} | {max(off):.0e} "
-              f"| {best[0] / best[1]:.2f} |", flush=True)  # fmt: skip
+        print(f"| {name} | {lane:.2f} | {alone:.2f} | {batch:.2f} | {np.median(off):.0e} | {max(off):.0e} "
+              f"| {alone / batch:.2f} | {lane / batch:.2f} |", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":
