@@ -153,9 +153,10 @@ def against_the_recursion(ours: float) -> None:
 def against_depth() -> None:
     """Newton iteration and build of ten surfaces over four."""
     small, large = (deep(Layout(*counts)) for counts in ((5, 2, 2), (11, 5, 5)))
-    few, many = (timed(scene, state_of(scene))[2] for scene in (small, large))
+    states = [(scene, state_of(scene)) for scene in (small, large)]
+    few, many = np.min([[timed(*each)[2] for each in states] for _ in range(5)], axis=0)  # in turn
     print(f"Newton iteration: (5,2,2) {few:.0f} ns, (11,5,5) {many:.0f} ns; ratio: {many / few:.2f}", flush=True)
-    few, many = (min(build_seconds(scene.bearing.layout) for _ in range(3)) for scene in (small, large))
+    few, many = np.min([[build_seconds(scene.bearing.layout) for scene in (small, large)] for _ in range(3)], axis=0)
     print(f"derive, emit, compile: (5,2,2) {few:.2f} s, (11,5,5) {many:.2f} s of CPU; ratio: {many / few:.2f}", flush=True)
 
 

@@ -68,7 +68,7 @@ def against_the_report() -> None:
     check = difference(run.history.top_force[:, along], reference[:, along])[1]
     ours, seconds = cpu(scene, "implicit", rtol), run.counters.wall_time
     print(f"fenz-test2, largest force error < 1e-3 of the peak: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e}), "
-          f"dopri5 {theirs:g} {seconds:.1f} s ({their_error:.1e}); both references apart by {check:.1e}; "
+          f"dopri5 {theirs:g} {seconds:.1f} s, {run.counters.steps} steps ({their_error:.1e}); both references apart by {check:.1e}; "
           f"times faster: {seconds / ours:.0f}", flush=True)  # fmt: skip
 
 
