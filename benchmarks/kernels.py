@@ -64,12 +64,18 @@ def state_of(scene: Scene) -> State:
                  history.tilt_accelerations[i], history.friction_state[i])  # fmt: skip
 
 
-def timed(scene: Scene, state: State) -> list[float]:
-    """Value, tangent, Newton iteration, accelerations [ns]."""
+def prepared(scene: Scene, state: State) -> tuple[str, Path]:
+    """What `kernels.c` reads, and the folder of the built model."""
     model = build_model(scene.bearing.layout, scene.effects)
     text = " ".join(repr(float(x)) for value in (BETA, scene.bearing.gravity, *state) for x in np.ravel(value))
+    return text, model.info.folder
+
+
+def timed(scene: Scene, state: State) -> list[float]:
+    """Value, tangent, Newton iteration, accelerations [ns]."""
+    text, sources = prepared(scene, state)
     with tempfile.TemporaryDirectory() as folder:
-        program = compiled(HERE / "c" / "kernels.c", Path(folder) / "kernels", model.info.folder)
+        program = compiled(HERE / "c" / "kernels.c", Path(folder) / "kernels", sources)
         done = subprocess.run([program], input=text, text=True, capture_output=True, check=True)
     return [float(word) for word in done.stdout.split()]
 

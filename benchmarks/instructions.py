@@ -1,0 +1,74 @@
+"""Instructions that kernels and runs take: `python benchmarks/instructions.py`, some minutes, with valgrind installed.
+
+Counted by callgrind, so that they are the same on a busy machine. It knows no AVX-512: these are the AVX2 versions. Of a
+run, what is inside the loop in C (`msfp_run_advance`); of a kernel, one call. Rows of docs/performance.md.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import kernels
+
+from msfp_gen import Layout, Scene, load_scene
+
+CALLS = 200
+RUN = """
+from dataclasses import replace
+from msfp_gen import Effects, load_scene, simulate
+scene = load_scene({name!r})
+simulate(replace(scene, effects=Effects(**{effects!r}), solver=replace(scene.solver, rtol={rtol}), output_step=None))
+"""
+RUNS = {
+    "`fenz-test2`, 1e-4": ("fenz-test2", {}, 1e-4),
+    "the same, planar and massless, no rims": ("fenz-test2", {"dimension": "planar", "sliders": "massless", "rims": False}, 1e-4),
+    "`ridgecrest-clc`, 3e-3": ("ridgecrest-clc", {}, 3e-3),
+}  # fmt: skip
+KERNELS = ("one value of the residual", "one residual with its tangent", "one Newton iteration", "accelerations")
+
+
+def instructions(command: list[str], within: str, given: str = "") -> int:
+    """Instructions of a command inside one function and what it calls."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        watch = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", f"--toggle-collect={within}"]
+        subprocess.run([*watch, *command], input=given, text=True, check=True, capture_output=True)
+        found = re.search(r"^summary: (\d+)", out.read_text(), re.MULTILINE)
+    if found is None:
+        raise SystemExit(f"callgrind counted nothing inside {within}")
+    return int(found[1])
+
+
+def of_kernels(scene: Scene) -> list[float]:
+    """Instructions of one call of each kernel at a state of the scene."""
+    text, folder = kernels.prepared(scene, kernels.state_of(scene))
+    with tempfile.TemporaryDirectory() as target:
+        program = str(kernels.compiled(kernels.HERE / "c" / "kernels.c", Path(target) / "kernels", folder))
+        return [instructions([program, str(CALLS), str(i)], "repeated", text) / CALLS for i in range(len(KERNELS))]
+
+
+def main() -> None:
+    """Print a row for every run and kernel."""
+    if not shutil.which("valgrind"):
+        raise SystemExit("valgrind is not installed: nothing to count with")
+    print("| what | instructions |\n|---|---|")
+    for text, (name, effects, rtol) in RUNS.items():
+        program = RUN.format(name=name, effects=effects, rtol=rtol)
+        subprocess.run([sys.executable, "-c", program], check=True, env=os.environ)  # builds the model
+        count = instructions([sys.executable, "-c", program], "msfp_run_advance")
+        print(f"| {text} | {count / 1e6:.1f} million |", flush=True)
+    tfp = replace(load_scene("fenz-test2"), effects=kernels.FULL)
+    few, many = of_kernels(tfp), of_kernels(kernels.deep(Layout(11, 5, 5)))
+    for text, count, more in zip(KERNELS, few, many, strict=True):
+        print(f"| {text}, TFP; (11,5,5) | {count / 1e3:.1f} thousand; {more / 1e3:.1f} ({more / count:.1f} times) |")
+
+
+if __name__ == "__main__":
+    main()
