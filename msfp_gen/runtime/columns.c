@@ -133,14 +133,13 @@ MSFP_INLINE void descend(const msfp_parameters *p, const msfp_work *w, int k, co
 /* Rows of body k. They are linear in forces and moments, so that any will do for their columns. */
 MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, const double *own, const columns *c, double *tangent)
 {
-    double turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    double turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], *rows = tangent + (k - 1) * ND * DOF;
     msfp_felt(w->body[k], still, turning);
     msfp_turning_balance_tangent(p->body[k], w->body[k], turning, w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out,
-                                 c->turning, c->below, c->moment_below, c->above, c->moment_above, dout);
-    memcpy(tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
+                                 c->turning, c->below, c->moment_below, c->above, c->moment_above, rows);
     for (int i = 0; i < ND; ++i)
         for (int r = 0; r < NA; ++r)
-            tangent[((k - 1) * ND + r) * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
+            rows[r * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
 }
 
 MSFP_WIDE void msfp_columns(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w, const msfp_slopes *slopes,

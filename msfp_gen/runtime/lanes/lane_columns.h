@@ -15,9 +15,9 @@ enum {
 };
 static const lane still[SCREW];
 
+/* Force and moment of the surface above a body and of the one below take turns. */
 typedef struct {
-    lane screw[SCREW * DOF], above[VECTOR * DOF], moment_above[MOMENT * DOF], below[VECTOR * DOF], moment_below[MOMENT * DOF];
-    lane turning[MSFP_TURNING_SIZE * DOF];
+    lane screw[SCREW * DOF], wrenches[2][(VECTOR + MOMENT) * DOF], *above, *below, turning[MSFP_TURNING_SIZE * DOF];
 } lane_columns;
 
 LANE_INLINE void lane_add_own(lane *column, int k, const lane *own, int field, int count)
@@ -42,7 +42,7 @@ LANE_INLINE void lane_top_columns(lane_work *w, const lane *own, lane_columns *c
 {
     static const lane zero[6 * DOF];
     lane body[MSFP_BODY_SIZE], dbody[MSFP_BODY_SIZE * DOF], dx[MSFP_COORDINATES_SIZE * DOF];
-    lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF], seen[MSFP_TOP_WRENCH_SIZE * DOF];
+    lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     lane_carried_tangent(DOF, w->out.body[NB], still, body, c->screw, dbody);
     memset(dx, 0, sizeof dx);
 #if MSFP_SPIN_LOCKED
@@ -58,9 +58,7 @@ LANE_INLINE void lane_top_columns(lane_work *w, const lane *own, lane_columns *c
     lane_held(w, upright);
 #endif
     lane_top_wrench_tangent(DOF, w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench, dbody, dx, zero, zero, dwrench);
-    lane_seen_wrench_tangent(DOF, w->out.body[NB], still, w->out.force[NB], w->out.moment[NB], wrench, c->screw, dwrench, dwrench + VECTOR * DOF, seen);
-    memcpy(c->above, seen, sizeof c->above);
-    memcpy(c->moment_above, seen + VECTOR * DOF, sizeof c->moment_above);
+    lane_seen_wrench_tangent(DOF, w->out.body[NB], still, w->out.force[NB], w->out.moment[NB], wrench, c->screw, dwrench, dwrench + VECTOR * DOF, c->above);
 }
 
 LANE_INLINE void lane_contact_row(const lane_work *w, const lane *slope, const lane *local, int j, const lane *inputs, lane *row)
@@ -98,17 +96,19 @@ LANE_INLINE void lane_surface_columns(lane_work *w, int j, const lane *own, lane
     lane_condense(w, j, condensed);
     lane_force_to_local_tangent(DOF, w->out.body[j], w->out.force[j], unused, c->below, local);
     for (int r = 0; r <= MOMENT; ++r)
-        lane_contact_row(w, condensed + r * INPUTS, local, j, inputs, r < MOMENT ? c->moment_below + r * DOF : w->dnormal[j]);
+        lane_contact_row(w, condensed + r * INPUTS, local, j, inputs, r < MOMENT ? c->below + (VECTOR + r) * DOF : w->dnormal[j]);
     for (int i = 0; i < 2 * PAIR && w->any_rim[j]; ++i)
         for (int r = 0; r < MOMENT; ++r)
-            c->moment_below[r * DOF + j * ND + i % PAIR] += factors[i / PAIR] * rim[(VECTOR + r) * MSFP_RIM_LOCAL + i];
+            c->below[(VECTOR + r) * DOF + j * ND + i % PAIR] += factors[i / PAIR] * rim[(VECTOR + r) * MSFP_RIM_LOCAL + i];
 }
 
 /* From the surface above body k to the one below. */
 LANE_INLINE void lane_descend(const lane_work *w, int k, const lane *own, lane_columns *c)
 {
     lane turning[MSFP_TURNING_SIZE], force[VECTOR];
-    memcpy(c->below, c->above, sizeof c->below);
+    for (int f = 0; f < VECTOR; ++f)
+        for (int i = k * ND; i < DOF; ++i)
+            c->below[f * DOF + i] = c->above[f * DOF + i];
     lane_carried_force_tangent(k * ND, w->in.parts.body[k], w->out.body[k], still, w->out.force[k], force, c->screw, c->above, c->below);
     for (int f = 0; f < MSFP_TURNING_SIZE && k < NB; ++f)
         for (int i = 0; i < ND; ++i)
@@ -123,14 +123,13 @@ LANE_INLINE void lane_descend(const lane_work *w, int k, const lane *own, lane_c
 
 LANE_INLINE void lane_balance_columns(lane_work *w, int k, const lane *own, const lane_columns *c)
 {
-    lane turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    lane turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], *rows = w->tangent + (k - 1) * ND * DOF;
     lane_felt(w->out.body[k], still, turning);
     lane_turning_balance_tangent(DOF, w->in.parts.body[k], w->out.body[k], turning, w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k],
-                                 w->out.moment[k], out, c->turning, c->below, c->moment_below, c->above, c->moment_above, dout);
-    memcpy(w->tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
+                                 w->out.moment[k], out, c->turning, c->below, c->below + VECTOR * DOF, c->above, c->above + VECTOR * DOF, rows);
     for (int i = 0; i < ND; ++i)
         for (int r = 0; r < NA; ++r)
-            w->tangent[((k - 1) * ND + r) * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
+            rows[r * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
 }
 
 LANE_INLINE void lane_tangent(lane_work *w)
@@ -143,14 +142,17 @@ LANE_INLINE void lane_tangent(lane_work *w)
         lane_surface_moment(w, k - 1, moment);
         lane_own(seed, w->out.body[k - 1], w->out.body[k], w->out.x[k], w->out.x[k - 1], w->out.force[k - 1], moment, own[k]);
     }
+    c.above = c.wrenches[0];
+    c.below = c.wrenches[1];
     lane_top_columns(w, own[NB], &c);
     for (int k = NB; k >= 1; --k) {
         lane_descend(w, k, own[k], &c);
         lane_surface_columns(w, k - 1, own[k], &c);
         lane_balance_columns(w, k, own[k], &c);
-        memcpy(c.above, c.below, sizeof c.above);
-        lane_add_own(c.above, k, own[k], OWN_F, VECTOR);
-        memcpy(c.moment_above, c.moment_below, sizeof c.moment_above);
+        lane_add_own(c.below, k, own[k], OWN_F, VECTOR); /* in axes that turn with the body below */
+        lane *const next = c.above;
+        c.above = c.below;
+        c.below = next;
     }
 }
 

@@ -97,7 +97,7 @@ static void descend(lane_work *w, msfp_request *const *r, int count)
     unsigned back, done = 0, ever = 0;
     for (;;) {
         unsigned on = going_on(w, r, count, done, &back);
-        if (!back && 2 * __builtin_popcount(on) < count)
+        if (!back && 4 * __builtin_popcount(on) < count)
             break;
         if (!ever)
             gather_newton(w, r);
