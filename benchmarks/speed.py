@@ -6,6 +6,7 @@ Builds go to a cache of their own that is thrown away; every run is repeated and
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -68,7 +69,8 @@ def main() -> None:
         count = best.counters
         speed = best.history.time[-1] / count.wall_time
         print(f"| {name} | {count.wall_time:.4f} | {speed:.0f} | {count.steps} | {count.newton_iterations} |")
-    for script in ("kernels.py", "runs.py"):
+    scripts = ["kernels.py", "runs.py", "batch.py"] + ["instructions.py"] * bool(shutil.which("valgrind"))
+    for script in scripts:
         print(flush=True)
         subprocess.run([sys.executable, str(Path(__file__).with_name(script))], check=True)
 

@@ -280,3 +280,15 @@ def test_planar_equals_spatial(layout, plane):
     assert np.abs(flat.normal_force - full.normal_force).max() < 1e-10 * full.normal_force.max()
     assert np.abs(flat.contact_angles - full.contact_angles).max() < 1e-12
     assert np.abs(flat.friction_rate - full.friction_rate).max() < 1e-9 * np.abs(full.friction_rate).max()
+
+
+def test_a_column_costs_a_body_a_third_of_what_its_fields_would():
+    """Operations of one column at one body: of rigid bodies on each other, and field by field."""
+    from msfp_gen.generator.derive import derive
+    from msfp_gen.generator.lower import lower
+    from msfp_gen.layout import Effects, Layout, ModelSpec
+
+    kernels = {p.name: lower(p).tangent_operations for p in derive(ModelSpec(Layout.tfp(), Effects())).programs}
+    fields = ("forward", "surface_local", "moment_to_world", "interface_force", "angular_balance")
+    screws = ("felt", "carried_force", "force_to_local", "turning_balance")
+    assert 3 * sum(kernels[name] for name in screws) < sum(kernels[name] for name in fields)
