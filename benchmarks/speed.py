@@ -1,4 +1,4 @@
-"""What a build and a run cost here, then against others: `python benchmarks/speed.py` (docs/performance.md).
+"""What a build and a run cost here, then against others, in batches and in instructions (docs/performance.md).
 
 Builds go to a cache of their own that is thrown away; every run is repeated and its fastest wall time counts.
 """

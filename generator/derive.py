@@ -18,7 +18,7 @@ class Equations:
     spec: ModelSpec
     blocks: Blocks
     programs: tuple[Program, ...]
-    columns: columns.Columns | None = None
+    column_blocks: columns.Columns | None = None
     """Blocks of the tangent's columns, where they are those of rigid bodies on each other."""
 
     @property
@@ -72,6 +72,6 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.uplift:
         programs += [seat.seat_inside(blocks), seat.seat_edge(blocks)]
         return Equations(spec, blocks, tuple(programs))
-    carried = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
-    programs += columns.programs(blocks, carried, massless, unknowns(spec))
-    return Equations(spec, blocks, tuple(programs), carried)
+    column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
+    programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))
+    return Equations(spec, blocks, tuple(programs), column_blocks)

@@ -167,10 +167,11 @@ def lanes(surfaces: int) -> int:
     return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
 
 
-LANE_FUNCTIONS = ("forward", "upright", "top_wrench", "interface_force", "surface_local", "contact", "moment_to_world",
-                  "angular_balance", "screws", "carried", "felt", "carried_force", "seen_wrench", "force_to_local",
-                  "turning_balance", "own")  # fmt: skip
+LANE_VALUES = ("forward", "upright", "top_wrench", "interface_force", "surface_local", "contact", "moment_to_world",
+               "angular_balance", "screws", "own", "felt")  # fmt: skip
 """Programs of one evaluation of the condensed equations, which a batch runs for several bearings at once."""
+LANE_TANGENTS = ("top_wrench", "carried", "felt", "carried_force", "seen_wrench", "force_to_local", "turning_balance")
+"""Those of which it takes columns."""
 
 
 def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: bool = False) -> dict[str, str]:
@@ -187,7 +188,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         autoescape=False,
     )
     spec = equations.spec
-    rooms = (equations.blocks, equations.columns) if equations.columns else (equations.blocks,)
+    rooms = [room for room in (equations.blocks, equations.column_blocks) if room is not None]
     blocks = [b for room in rooms for f in fields(room) if (b := getattr(room, f.name)) is not None]
     law = spec.effects.law
     context = {
@@ -212,7 +213,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         "heat": HEAT_KERNEL if law is not None and law.heats else (),
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
         "batch": batch,
-        "lane_functions": LANE_FUNCTIONS,
+        "lane_values": LANE_VALUES,
+        "lane_tangents": LANE_TANGENTS,
     }
     names = {
         "msfp_model.h": "msfp_model.h.jinja",

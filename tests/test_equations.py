@@ -214,11 +214,12 @@ def test_combined_tangent_of_the_condensed_step(effects, beta):
     against_differences((5, 2, 2), effects, beta)
 
 
+STACKS = ({}, {"spin": "free"}, {"spin": "patch"}, {"dimension": "planar"}, {"sliders": "massless"})
 TOPS = (Top.rig(0.0, 1e6, 1e4, 1e7, 1e5), Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7))
 
 
 @pytest.mark.parametrize("top", TOPS, ids=str)
-@pytest.mark.parametrize("effects", [{}, {"spin": "free"}, {"dimension": "planar"}, {"sliders": "massless"}], ids=str)
+@pytest.mark.parametrize("effects", STACKS, ids=str)
 @pytest.mark.parametrize("layout", [(2, 1, 0), (4, 2, 1), (5, 1, 3), (11, 5, 5)])
 def test_tangent_in_any_stack_below_any_top(layout, effects, top):
     """On a base that moves and turns, with every rim met."""

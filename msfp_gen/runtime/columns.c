@@ -7,17 +7,8 @@
 #include "stack.h"
 
 #if !MSFP_UPLIFT
-enum {
-    SCREW = MSFP_SCREW_SIZE,
-    OWN = MSFP_OWN_SIZE,
-    INPUTS = MSFP_LOCAL_SIZE,
-    SLIP = INPUTS - VECTOR, /* inputs of a contact beside the force: the first fields of what is a body's own */
-    OWN_P = SLIP,
-    OWN_F = OWN_P + VECTOR,
-    OWN_M = OWN_F + VECTOR,
-    OWN_WP = OWN_M + MOMENT
-};
-static const double still[SCREW]; /* columns are taken where nothing turns */
+enum { INPUTS = MSFP_LOCAL_SIZE };
+static const double at_rest[SCREW]; /* where columns are taken: no screw yet */
 
 /* All columns at one body, [field][column], and at the surfaces next to it. */
 typedef struct {
@@ -32,7 +23,7 @@ MSFP_INLINE void add_own(double *column, int k, const double *own, int field, in
 {
     for (int i = 0; i < ND; ++i)
         for (int f = 0; f < count; ++f)
-            column[f * DOF + (k - 1) * ND + i] += own[i * OWN + field + f];
+            column[f * DOF + (k - 1) * ND + i] += own[i * MINE + field + f];
 }
 
 MSFP_INLINE void screws(const msfp_work *w, const double *seed, double *screw)
@@ -50,18 +41,18 @@ MSFP_INLINE void screws(const msfp_work *w, const double *seed, double *screw)
 MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w, const double *own, columns *c)
 {
     double body[MSFP_BODY_SIZE], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
-    msfp_carried_tangent(w->body[NB], still, body, c->screw, w->dbody[NB]);
+    msfp_carried_tangent(w->body[NB], at_rest, body, c->screw, w->dbody[NB]);
     memset(w->dx[NB], 0, sizeof w->dx[NB]);
 #if MSFP_SPIN_LOCKED
     (void)seed;
     (void)own;
 #else
-    add_own(w->dbody[NB] + MSFP_BODY_WPX * DOF, NB, own, OWN_WP, MOMENT);
-    add_own(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, own, OWN_WP + MOMENT, MOMENT);
+    add_own(w->dbody[NB] + MSFP_BODY_WPX * DOF, NB, own, MINE_WP, MOMENT);
+    add_own(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, own, MINE_WP + MOMENT, MOMENT);
     w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->cq;
 #endif
     msfp_top_columns(p, at, w, NULL);
-    msfp_seen_wrench_tangent(w->body[NB], still, w->force[NB], w->moment[NB], wrench, c->screw, w->dforce[NB], w->dmoment[NB], dwrench);
+    msfp_seen_wrench_tangent(w->body[NB], at_rest, w->force[NB], w->moment[NB], wrench, c->screw, w->dforce[NB], w->dmoment[NB], dwrench);
     memcpy(c->above, dwrench, sizeof c->above);
     memcpy(c->moment_above, dwrench + VECTOR * DOF, sizeof c->moment_above);
 }
@@ -72,7 +63,7 @@ MSFP_INLINE void own_inputs(const msfp_work *w, const msfp_seed *seed, const dou
     const double factors[2] = { seed->cq, seed->cv };
     for (int k = 0; k < INPUTS; ++k)
         for (int i = 0; i < ND; ++i)
-            inputs[k * ND + i] = own[i * OWN + (k < VECTOR ? OWN_P + k : k - VECTOR)];
+            inputs[k * ND + i] = own[i * MINE + (k < VECTOR ? MINE_P + k : k - VECTOR)];
     for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
         for (int f = 0; f < VECTOR; ++f)
             inputs[f * ND + i % PAIR] -= factors[i / PAIR] * rim[f * MSFP_RIM_LOCAL + i];
@@ -119,12 +110,12 @@ MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, const msfp_slopes 
 MSFP_INLINE void descend(const msfp_parameters *p, const msfp_work *w, int k, const double *own, columns *c)
 {
     double turning[MSFP_TURNING_SIZE], force[VECTOR];
-    msfp_carried_force_tangent(p->body[k], w->body[k], still, w->force[k], force, c->screw, c->above, c->below);
-    msfp_felt_tangent(w->body[k], still, turning, c->screw, c->turning);
+    msfp_carried_force_tangent(p->body[k], w->body[k], at_rest, w->force[k], force, c->screw, c->above, c->below);
+    msfp_felt_tangent(w->body[k], at_rest, turning, c->screw, c->turning);
 #if MSFP_SPIN_LOCKED
     (void)own;
 #else
-    add_own(c->turning, k, own, OWN_WP, MSFP_TURNING_SIZE);
+    add_own(c->turning, k, own, MINE_WP, MSFP_TURNING_SIZE);
 #endif
     for (int f = 0; f < SCREW; ++f)
         memset(c->screw + f * DOF + (k - 1) * ND, 0, ND * sizeof *c->screw);
@@ -134,19 +125,19 @@ MSFP_INLINE void descend(const msfp_parameters *p, const msfp_work *w, int k, co
 MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, const double *own, const columns *c, double *tangent)
 {
     double turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], *rows = tangent + (k - 1) * ND * DOF;
-    msfp_felt(w->body[k], still, turning);
+    msfp_felt(w->body[k], at_rest, turning);
     msfp_turning_balance_tangent(p->body[k], w->body[k], turning, w->force[k - 1], w->moment[k - 1], w->force[k], w->moment[k], out,
                                  c->turning, c->below, c->moment_below, c->above, c->moment_above, rows);
     for (int i = 0; i < ND; ++i)
         for (int r = 0; r < NA; ++r)
-            rows[r * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
+            rows[r * DOF + (k - 1) * ND + i] -= own[i * MINE + MINE_M + r];
 }
 
 MSFP_WIDE void msfp_columns(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w, const msfp_slopes *slopes,
                             double *tangent)
 {
     const double factors[MSFP_SEED_SIZE] = { seed->cq, seed->cv, seed->ca };
-    double own[NB + 1][ND * OWN], moment[MOMENT];
+    double own[NB + 1][ND * MINE], moment[MOMENT];
     columns c;
     screws(w, factors, c.screw);
     for (int k = 1; k <= NB; ++k) {
@@ -158,7 +149,7 @@ MSFP_WIDE void msfp_columns(const msfp_parameters *p, const msfp_point *at, cons
         double next[VECTOR * DOF]; /* in axes that turn with the body below */
         descend(p, w, k, own[k], &c);
         memcpy(next, c.below, sizeof next);
-        add_own(next, k, own[k], OWN_F, VECTOR);
+        add_own(next, k, own[k], MINE_F, VECTOR);
         surface(w, seed, slopes, k - 1, own[k], &c);
         balance(p, w, k, own[k], &c, tangent);
         memcpy(c.above, next, sizeof c.above);

@@ -54,7 +54,7 @@ MSFP_INLINE int factors(double *matrix, int n, int *pivots)
     return sign;
 }
 
-/* Column by column: a row does not wait for its own sum. */
+/* L column by column: a row does not wait for its own sum. */
 MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double *rhs)
 {
     for (int k = 0; k < n; ++k) {
@@ -65,10 +65,10 @@ MSFP_INLINE void solution(const double *matrix, int n, const int *pivots, double
     for (int j = 0; j < n; ++j)
         for (int i = j + 1; i < n; ++i)
             rhs[i] -= matrix[i * n + j] * rhs[j];
-    for (int j = n - 1; j >= 0; --j) {
-        rhs[j] *= matrix[j * n + j];
-        for (int i = 0; i < j; ++i)
+    for (int i = n - 1; i >= 0; --i) {
+        for (int j = i + 1; j < n; ++j)
             rhs[i] -= matrix[i * n + j] * rhs[j];
+        rhs[i] *= matrix[i * n + i];
     }
 }
 

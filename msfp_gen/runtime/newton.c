@@ -263,7 +263,7 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     if (!fresh)
         size = msfp_stage_residual(run, s, &run->work, residual);
     const int taken = s->taken;
-    if (taken && size > goal && size >= 0.1 * s->before) { /* a step that leads to no value has been taken back too */
+    if (taken && size > goal && size >= 0.1 * s->before) { /* size may be infinite: taken back, and no value there either */
         ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
         fresh = 1;
     }

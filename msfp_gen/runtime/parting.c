@@ -18,6 +18,8 @@ static void seed_columns(msfp_work *w, const msfp_seed *seed)
         }
 }
 
+/* Programs that are linear in a force take any value of it for their columns. */
+
 /* Forces that the seats carry; rows of surface j, below its moments, from what the motion asks for. */
 static void forces(const msfp_parameters *p, msfp_work *w, double *tangent)
 {

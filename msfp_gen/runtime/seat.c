@@ -21,12 +21,9 @@ static void compression(const msfp_work *w, int j, double *along, double *across
     *across = sqrt(square);
 }
 
-/* Whether the compression points into the footprint. */
-static int inside(const msfp_parameters *p, const msfp_work *w, int j)
+/* Whether a compression points into the footprint. */
+static int inside(const double *par, double along, double across)
 {
-    double along, across;
-    const double *par = p->surface[j];
-    compression(w, j, &along, &across);
     return across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA];
 }
 
@@ -35,7 +32,7 @@ double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
     double along, across;
     const double *par = p->surface[j];
     compression(w, j, &along, &across);
-    if (inside(p, w, j))
+    if (inside(par, along, across))
         return sqrt(along * along + across * across);
     return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
 }
@@ -43,10 +40,11 @@ double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
 /* Force of the seat of surface j, into force[j]; zero where it is open or its damping would pull. */
 void msfp_seat(const msfp_parameters *p, msfp_work *w, int j)
 {
-    double *seat = w->seat[j];
+    double along, across, *seat = w->seat[j];
+    compression(w, j, &along, &across);
     seat[MSFP_SEAT_GRIP] = seat[MSFP_SEAT_STORED] = seat[MSFP_SEAT_POWER] = 0.0;
     if (msfp_compression(p, w, j) > 0.0) {
-        if (inside(p, w, j))
+        if (inside(p->surface[j], along, across))
             msfp_seat_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], seat);
         else
             msfp_seat_edge(p->surface[j], w->body[slider_of(j)], w->x[j + 1], seat);
@@ -60,10 +58,11 @@ void msfp_seat(const msfp_parameters *p, msfp_work *w, int j)
 void msfp_seat_columns(const msfp_parameters *p, msfp_work *w, int j)
 {
     const int k = slider_of(j);
-    double seat[MSFP_SEAT_SIZE], *dseat = w->dseat[j];
+    double along, across, seat[MSFP_SEAT_SIZE], *dseat = w->dseat[j];
+    compression(w, j, &along, &across);
     if (w->seat[j][MSFP_SEAT_GRIP] <= 0.0)
         memset(dseat, 0, sizeof w->dseat[j]);
-    else if (inside(p, w, j))
+    else if (inside(p->surface[j], along, across))
         msfp_seat_inside_tangent(p->surface[j], w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);
     else
         msfp_seat_edge_tangent(p->surface[j], w->body[k], w->x[j + 1], seat, w->dbody[k], w->dx[j + 1], dseat);

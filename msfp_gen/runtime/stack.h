@@ -95,6 +95,18 @@ void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msf
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 void msfp_top_columns(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload /* [6][DOF] or NULL */);
 
+#if !MSFP_UPLIFT
+/* Fields of what a body's own unknowns change (columns.c): first the inputs of a contact beside its force. */
+enum {
+    SCREW = MSFP_SCREW_SIZE,
+    MINE = MSFP_OWN_SIZE,
+    MINE_P = MSFP_LOCAL_SIZE - VECTOR,
+    MINE_F = MINE_P + VECTOR,
+    MINE_M = MINE_F + VECTOR,
+    MINE_WP = MINE_M + MOMENT
+};
+#endif
+
 /* seat.c */
 void msfp_seat(const msfp_parameters *p, msfp_work *w, int j);
 void msfp_seat_columns(const msfp_parameters *p, msfp_work *w, int j);

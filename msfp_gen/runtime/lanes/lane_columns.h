@@ -4,16 +4,7 @@
 #define MSFP_LANE_COLUMNS_H
 #include "lane_surface.h"
 
-enum {
-    SCREW = MSFP_SCREW_SIZE,
-    OWN = MSFP_OWN_SIZE,
-    SLIP = INPUTS - VECTOR,
-    OWN_P = SLIP,
-    OWN_F = OWN_P + VECTOR,
-    OWN_M = OWN_F + VECTOR,
-    OWN_WP = OWN_M + MOMENT
-};
-static const lane still[SCREW];
+static const lane at_rest[SCREW];
 
 /* Force and moment of the surface above a body and of the one below take turns. */
 typedef struct {
@@ -24,7 +15,7 @@ LANE_INLINE void lane_add_own(lane *column, int k, const lane *own, int field, i
 {
     for (int f = 0; f < count; ++f)
         for (int i = 0; i < ND; ++i)
-            column[f * DOF + (k - 1) * ND + i] += own[i * OWN + field + f];
+            column[f * DOF + (k - 1) * ND + i] += own[i * MINE + field + f];
 }
 
 LANE_INLINE void lane_spread_screws(const lane_work *w, const lane *seed, lane *screw)
@@ -43,13 +34,13 @@ LANE_INLINE void lane_top_columns(lane_work *w, const lane *own, lane_columns *c
     static const lane zero[6 * DOF];
     lane body[MSFP_BODY_SIZE], dbody[MSFP_BODY_SIZE * DOF], dx[MSFP_COORDINATES_SIZE * DOF];
     lane force[VECTOR], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
-    lane_carried_tangent(DOF, w->out.body[NB], still, body, c->screw, dbody);
+    lane_carried_tangent(DOF, w->out.body[NB], at_rest, body, c->screw, dbody);
     memset(dx, 0, sizeof dx);
 #if MSFP_SPIN_LOCKED
     (void)own;
 #else
-    lane_add_own(dbody + MSFP_BODY_WPX * DOF, NB, own, OWN_WP, MOMENT);
-    lane_add_own(dbody + MSFP_BODY_ALPX * DOF, NB, own, OWN_WP + MOMENT, MOMENT);
+    lane_add_own(dbody + MSFP_BODY_WPX * DOF, NB, own, MINE_WP, MOMENT);
+    lane_add_own(dbody + MSFP_BODY_ALPX * DOF, NB, own, MINE_WP + MOMENT, MOMENT);
     dx[MSFP_COORDINATES_PHI * DOF + DOF - 1] = w->in.seed.cq;
 #endif
     lane_outside(w, force, moment);
@@ -58,7 +49,7 @@ LANE_INLINE void lane_top_columns(lane_work *w, const lane *own, lane_columns *c
     lane_held(w, upright);
 #endif
     lane_top_wrench_tangent(DOF, w->in.top, w->out.body[NB], w->out.x[NB], force, moment TURNED(upright), wrench, dbody, dx, zero, zero, dwrench);
-    lane_seen_wrench_tangent(DOF, w->out.body[NB], still, w->out.force[NB], w->out.moment[NB], wrench, c->screw, dwrench, dwrench + VECTOR * DOF, c->above);
+    lane_seen_wrench_tangent(DOF, w->out.body[NB], at_rest, w->out.force[NB], w->out.moment[NB], wrench, c->screw, dwrench, dwrench + VECTOR * DOF, c->above);
 }
 
 LANE_INLINE void lane_contact_row(const lane_work *w, const lane *slope, const lane *local, int j, const lane *inputs, lane *row)
@@ -89,7 +80,7 @@ LANE_INLINE void lane_surface_columns(lane_work *w, int j, const lane *own, lane
     const lane factors[2] = { w->in.seed.cq, w->in.seed.cv }, *rim = w->rim_slope[j];
     for (int k = 0; k < INPUTS; ++k)
         for (int i = 0; i < ND; ++i)
-            inputs[k * ND + i] = own[i * OWN + (k < VECTOR ? OWN_P + k : k - VECTOR)];
+            inputs[k * ND + i] = own[i * MINE + (k < VECTOR ? MINE_P + k : k - VECTOR)];
     for (int i = 0; i < 2 * PAIR && w->any_rim[j]; ++i)
         for (int f = 0; f < VECTOR; ++f)
             inputs[f * ND + i % PAIR] -= factors[i / PAIR] * rim[f * MSFP_RIM_LOCAL + i];
@@ -103,39 +94,39 @@ LANE_INLINE void lane_surface_columns(lane_work *w, int j, const lane *own, lane
 }
 
 /* From the surface above body k to the one below. */
-LANE_INLINE void lane_descend(const lane_work *w, int k, const lane *own, lane_columns *c)
+LANE_INLINE void lane_carry_down(const lane_work *w, int k, const lane *own, lane_columns *c)
 {
     lane turning[MSFP_TURNING_SIZE], force[VECTOR];
     for (int f = 0; f < VECTOR; ++f)
         for (int i = k * ND; i < DOF; ++i)
             c->below[f * DOF + i] = c->above[f * DOF + i];
-    lane_carried_force_tangent(k * ND, w->in.parts.body[k], w->out.body[k], still, w->out.force[k], force, c->screw, c->above, c->below);
+    lane_carried_force_tangent(k * ND, w->in.parts.body[k], w->out.body[k], at_rest, w->out.force[k], force, c->screw, c->above, c->below);
     for (int f = 0; f < MSFP_TURNING_SIZE && k < NB; ++f)
         for (int i = 0; i < ND; ++i)
             c->turning[f * DOF + k * ND + i] = lane_of(0.0);
-    lane_felt_tangent(k * ND, w->out.body[k], still, turning, c->screw, c->turning);
+    lane_felt_tangent(k * ND, w->out.body[k], at_rest, turning, c->screw, c->turning);
 #if MSFP_SPIN_LOCKED
     (void)own;
 #else
-    lane_add_own(c->turning, k, own, OWN_WP, MSFP_TURNING_SIZE);
+    lane_add_own(c->turning, k, own, MINE_WP, MSFP_TURNING_SIZE);
 #endif
 }
 
 LANE_INLINE void lane_balance_columns(lane_work *w, int k, const lane *own, const lane_columns *c)
 {
     lane turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], *rows = w->tangent + (k - 1) * ND * DOF;
-    lane_felt(w->out.body[k], still, turning);
+    lane_felt(w->out.body[k], at_rest, turning);
     lane_turning_balance_tangent(DOF, w->in.parts.body[k], w->out.body[k], turning, w->out.force[k - 1], w->out.moment[k - 1], w->out.force[k],
                                  w->out.moment[k], out, c->turning, c->below, c->below + VECTOR * DOF, c->above, c->above + VECTOR * DOF, rows);
     for (int i = 0; i < ND; ++i)
         for (int r = 0; r < NA; ++r)
-            rows[r * DOF + (k - 1) * ND + i] -= own[i * OWN + OWN_M + r];
+            rows[r * DOF + (k - 1) * ND + i] -= own[i * MINE + MINE_M + r];
 }
 
 LANE_INLINE void lane_tangent(lane_work *w)
 {
     const lane seed[MSFP_SEED_SIZE] = { w->in.seed.cq, w->in.seed.cv, w->in.seed.ca };
-    lane own[NB + 1][ND * OWN], moment[MOMENT];
+    lane own[NB + 1][ND * MINE], moment[MOMENT];
     lane_columns c;
     lane_spread_screws(w, seed, c.screw);
     for (int k = 1; k <= NB; ++k) {
@@ -146,10 +137,10 @@ LANE_INLINE void lane_tangent(lane_work *w)
     c.below = c.wrenches[1];
     lane_top_columns(w, own[NB], &c);
     for (int k = NB; k >= 1; --k) {
-        lane_descend(w, k, own[k], &c);
+        lane_carry_down(w, k, own[k], &c);
         lane_surface_columns(w, k - 1, own[k], &c);
         lane_balance_columns(w, k, own[k], &c);
-        lane_add_own(c.below, k, own[k], OWN_F, VECTOR); /* in axes that turn with the body below */
+        lane_add_own(c.below, k, own[k], MINE_F, VECTOR); /* in axes that turn with the body below */
         lane *const next = c.above;
         c.above = c.below;
         c.below = next;

@@ -40,10 +40,10 @@ static void solve(const lane_work *w, lane *x)
     for (int j = 0; j < DOF; ++j)
         for (int i = j + 1; i < DOF; ++i)
             x[i] -= matrix[i * DOF + j] * x[j];
-    for (int j = DOF - 1; j >= 0; --j) {
-        x[j] *= matrix[j * DOF + j];
-        for (int i = 0; i < j; ++i)
+    for (int i = DOF - 1; i >= 0; --i) {
+        for (int j = i + 1; j < DOF; ++j)
             x[i] -= matrix[i * DOF + j] * x[j];
+        x[i] *= matrix[i * DOF + i];
     }
 }
 
@@ -91,7 +91,8 @@ static unsigned going_on(const lane_work *w, msfp_request *const *r, int count, 
     return on & ~*back;
 }
 
-/* Newton's method with old factors, in the runs that may, as long as it is worth a vector. */
+/* Newton's method with old factors, in the runs that may, as long as they are a quarter of the lanes: fewer had better wait for
+ * others. */
 static void descend(lane_work *w, msfp_request *const *r, int count)
 {
     unsigned back, done = 0, ever = 0;

@@ -1,4 +1,4 @@
-/* lane_work.h: what an evaluation of several runs at once works on. Private to lanes.c and lane_surface.h. */
+/* lane_work.h: what an evaluation of several runs at once works on. Private to lanes.c and what it includes. */
 #ifndef MSFP_LANE_WORK_H
 #define MSFP_LANE_WORK_H
 #include "stack.h"
