@@ -342,3 +342,15 @@ def test_bad_input_is_one_line(arguments: list[str], words: str, capsys: Any) ->
     assert main(["characterise", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("error: ") and err.count("\n") == 1 and words in err
+
+
+@pytest.mark.parametrize("later", [-1e-9, 0.0, 1e-9])
+def test_of_peaks_that_rounding_tells_apart_the_first_is_named(later: float) -> None:
+    from msfp_gen.characterise.report import _first_peak
+
+    radial = np.abs(np.sin(np.linspace(0.0, 4 * np.pi, 401)))
+    radial[150:] *= 1.0 + later
+    assert _first_peak(radial) == 50
+    radial[250] = 1.01
+    assert _first_peak(radial) == 250
+    assert _first_peak(np.linspace(0.0, 1.0, 11)) == 10

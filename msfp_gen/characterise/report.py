@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 ASIDE = 0.02  # way aside, over the largest displacement, that still counts as motion in one direction
+ALIKE = 1e-3  # difference of two peaks, over the larger, below which the first is the one that is named
 REST = 0.05  # last share of a run over which it is judged whether the bearing has come to rest
 STILL = 0.01  # movement in it, over the largest displacement, that counts as rest
 Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
@@ -112,8 +113,8 @@ def characterise(result: Result) -> Characterisation:
     peak = float(history.horizontal.max())
     if peak == 0.0:
         raise InputError("characterise: the bearing did not move in this run; give a motion, or a longer duration")
-    row = int(history.horizontal.argmax())
-    direction = history.displacement[row, :2] / peak
+    row = _first_peak(history.horizontal)
+    direction = history.displacement[row, :2] / history.horizontal[row]
     cycles, first = _one_direction(result, direction)
     kind = _kind(result, direction, cycles)
     uses = surface_use(result, slice(None))
@@ -133,13 +134,21 @@ def characterise(result: Result) -> Characterisation:
         surfaces=uses,
         peak_displacement=peak,
         peak_force=float(np.hypot(*history.top_force[:, :2].T).max()),
-        secant_stiffness=float(history.top_force[row, :2] @ direction) / peak,
+        secant_stiffness=float(history.top_force[row, :2] @ direction / history.horizontal[row]),
         energy_dissipated=float(_dissipated(history)[-1]),
         residual_displacement=float(history.horizontal[-1]),
         at_rest=at_rest,
         maximum_uplift=max(lifts, default=None),
         notes=tuple(_notes(result, kind, at_rest, uses)),
     )
+
+
+def _first_peak(radial: Array) -> int:
+    """Row of the largest displacement; of several that rounding tells apart the first."""
+    near = radial >= (1.0 - ALIKE) * radial.max()
+    first = int(near.argmax())
+    last = first + int((~near[first:]).argmax()) if not near[first:].all() else len(radial)
+    return first + int(radial[first:last].argmax())
 
 
 def _one_direction(result: Result, direction: Array) -> tuple[tuple[Cycle, ...], Branch | None]:
