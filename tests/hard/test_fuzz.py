@@ -125,7 +125,11 @@ def test_a_residual_is_measured_by_the_force_of_its_rim_too() -> None:
     """Before an interface parts a rim pushes a hundred times more than the normal force. Measured by the latter alone
     Newton was asked for what rounding does not leave, and the run ended as newton."""
     scene = fuzz_scenes.case(41, 1010).scene
-    error = failure_of(scene)
-    assert error.status == "uplift" and isinstance(error.result, Result)
-    last = error.result.history
-    assert (last.rim_force.max(axis=1) > 3 * last.normal_force.min(axis=1)).any()
+    ends = []
+    for share in np.linspace(1.0, 1.007, 8):  # the last digit decides what comes first of parting and a jam
+        error = failure_of(replace(scene, solver=replace(scene.solver, rtol=share * scene.solver.rtol)))
+        assert isinstance(error.result, Result)
+        last = error.result.history
+        ends.append(error.status)
+        assert (last.rim_force.max(axis=1) > 3 * last.normal_force.min(axis=1)).any()
+    assert ends.count("uplift") >= 6, ends

@@ -51,14 +51,17 @@ def test_a_kilohertz() -> None:
 
 
 def test_six_hundred_seconds_of_cycles_do_not_drift() -> None:
-    """Three hundred cycles: the last ten write the loops of the first to 0.1 %, each of them to 1 %."""
+    """Three hundred cycles: the last thirty write the loops of the first to 0.1 % on average, each of them to 1 %.
+
+    One loop differs from the next by how inner surfaces of like friction share the way, which hangs on the last digit.
+    """
     period, rows = 2.0, 100
     run = shaken(triple(), Motion.harmonic(0.1, 1 / period, cycles=299.75), period / rows)
     assert run.history.time[-1] == 600.0
     for values in (run.history.top_force[:, :1], run.history.sliding):
         loops = values[: 300 * rows].reshape(300, rows, -1)
         size = np.abs(values).max()
-        assert np.abs(loops[-10:].mean(axis=0) - loops[3:13].mean(axis=0)).max() < 1e-3 * size
+        assert np.abs(loops[-30:].mean(axis=0) - loops[3:33].mean(axis=0)).max() < 1e-3 * size
         assert np.abs(loops[3:] - loops[3]).max() < 1e-2 * size
     assert run.summary["energy"]["closure_error"] < 1e-3
 
