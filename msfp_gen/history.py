@@ -42,6 +42,18 @@ ENERGY: dict[str, str] = {
 }
 
 
+ALIKE = 1e-3
+"""Difference of two peaks, over the larger, below which rounding may have decided which is larger: the first counts."""
+
+
+def first_peak(size: Array) -> int:
+    """Row of the largest of `size`, shape (T,); of several that differ by less than `ALIKE` the first."""
+    near = size >= (1.0 - ALIKE) * size.max()
+    first = int(near.argmax())
+    last = len(size) if near[first:].all() else first + int((~near[first:]).argmax())
+    return first + int(size[first:last].argmax())
+
+
 @dataclass(frozen=True)
 class Rows:
     """A quantity of `History`: dimensions after time, unit, meaning ({} is the name), and names in the dataset.
@@ -115,6 +127,11 @@ class History:
     def horizontal(self) -> Array:
         """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
         return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
+
+    @property
+    def peak_row(self) -> int:
+        """Row of the largest horizontal displacement; of several that differ by less than `ALIKE` the first."""
+        return first_peak(self.horizontal)
 
     def arrays(self) -> dict[str, Array]:
         """The arrays of this run by field; what its model does not have is not among them."""

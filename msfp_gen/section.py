@@ -84,7 +84,7 @@ def sections(result: Result, azimuth: float | None = None) -> list[Section]:
 def azimuth_of(result: Result) -> float:
     """Azimuth [rad] of the vertical plane of the largest displacement, in (-pi/2, pi/2]; 0 where nothing moved."""
     history = result.history
-    u1, u2 = history.displacement[int(history.horizontal.argmax()), :2]
+    u1, u2 = history.displacement[history.peak_row, :2]
     angle = float(np.arctan2(u2, u1)) if u1 or u2 else 0.0
     return float(angle - np.pi * np.ceil(angle / np.pi - 0.5))
 

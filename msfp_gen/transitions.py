@@ -104,7 +104,7 @@ def _path(history: History) -> tuple[Array, Array]:
 
 def _direction(history: History) -> Array:
     """Unit vector towards the largest horizontal displacement; E1 where the bearing did not move."""
-    peak: Array = history.displacement[int(np.argmax(history.horizontal)), :2]
+    peak: Array = history.displacement[history.peak_row, :2]
     size = float(np.hypot(*peak))
     return np.asarray(peak / size) if size else np.array([1.0, 0.0])
 

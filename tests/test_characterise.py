@@ -346,11 +346,11 @@ def test_bad_input_is_one_line(arguments: list[str], words: str, capsys: Any) ->
 
 @pytest.mark.parametrize("later", [-1e-9, 0.0, 1e-9])
 def test_of_peaks_that_rounding_tells_apart_the_first_is_named(later: float) -> None:
-    from msfp_gen.characterise.report import _first_peak
+    from msfp_gen.history import first_peak
 
     radial = np.abs(np.sin(np.linspace(0.0, 4 * np.pi, 401)))
     radial[150:] *= 1.0 + later
-    assert _first_peak(radial) == 50
+    assert first_peak(radial) == 50
     radial[250] = 1.01
-    assert _first_peak(radial) == 250
-    assert _first_peak(np.linspace(0.0, 1.0, 11)) == 10
+    assert first_peak(radial) == 250
+    assert first_peak(np.linspace(0.0, 1.0, 11)) == 10

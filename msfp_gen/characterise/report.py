@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 ASIDE = 0.02  # way aside, over the largest displacement, that still counts as motion in one direction
-ALIKE = 1e-3  # difference of two peaks, over the larger, below which the first is the one that is named
 REST = 0.05  # last share of a run over which it is judged whether the bearing has come to rest
 STILL = 0.01  # movement in it, over the largest displacement, that counts as rest
 Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
@@ -113,7 +112,7 @@ def characterise(result: Result) -> Characterisation:
     peak = float(history.horizontal.max())
     if peak == 0.0:
         raise InputError("characterise: the bearing did not move in this run; give a motion, or a longer duration")
-    row = _first_peak(history.horizontal)
+    row = history.peak_row
     direction = history.displacement[row, :2] / history.horizontal[row]
     cycles, first = _one_direction(result, direction)
     kind = _kind(result, direction, cycles)
@@ -141,14 +140,6 @@ def characterise(result: Result) -> Characterisation:
         maximum_uplift=max(lifts, default=None),
         notes=tuple(_notes(result, kind, at_rest, uses)),
     )
-
-
-def _first_peak(radial: Array) -> int:
-    """Row of the largest displacement; of several that rounding tells apart the first."""
-    near = radial >= (1.0 - ALIKE) * radial.max()
-    first = int(near.argmax())
-    last = first + int((~near[first:]).argmax()) if not near[first:].all() else len(radial)
-    return first + int(radial[first:last].argmax())
 
 
 def _one_direction(result: Result, direction: Array) -> tuple[tuple[Cycle, ...], Branch | None]:

@@ -117,7 +117,7 @@ def draw_orbit(axes: Axes, result: Result, title: str = "Orbit") -> None:
 def _draw_transitions(axes: Axes, result: Result, axis: int) -> None:
     """Dotted lines where the stages of a monotonic run change, each with its symbol and value."""
     history = result.history
-    sign = np.sign(history.displacement[int(history.horizontal.argmax()), axis])
+    sign = np.sign(history.displacement[history.peak_row, axis])
     for key, value in result.summary["transitions"].items():
         if not key.startswith("u_") or value is None:
             continue

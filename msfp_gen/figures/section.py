@@ -71,7 +71,7 @@ def plot_section(
 
 def peak_time(result: Result) -> float:
     """Time of the largest horizontal displacement [s]."""
-    return float(result.history.time[int(result.history.horizontal.argmax())])
+    return float(result.history.time[result.history.peak_row])
 
 
 def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> None:
