@@ -159,14 +159,9 @@ def gap(b: Blocks) -> Program:
     """Sliding displacement and gap (3.20), (3.21); arccos by atan2, exact at zero tilt."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    x: Symbols = p.read(b.rim_coordinates, "x", active=False)
-    if x["psi"] == 0:  # planar
-        s = p.let(par["R"] * sp.Abs(x["theta"]))
-        p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
-        return p
-    cos_theta = p.let(sp.cos(x["theta"]))
-    across = p.let(norm(p.let(sp.sin(x["theta"])), p.let(sp.sin(x["psi"]) * cos_theta)))
-    s = p.let(par["R"] * ArcTan2(across, p.let(sp.cos(x["psi"]) * cos_theta)))
+    turned: Symbols = p.read(b.body, "a", active=False)
+    across = p.let(norm(turned["st"], p.let(turned["sp"] * turned["ct"])))
+    s = p.let(par["R"] * ArcTan2(across, p.let(turned["cp"] * turned["ct"])))
     p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
     return p
 

@@ -16,7 +16,7 @@ class Step(sp.Function):  # type: ignore[misc]
 
 
 class ArcTan2(sp.Function):  # type: ignore[misc]
-    """atan2(y, x) with the derivative it has off its branch cut (SymPy's own adds a distribution on the cut)."""
+    """atan2 of a sine and a cosine, with its derivative off the branch cut (SymPy's own adds a distribution on it)."""
 
     nargs = 2
 

@@ -64,7 +64,7 @@ LOCAL_KINDS = {"local", "local_moment", "rim_force", "contact", "report_contact"
 PLACES: dict[str, dict[str, str]] = {
     "arms": {"d": "k", "out": "k"},
     "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
-    "gap": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
+    "gap": {"par": r"\gamma", "a": r"\gamma+1", "out": r"\gamma"},
     "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "interface_force": {"par": "k", "b": "k", "up": "k", "out": "k-1"},
     "surface_local": {"b": r"\gamma", "a": r"\gamma+1", "x": r"\gamma+1", "y": r"\gamma", "tot": r"\gamma",

@@ -21,7 +21,7 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
         return f"msfp_step({self._print(expr.args[0])})"
 
     def _print_ArcTan2(self, expr: sp.Function) -> str:
-        return f"atan2({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+        return f"msfp_angle({self._print(expr.args[0])}, {self._print(expr.args[1])})"
 
     def _print_Modulus(self, expr: sp.Function) -> str:
         return f"fabs({self._print(expr.args[0])})"

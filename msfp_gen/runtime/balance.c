@@ -33,7 +33,7 @@ static double stored(const msfp_run *run, const msfp_state *s)
 
 void msfp_balance_begin(msfp_run *run, const msfp_point *at)
 {
-    run->now.energy = msfp_energy(&run->parameters, at, &run->work, &run->now.kinetic) + stored(run, &run->now);
+    run->now.energy = msfp_energy(&run->parameters, at, &run->work, &run->now.masses) + stored(run, &run->now);
     run->exchanged = fmax(run->exchanged, FLOOR * run->work.reference * run->parameters.surface[0][MSFP_SURFACE_PARAMETERS_R]);
 }
 
@@ -41,9 +41,9 @@ int msfp_balanced(msfp_run *run)
 {
     msfp_state *next = &run->next;
     const msfp_state *now = &run->now;
-    next->energy = msfp_energy(&run->parameters, &run->reached, &run->work, &next->kinetic) + stored(run, next);
+    next->energy = msfp_energy(&run->parameters, &run->reached, &run->work, &next->masses) + stored(run, next);
     const double made = next->energy - now->energy - (left(next) - left(now));
-    double most = fmax(run->exchanged, now->kinetic);
+    double most = fmax(run->exchanged, now->masses.kinetic);
     for (int i = 0; i < MSFP_WORKS; ++i)
         most = i == MSFP_WORK_FRICTION_STORED ? most : fmax(most, fabs(now->work[i]));
     run->exchanged = most;

@@ -89,7 +89,8 @@ static int works(msfp_run *run, double h)
     const int status = msfp_condensed(&run->parameters, &at, &seed, &w, f, residual, NULL);
     if (status)
         return status;
-    msfp_powers(&run->parameters, &at, at.f, &w, power);
+    const msfp_masses masses = msfp_weigh(&run->parameters, &at, &w);
+    msfp_powers(&run->parameters, &at, at.f, &w, &masses, power);
     for (int i = 0; i < MSFP_WORKS; ++i)
         next->work[i] += h / 6.0 * (run->now.power[i] + 4.0 * power[i] + next->power[i]);
     return MSFP_OK;
@@ -126,7 +127,8 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
     memcpy(next->a, last->a, sizeof next->a);
     memcpy(next->f, at->f, sizeof next->f);
     memcpy(next->df, last->f, sizeof next->df);
-    msfp_powers(&run->parameters, at, at->f, &run->work, next->power);
+    next->masses = msfp_weigh(&run->parameters, at, &run->work);
+    msfp_powers(&run->parameters, at, at->f, &run->work, &next->masses, next->power);
     return works(run, h);
 }
 

@@ -4,21 +4,28 @@
 
 #define FIRST_SEAT (NB + 1)
 
-/* Event functions of a state: the gaps (while open, to first order where they close), what is left to the stop displacement, compressions. */
+static double event_tolerance(const msfp_run *run, int i)
+{
+    if (i >= FIRST_SEAT)
+        return 0.1 * msfp_absolute(run, i - FIRST_SEAT, 3);
+    return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
+}
+
+/* Event functions of a state: the gaps (less than they are while they are wide), what is left to the stop displacement, compressions. */
 void msfp_event_values(msfp_run *run, const msfp_state *s, double *g)
 {
     double u[3], sliding[NB][MSFP_GAP_SIZE];
     msfp_row row;
-    int met = 0;
-    for (int j = 0; j < NB; ++j) { /* no arc tangent while the rim is away */
-        g[j] = ((MSFP_PLANAR ? 1.0 : cos(s->q[j][0])) * cos(s->q[j][1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
-        met |= g[j] <= 0.0;
+    int near = 0;
+    for (int j = 0; j < NB; ++j) { /* cos x > 1 - x^2/2: no arc tangent while the rim is away */
+        const double tilt = s->q[j][0] * s->q[j][0] + s->q[j][1] * s->q[j][1];
+        g[j] = (1.0 - 0.5 * tilt - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        near |= g[j] <= event_tolerance(run, j);
     }
-    if (met) {
-        msfp_gaps(&run->parameters, s->q, sliding);
-        for (int j = 0; j < NB; ++j)
-            g[j] = g[j] <= 0.0 ? sliding[j][MSFP_GAP_G] : g[j];
-    }
+    if (near)
+        msfp_gaps_at(&run->parameters, s->q, sliding);
+    for (int j = 0; j < NB && near; ++j)
+        g[j] = g[j] <= event_tolerance(run, j) ? sliding[j][MSFP_GAP_G] : g[j];
     g[NB] = 1.0;
     if (run->options.stop_displacement > 0.0) {
         msfp_observe_state(run, s, &row);
@@ -30,13 +37,6 @@ void msfp_event_values(msfp_run *run, const msfp_state *s, double *g)
     for (int j = 0; j < NB; ++j)
         g[FIRST_SEAT + j] = row.compression[j];
 #endif
-}
-
-static double event_tolerance(const msfp_run *run, int i)
-{
-    if (i >= FIRST_SEAT)
-        return 0.1 * msfp_absolute(run, i - FIRST_SEAT, 3);
-    return 1e-6 * (i < NB ? run->parameters.surface[i][MSFP_SURFACE_PARAMETERS_SC] : run->options.stop_displacement);
 }
 
 /* Where in the step the first event lies: its share of the step, or 1. */

@@ -24,25 +24,29 @@ typedef struct {
     msfp_stage now; /* the one at work */
 } stages;
 
+MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double weight, int count)
+{
+    for (int i = 0; i < count; ++i)
+        sum[i] += weight * rates[i];
+}
+
+/* What the first stages add to coordinates, their rates, and Y, Z. */
+static void advance(const stages *s, const double *weights, int count, double h, double q[NB][NQ], double v[NB][NQ], double f[NB][2])
+{
+    for (int j = 0; j < count; ++j) {
+        add(&q[0][0], &s->v[j][0][0], h * weights[j], NB * NQ);
+        add(&v[0][0], &s->a[j][0][0], h * weights[j], NB * NQ);
+        add(&f[0][0], &s->df[j][0][0], h * weights[j], 2 * NB);
+    }
+}
+
 /* What the stages before leave: q = Q + beta v, v = V + beta a, f = fp + beta df. */
 static void prepare(const msfp_run *run, stages *s, int i, double h)
 {
-    const msfp_state *now = &run->now;
-    for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < NQ; ++d) {
-            s->now.Q[k][d] = now->q[k][d];
-            s->now.V[k][d] = now->v[k][d];
-            for (int j = 0; j < i; ++j) {
-                s->now.Q[k][d] += h * s->method->a[i][j] * s->v[j][k][d];
-                s->now.V[k][d] += h * s->method->a[i][j] * s->a[j][k][d];
-            }
-        }
-        for (int d = 0; d < 2; ++d) {
-            s->now.seed.fp[k][d] = now->f[k][d];
-            for (int j = 0; j < i; ++j)
-                s->now.seed.fp[k][d] += h * s->method->a[i][j] * s->df[j][k][d];
-        }
-    }
+    memcpy(s->now.Q, run->now.q, sizeof s->now.Q);
+    memcpy(s->now.V, run->now.v, sizeof s->now.V);
+    memcpy(s->now.seed.fp, run->now.f, sizeof s->now.seed.fp);
+    advance(s, s->method->a[i], i, h, s->now.Q, s->now.V, s->now.seed.fp);
 }
 
 /* A rate as it goes on from those of the stages before. */
@@ -129,7 +133,8 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
     msfp_friction_rates(&run->work, s->df[i]);
-    msfp_powers(&run->parameters, &s->now.at, s->now.f, &run->work, s->power[i]);
+    run->next.masses = msfp_weigh(&run->parameters, &s->now.at, &run->work);
+    msfp_powers(&run->parameters, &s->now.at, s->now.f, &run->work, &run->next.masses, s->power[i]);
     s->moved[i] = msfp_moved_power(&run->parameters, &s->now.at, &run->work);
     msfp_heat_stage(run, i, s->now.beta);
     if (run->middles < MSFP_MIDDLES && i == s->method->middle[run->middles]) {
@@ -151,10 +156,12 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
     const double rtol = run->options.rtol;
     double worst = 0.0;
     for (int j = 0; j < NB; ++j) {
-        const double *now = run->now.f[j];
+        const double *now = run->now.f[j], square = f[j][0] * f[j][0] + f[j][1] * f[j][1];
+        if (square <= 1.0)
+            continue;
         const double before = fmax(1.0, sqrt(now[0] * now[0] + now[1] * now[1]));
         const double room = fmax(0.05, 1.0 - 0.2 * (before - 1.0) / rtol);
-        worst = fmax(worst, (sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]) - before) / (rtol * room));
+        worst = fmax(worst, (sqrt(square) - before) / (rtol * room));
     }
     return worst;
 }
@@ -164,8 +171,11 @@ static double beyond_disc(const msfp_run *run, const double f[MSFP_NB][2])
 double msfp_leap(const double now[MSFP_NB][2], const double next[MSFP_NB][2])
 {
     double worst = 0.0;
-    for (int j = 0; j < NB; ++j)
-        worst = fmax(worst, hypot(next[j][0] - now[j][0], next[j][1] - now[j][1]) / 0.5);
+    for (int j = 0; j < NB; ++j) {
+        const double y = next[j][0] - now[j][0], z = next[j][1] - now[j][1];
+        worst = fmax(worst, y * y + z * z);
+    }
+    worst = 2.0 * sqrt(worst);
     return worst > 1.0 ? worst * worst * worst : 0.0;
 }
 
@@ -224,7 +234,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
 #endif
     s.now.seed.ca = 1.0 / beta;
     s.now.seed.accuracy = 1e-5 * run->options.rtol;
-    memset(&s.now.at, 0, sizeof s.now.at);
+    memset(s.now.at.a, 0, sizeof s.now.at.a);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
@@ -250,16 +260,10 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->power, s.power[last], sizeof next->power);
     next->moved = s.moved[last];
     works(run, &s, last, h, next->work);
+    advance(&s, method->e, last + 1, h, dq, dv, df);
     for (int k = 0; k < NB; ++k)
-        for (int i = 0; i <= last; ++i) {
-            for (int d = 0; d < NQ; ++d) {
-                run->slope[k][d] = (s.a[last][k][d] - s.a[0][k][d]) / h;
-                dq[k][d] += h * method->e[i] * s.v[i][k][d];
-                dv[k][d] += h * method->e[i] * s.a[i][k][d];
-            }
-            for (int d = 0; d < 2; ++d)
-                df[k][d] += h * method->e[i] * s.df[i][k][d];
-        }
+        for (int d = 0; d < NQ; ++d)
+            run->slope[k][d] = (s.a[last][k][d] - s.a[0][k][d]) / h;
     disc = fmax(disc, msfp_leap(now->f, next->f));
     disc = fmax(disc, msfp_heat_error(run, method->e, last + 1, h, beta));
     *error = fmax(disc, msfp_error_norm(run, dq, NULL, df));

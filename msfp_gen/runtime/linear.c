@@ -5,19 +5,12 @@
 #include <math.h>
 #include "msfp_model.h"
 
-#ifdef __GNUC__
-typedef double whole __attribute__((vector_size(32), aligned(8), may_alias));
-#else
-typedef double whole;
-#endif
-enum { WHOLE = sizeof(whole) / sizeof(double) };
-
 /* to -= factor * from */
 MSFP_INLINE void subtract(double *restrict to, const double *restrict from, double factor, int count)
 {
     int j = 0;
-    for (; j + WHOLE <= count; j += WHOLE)
-        *(whole *)(to + j) -= factor * *(const whole *)(from + j);
+    for (; j + MSFP_WHOLE <= count; j += MSFP_WHOLE)
+        *(msfp_whole *)(to + j) -= factor * *(const msfp_whole *)(from + j);
     for (; j < count; ++j)
         to[j] -= factor * from[j];
 }

@@ -23,6 +23,14 @@ extern "C" {
 #endif
 #define MSFP_INLINE MSFP_INLINED static inline
 
+/* Numbers side by side, as many as the vectors of most processors hold. */
+#ifdef __GNUC__
+typedef double msfp_whole __attribute__((vector_size(32), aligned(8), may_alias));
+#else
+typedef double msfp_whole;
+#endif
+enum { MSFP_WHOLE = sizeof(msfp_whole) / sizeof(double) };
+
 #if MSFP_BATCH
 /* The library's fmax, without a call: a batch is compiled for the processor at hand. */
 #include <math.h>
@@ -164,8 +172,9 @@ void msfp_report(const msfp_parameters *p, const msfp_point *at, const double *u
                  double *rates /* derivatives of dY/dt, dZ/dt [2 NB][count], zeroed by the caller, or NULL */);
 int msfp_report_solve(const msfp_parameters *p, msfp_point *at, msfp_work *w, double *unknowns, int warm, msfp_solution *out);
 
-/* Sliding displacements and gaps (3.20), (3.21). */
-void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
+/* Sliding displacements and gaps (3.20), (3.21): of an evaluation, at given coordinates. */
+void msfp_gaps(const msfp_parameters *p, const msfp_work *w, double sliding[MSFP_NB][MSFP_GAP_SIZE]);
+void msfp_gaps_at(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
 /* Surface (1-based) whose interface would have to pull: P . t_3 <= 0 (docs/model.md, choice 11). 0: none. */
 int msfp_pulling(const msfp_work *w);
@@ -191,13 +200,14 @@ void msfp_lu_solve(const double *matrix, int n, const int *pivots, double *rhs);
 /* ---- histories: piecewise polynomials in time --------------------------------------------- */
 
 #define MSFP_DEGREE 5
+#define MSFP_CHANNELS 8 /* six, and as many as whole vectors have */
 typedef struct {
     int pieces;
     const double *knots;        /* [pieces + 1] */
     const double *coefficients; /* [pieces][6][MSFP_DEGREE + 1], ascending powers of t - knot */
     int last;                   /* piece found last: the search starts there */
     int held, degree;           /* the piece, counted from 1, whose coefficients are at hand with channels side by side */
-    double powers[MSFP_DEGREE + 1][6];
+    double powers[MSFP_DEGREE + 1][MSFP_CHANNELS];
 } msfp_history;
 void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
@@ -268,16 +278,22 @@ typedef struct {
     double displacement[3], top_force[3];
 } msfp_event;
 
-/* Event functions of a run: the gap of every rim (to first order while it is open), what is left to the stop displacement, and how far every seat is
- * compressed where bodies may part. */
+/* Event functions of a run: the gap of every rim (less than it is while it is wide), what is left to the stop displacement,
+ * and how far every seat is compressed where bodies may part. */
 #define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
+
+/* Of all masses that the model keeps: energies [J], and what the forces of the moving frame do [W]. */
+typedef struct {
+    double kinetic, potential, power;
+} msfp_masses;
 
 /* Values at the end of a step from which the next goes on. */
 typedef struct {
     double t;
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
     double work[MSFP_WORKS], power[MSFP_WORKS], moved; /* moved: the power of what moves as prescribed */
-    double energy, kinetic;
+    double energy;
+    msfp_masses masses;
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
 #endif
@@ -375,19 +391,21 @@ const char *msfp_guard_name(int guard);
 /* Between the files of the runtime. */
 /* Friction of one surface: mu N f . slip, added to what Y, Z store and what is lost (3.16)-(3.18). */
 void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
+msfp_masses msfp_weigh(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
 /* All but those of friction. */
-void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS]);
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses, double power[MSFP_WORKS]);
 /* Of the load on the top plate, in the frame of the base. */
 double msfp_load_power(const msfp_point *at, const msfp_work *w);
 void msfp_point_at(msfp_run *run, double t, msfp_point *at);
-void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS]);
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, const msfp_masses *masses,
+                 double power[MSFP_WORKS]);
 /* Power of what moves as prescribed, a part of what is put in: the base of the rig, and that of the stack where it turns. */
 double msfp_moved_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
 /* Kinetic, potential and of all springs but friction. */
-double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *kinetic);
+double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses);
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
 /* The same from an evaluation at hand. */
-void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row);
+void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses, msfp_row *row);
 /* Whether the model holds at a state: no interface pulls, no angle is singular. 0 or a status. */
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
 /* Largest error of a step relative to the tolerance: angles and Y, Z (and rates where given). */

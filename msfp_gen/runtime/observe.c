@@ -17,22 +17,25 @@ static void frame(const msfp_point *at, double *base)
     msfp_base_motion_B_put(base, at->base[2]);
 }
 
-/* Kinetic, potential and frame power of all masses that the model keeps. */
-static void energies(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double total[3])
+static void add(msfp_masses *total, const double *one)
+{
+    total->kinetic += one[MSFP_ENERGY_KINETIC];
+    total->potential += one[MSFP_ENERGY_POTENTIAL];
+    total->power += one[MSFP_ENERGY_POWER];
+}
+
+msfp_masses msfp_weigh(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     double base[MSFP_BASE_MOTION_SIZE], one[MSFP_ENERGY_SIZE];
+    msfp_masses total = { 0.0, 0.0, 0.0 };
     frame(at, base);
-    total[0] = total[1] = total[2] = 0.0;
     for (int k = 1; k <= NB; ++k) {
         msfp_body_energy(p->body[k], w->body[k], base, one);
-        total[0] += one[MSFP_ENERGY_KINETIC];
-        total[1] += one[MSFP_ENERGY_POTENTIAL];
-        total[2] += one[MSFP_ENERGY_POWER];
+        add(&total, one);
     }
     msfp_top_energy(p->top, w->body[NB], base, one);
-    total[0] += one[MSFP_ENERGY_KINETIC];
-    total[1] += one[MSFP_ENERGY_POTENTIAL];
-    total[2] += one[MSFP_ENERGY_POWER];
+    add(&total, one);
+    return total;
 }
 
 static double friction_coefficient(const double *par, const double *contact)
@@ -79,11 +82,11 @@ static double rim_lever(const double *par)
 
 /* What the damper of a rim takes, never less than nothing: c (dg/dt)^2; and where it would pull and so lets go, what the
  * spring gives it. */
-static double rim_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, int j)
+static double rim_power(const msfp_parameters *p, const msfp_work *w, int j)
 {
     double sliding[NB][MSFP_GAP_SIZE];
     const double *par = p->surface[j];
-    msfp_gaps(p, at->q, sliding);
+    msfp_gaps(p, w, sliding);
     const double gap = sliding[j][MSFP_GAP_G], spring = par[MSFP_SURFACE_PARAMETERS_KC] * gap;
     const double damper = w->rim_sum[j] - spring;
     if (gap >= 0.0 || par[MSFP_SURFACE_PARAMETERS_CC] == 0.0)
@@ -166,21 +169,20 @@ static double lock_power(const msfp_work *w)
     return power;
 }
 
-void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double power[MSFP_WORKS])
+void msfp_other_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses, double power[MSFP_WORKS])
 {
-    double total[3];
-    energies(p, at, w, total);
     memset(power, 0, MSFP_WORKS * sizeof *power);
-    power[MSFP_WORK_INPUT] = total[2] + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
+    power[MSFP_WORK_INPUT] = masses->power + drive_power(p, at, w, &power[MSFP_WORK_TOP]) + lock_power(w);
     power[MSFP_WORK_SEAT] = seat_power(w);
     for (int j = 0; j < NB; ++j)
         if (w->rim_sum[j] != 0.0)
-            power[MSFP_WORK_RIM] += rim_power(p, at, w, j);
+            power[MSFP_WORK_RIM] += rim_power(p, w, j);
 }
 
-void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, double power[MSFP_WORKS])
+void msfp_powers(const msfp_parameters *p, const msfp_point *at, const double f[MSFP_NB][2], const msfp_work *w, const msfp_masses *masses,
+                 double power[MSFP_WORKS])
 {
-    msfp_other_powers(p, at, w, power);
+    msfp_other_powers(p, at, w, masses, power);
     for (int j = 0; j < NB; ++j)
         msfp_friction_power(p->surface[j], f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED], &power[MSFP_WORK_FRICTION]);
 }
@@ -226,17 +228,15 @@ static double seat_energy(const msfp_work *w)
     return total;
 }
 
-double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *kinetic)
+double msfp_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses)
 {
-    double total[3], sliding[NB][MSFP_GAP_SIZE], gap[NB] = { 0.0 };
-    energies(p, at, w, total);
+    double sliding[NB][MSFP_GAP_SIZE], gap[NB] = { 0.0 };
     for (int j = 0; j < NB; ++j)
         if (w->rim_sum[j] != 0.0) { /* rarely */
-            msfp_gaps(p, at->q, sliding);
+            msfp_gaps(p, w, sliding);
             gap[j] = sliding[j][MSFP_GAP_G];
         }
-    *kinetic = total[0];
-    return total[0] + total[1] + restraint_energy(p, at, w) + rim_energy(p, gap) + seat_energy(w);
+    return masses->kinetic + masses->potential + restraint_energy(p, at, w) + rim_energy(p, gap) + seat_energy(w);
 }
 
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
@@ -249,13 +249,14 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
     memset(w->coefficient, 0, sizeof w->coefficient);
 #endif
     msfp_condensed(p, at, &seed, w, f, residual, NULL);
-    msfp_record(p, at, w, row);
+    const msfp_masses masses = msfp_weigh(p, at, w);
+    msfp_record(p, at, w, &masses, row);
 }
 
-void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, msfp_row *row)
+void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_masses *masses, msfp_row *row)
 {
-    double total[3], sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps(p, at->q, sliding);
+    double sliding[NB][MSFP_GAP_SIZE];
+    msfp_gaps(p, w, sliding);
     memcpy(row->q, at->q, sizeof row->q);
     memcpy(row->v, at->v, sizeof row->v);
     memcpy(row->a, at->a, sizeof row->a);
@@ -263,8 +264,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     for (int j = 0; j < NB; ++j) {
         const double *contact = w->contact[j];
         row->normal[j] = contact[MSFP_CONTACT_N];
-        row->angles[j][0] = MSFP_PLANAR ? 0.0 : atan2(msfp_contact_sp(contact), msfp_contact_cp(contact));
-        row->angles[j][1] = atan2(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
+        row->angles[j][0] = MSFP_PLANAR ? 0.0 : msfp_angle(msfp_contact_sp(contact), msfp_contact_cp(contact));
+        row->angles[j][1] = msfp_angle(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = sliding[j][MSFP_GAP_G];
         row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;
@@ -283,9 +284,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     row->top[1] += MSFP_PLANAR ? at->base[0][1] : 0.0;
     msfp_force_F_get(w->force[NB], row->top_force);
     msfp_moment_M_get(w->moment[NB], row->top_moment);
-    energies(p, at, w, total);
-    row->kinetic = total[0];
-    row->potential = total[1];
+    row->kinetic = masses->kinetic;
+    row->potential = masses->potential;
     row->restraint = restraint_energy(p, at, w);
     row->rim_stored = rim_energy(p, row->gap);
     row->seat_stored = seat_energy(w);

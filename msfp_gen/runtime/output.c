@@ -154,7 +154,7 @@ static void limit(const msfp_row *rows, int count, msfp_row *row)
 static void measure(const msfp_run *run, msfp_row *row)
 {
     double sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps(&run->parameters, row->q, sliding);
+    msfp_gaps_at(&run->parameters, row->q, sliding);
     for (int j = 0; j < NB; ++j) {
         row->sliding[j] = sliding[j][MSFP_GAP_S];
         row->gap[j] = sliding[j][MSFP_GAP_G];
@@ -212,7 +212,7 @@ static int write_reached(msfp_run *run)
     msfp_row *row = new_row(run);
     if (!row)
         return MSFP_E_MEMORY;
-    msfp_record(&run->parameters, &run->reached, &run->work, row);
+    msfp_record(&run->parameters, &run->reached, &run->work, &run->next.masses, row);
     row->time = run->next.t;
     memcpy(row->work, run->next.work, sizeof row->work);
     return MSFP_OK;

@@ -169,7 +169,8 @@ static double load_work(const msfp_run *run)
 static void count_work(msfp_run *run, const msfp_stage *s, double h)
 {
     msfp_state *next = &run->next;
-    msfp_other_powers(&run->parameters, &s->at, &run->work, next->power);
+    next->masses = msfp_weigh(&run->parameters, &s->at, &run->work);
+    msfp_other_powers(&run->parameters, &s->at, &run->work, &next->masses, next->power);
     next->power[MSFP_WORK_INPUT] -= msfp_load_power(&s->at, &run->work);
     for (int e = 0; e < MSFP_WORKS; ++e)
         if (e != MSFP_WORK_FRICTION && e != MSFP_WORK_FRICTION_STORED)

@@ -83,7 +83,8 @@ static int settle(msfp_run *run)
     memcpy(run->now.a, at.a, sizeof at.a);
     msfp_friction_rates(&run->work, run->now.df);
     msfp_heat_settle(run);
-    msfp_powers(&run->parameters, &at, at.f, &run->work, run->now.power);
+    run->now.masses = msfp_weigh(&run->parameters, &at, &run->work);
+    msfp_powers(&run->parameters, &at, at.f, &run->work, &run->now.masses, run->now.power);
     run->now.moved = msfp_moved_power(&run->parameters, &at, &run->work);
     msfp_balance_begin(run, &at);
     memset(run->slope, 0, sizeof run->slope);

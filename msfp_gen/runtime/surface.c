@@ -42,13 +42,23 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 #endif
 }
 
-void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE])
+void msfp_gaps(const msfp_parameters *p, const msfp_work *w, double sliding[MSFP_NB][MSFP_GAP_SIZE])
 {
+    for (int j = 0; j < NB; ++j)
+        msfp_gap(p->surface[j], w->body[j + 1], sliding[j]);
+}
+
+void msfp_gaps_at(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE])
+{
+    double body[MSFP_BODY_SIZE];
     for (int j = 0; j < NB; ++j) {
-        double x[MSFP_RIM_LOCAL] = { 0 };
-        for (int i = 0; i < PAIR; ++i)
-            x[i] = q[j][MSFP_PLANAR ? 1 : i];
-        msfp_gap(p->surface[j], x, sliding[j]);
+#if !MSFP_PLANAR
+        body[MSFP_BODY_SP] = sin(q[j][0]);
+        body[MSFP_BODY_CP] = cos(q[j][0]);
+#endif
+        body[MSFP_BODY_ST] = sin(q[j][1]);
+        body[MSFP_BODY_CT] = cos(q[j][1]);
+        msfp_gap(p->surface[j], body, sliding[j]);
     }
 }
 

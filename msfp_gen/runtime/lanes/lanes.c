@@ -34,7 +34,6 @@ static void base(lane_work *w)
 
 static void stack_up(lane_work *w)
 {
-    base(w);
     for (int k = 1; k <= NB; ++k) {
         coordinates_of(w->out.x[k], w->in.at.q[k - 1], w->in.at.v[k - 1], w->in.at.a[k - 1]);
         lane_forward(w->in.parts.body[k], w->out.body[k - 1], w->out.x[k], w->out.body[k]);
@@ -177,6 +176,7 @@ void msfp_lanes(lane_work *w, msfp_request *const *requests, int count)
     for (int i = 0; i < W; ++i)
         all[i] = requests[i < count ? i : 0];
     gather(w, all);
+    base(w);
     w->asked = mask_of(LANE_BITS);
     evaluate(w);
     if (!w->wanted)
