@@ -190,7 +190,7 @@ static double jump(const msfp_run *run, const msfp_stage *s)
         if (fabs(gap) * par[MSFP_SURFACE_PARAMETERS_KC] <= 10.0 * force)
             worst = fmax(worst, force / (run->work.contact[j][MSFP_CONTACT_N] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01)));
     }
-    return fmin(worst, ARRIVED);
+    return fmin(worst, 1e-4);
 }
 
 /* Whether a step of Newton is below the last digits of the rates. Over a short time those are accelerations, and times a
