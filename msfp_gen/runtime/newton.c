@@ -179,7 +179,8 @@ static double rounding(const msfp_stage *s)
 }
 
 /* A rim with a damper is met with a jump of its force, c dg/dt, and the balance may lie within: where a gap is as small as
- * the spring makes of that, no residual below the jump is asked for. */
+ * the spring makes of that, no residual below the jump is asked for. More than 1e-4 would let stages pass that are still on
+ * their way: with 1e-3 the inner surfaces of the tutorial's bearing shared a motion wrongly, by 1.6 mm. */
 static double jump(const msfp_run *run, const msfp_stage *s)
 {
     double worst = 0.0;
