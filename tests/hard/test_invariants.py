@@ -35,6 +35,15 @@ def unresolved(scene: Scene, history: History) -> float:
     return float(history.normal_force.max()) * reach * scene.solver.angle_tolerance
 
 
+def pressed_in(scene: Scene, history: History) -> float:
+    """What stuck surfaces may give beyond what they took [J]: their spring mu N/d_y is the stiffer the more presses, so
+    that mu N d_y (Y^2 + Z^2)/2 is no potential where N rises. Thrown on rims, all methods and tolerances agree on some."""
+    square = (history.friction_state**2).sum(axis=2)
+    rises = 0.5 * (square[1:] + square[:-1]) * np.maximum(np.diff(history.normal_force, axis=0), 0.0)
+    scale = [0.5 * surface.friction * surface.yield_displacement for surface in scene.bearing.surfaces]
+    return float(rises.sum(axis=0) @ scale)
+
+
 @holds(12, 400, scene=scenes())
 def test_energy_balances_and_only_friction_and_rims_take_it(scene: Scene) -> None:
     """Input = kinetic + potential + stored + dissipated to a per cent, as of the presets; friction less its
@@ -46,9 +55,8 @@ def test_energy_balances_and_only_friction_and_rims_take_it(scene: Scene) -> Non
         assert np.abs(energy["numerical"]).max() < 1e-2 * peak + unresolved(scene, run.history)
     for source in ("friction_dissipated", "rim_dissipated", "top_dissipated"):
         assert np.diff(energy[source]).min() > -1e-3 * peak - unresolved(scene, history), source
-    assert (
-        energy["friction_stored"].min() > -1e-3 * peak - unresolved(scene, history) and energy["rim_stored"].min() >= 0
-    )
+    given = unresolved(scene, history) + pressed_in(scene, history)
+    assert energy["friction_stored"].min() > -1e-3 * peak - given and energy["rim_stored"].min() >= 0
     assert np.linalg.norm(history.friction_state, axis=2).max() < 1 + 10 * scene.solver.rtol
     assert history.rim_force.min() >= 0 and not history.rim_force[history.gap > 0].any()
     assert history.normal_force.min() > 0
