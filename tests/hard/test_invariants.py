@@ -37,7 +37,7 @@ def unresolved(scene: Scene, history: History) -> float:
 
 def pressed_in(scene: Scene, history: History) -> float:
     """What stuck surfaces may give beyond what they took [J]: their spring mu N/d_y is the stiffer the more presses, so
-    that mu N d_y (Y^2 + Z^2)/2 is no potential where N rises. Thrown on rims, all methods and tolerances agree on some."""
+    that mu N d_y (Y^2 + Z^2)/2 is no potential where N rises. Thrown on rims, all methods agree on how much."""
     square = (history.friction_state**2).sum(axis=2)
     rises = 0.5 * (square[1:] + square[:-1]) * np.maximum(np.diff(history.normal_force, axis=0), 0.0)
     scale = [0.5 * surface.friction * surface.yield_displacement for surface in scene.bearing.surfaces]
