@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: demo test slow lint types fuzz figures docs clean
+.PHONY: demo test slow lint types package bounds clang fuzz figures docs clean
 
 demo: $(STAMP)
 	$(BIN)/msfp-gen demo -o out
@@ -13,13 +13,26 @@ test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
 
 slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m slow
+	$(BIN)/python -m pytest -q -n auto --dist loadfile -m slow
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 
 types: $(STAMP)
 	$(BIN)/mypy
+
+# The sdist and the wheel, each built, installed and run outside the checkout.
+package: $(STAMP)
+	tests/packaging.sh
+
+# The lowest versions of the dependencies that pyproject.toml allows.
+bounds: $(STAMP)
+	tests/lower_bounds.sh
+
+# One model by another compiler; a warning is an error.
+clang: $(STAMP)
+	CC=clang MSFP_GEN_CFLAGS=-Werror $(BIN)/msfp-gen generate 3 1 1 -o build/clang
 
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)
@@ -40,4 +53,4 @@ $(STAMP): pyproject.toml
 	touch $@
 
 clean:
-	rm -rf $(VENV) build/models out
+	rm -rf $(VENV) build/models build/clang out

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from msfp_gen import load_scene
-from msfp_gen.bounding import bound, load_factors
-from msfp_gen.bounding.figure import plot_bounds
+from msfp_gen.studies.bounding import bound, load_factors
+from msfp_gen.studies.bounding.figure import plot_bounds
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "fenz-test5-bounds.png"
 

@@ -1,7 +1,8 @@
-"""The condensed residual of a step handed to CasADi: its generated C, with a dense solve, is what ours is held against.
+"""The condensed residual of a step in CasADi, whose generated C with a dense solver is compared with that of this project.
 
-The statements are the generator's own, put into CasADi's graph body by body, so that both compute the same thing; CasADi
-differentiates and prints. Unknowns are the rates and Y, Z (16 for a triple pendulum): it has no nested elimination.
+The statements are those of the generator, translated to CasADi's graph body by body, so that both compute the same
+residual; CasADi differentiates it and writes C. Unknowns are the rates and Y, Z (16 for a triple pendulum), without the
+nested elimination of Y, Z.
 """
 
 from __future__ import annotations
@@ -14,18 +15,18 @@ import numpy as np
 import sympy as sp
 
 from msfp_gen import Scene, build_model
-from msfp_gen.compiler import FLAGS, find_compiler
 from msfp_gen.generator.derive import derive
-from msfp_gen.generator.lower import live
+from msfp_gen.generator.lower import needed_statements
 from msfp_gen.generator.program import Program
-from msfp_gen.layout import ModelSpec
+from msfp_gen.jit.compiler import FLAGS, find_compiler
+from msfp_gen.specification.layout import ModelSpec
 
 HERE = Path(__file__).parent
 Values = dict[str, Any]
 
 
 def graph(expression: sp.Expr, known: dict[sp.Symbol, Any], ca: Any) -> Any:
-    """A small SymPy expression in CasADi."""
+    """A SymPy expression in CasADi."""
     if expression.is_Symbol:
         return known[expression]
     if expression.is_Number:
@@ -39,15 +40,25 @@ def graph(expression: sp.Expr, known: dict[sp.Symbol, Any], ca: Any) -> Any:
         return total
     if name == "Pow":
         exponent = expression.args[1]
-        return ca.sqrt(parts[0]) if exponent == sp.Rational(1, 2) else 1 / parts[0] if exponent == -1 else parts[0] ** int(exponent)
-    return {"sin": ca.sin, "cos": ca.cos, "Modulus": ca.fabs, "Step": lambda x: ca.if_else(x > 0, 1.0, 0.0)}[name](*parts)
+        return (
+            ca.sqrt(parts[0])
+            if exponent == sp.Rational(1, 2)
+            else 1 / parts[0]
+            if exponent == -1
+            else parts[0] ** int(exponent)
+        )
+    return {"sin": ca.sin, "cos": ca.cos, "Modulus": ca.fabs, "Step": lambda x: ca.if_else(x > 0, 1.0, 0.0)}[name](
+        *parts
+    )
 
 
 def results(program: Program, ca: Any, **inputs: Values) -> Values:
     """The results of a program in CasADi's graph."""
-    known = {sp.Symbol(f"{alias}_{name}", real=True): v for alias, fields in inputs.items() for name, v in fields.items()}
-    wanted = {s for e in program.results.values() for s in e.free_symbols}
-    for statement in live(program, wanted):
+    known = {
+        sp.Symbol(f"{alias}_{name}", real=True): v for alias, fields in inputs.items() for name, v in fields.items()
+    }
+    needed = {s for e in program.results.values() for s in e.free_symbols}
+    for statement in needed_statements(program.statements, needed):
         known[statement.target] = graph(statement.expression, known, ca)
     return {name: graph(expression, known, ca) for name, expression in program.results.items()}
 
@@ -62,7 +73,7 @@ class Stack:
         self.given: list[tuple[Any, str, int, str]] = []
 
     def parameter(self, kind: str, index: int, name: str) -> Any:
-        """A number that the compiled function takes."""
+        """A parameter of the compiled function."""
         symbol = self.ca.SX.sym(f"{kind}_{index}_{name}")
         self.given.append((symbol, kind, index, name))
         return symbol
@@ -73,42 +84,73 @@ class Stack:
         return {f.name: self.parameter(kind, index, f.name) for f in fields}
 
     def ground(self) -> Values:
-        """Body 0, at rest but for its translation."""
+        """Body 0, which translates without rotation."""
         fields = dict.fromkeys((f.name for f in derive(self.spec).blocks.body.fields), 0.0)
         fields |= {"t1x": 1.0, "t2y": 1.0, "t3z": 1.0, "cp": 1.0, "ct": 1.0}
-        return fields | {name: self.parameter("base", 0, name) for name in ("Cx", "Cy", "Cz", "Vx", "Vy", "Vz", "Ax", "Ay", "Az")}
+        return fields | {
+            name: self.parameter("base", 0, name) for name in ("Cx", "Cy", "Cz", "Vx", "Vy", "Vz", "Ax", "Ay", "Az")
+        }
 
     def residual(self) -> tuple[Any, Any, Any]:
         """Unknowns, parameters, residual."""
         ca, n, run = self.ca, self.count, self.programs
         v, f, beta = ca.SX.sym("v", 2 * n), ca.SX.sym("f", 2 * n), self.parameter("beta", 0, "")
-        bodies, xs = [self.ground()], [dict.fromkeys(("psi", "theta", "phi", "psi1", "theta1", "phi1", "psi2", "theta2", "phi2"), 0.0)]
+        bodies, xs = (
+            [self.ground()],
+            [dict.fromkeys(("psi", "theta", "phi", "psi1", "theta1", "phi1", "psi2", "theta2", "phi2"), 0.0)],
+        )
         pars = [self.block("body_parameters", k + 1) for k in range(n)]
         for k in range(n):
             x: Values = {"phi": 0.0, "phi1": 0.0, "phi2": 0.0}
             for i, name in enumerate(("psi", "theta")):
                 rate = v[2 * k + i]
-                x |= {name: self.parameter("Q", k, name) + beta * rate, f"{name}1": rate, f"{name}2": (rate - self.parameter("V", k, name)) / beta}
+                x |= {
+                    name: self.parameter("Q", k, name) + beta * rate,
+                    f"{name}1": rate,
+                    f"{name}2": (rate - self.parameter("V", k, name)) / beta,
+                }
             bodies.append(results(run["forward"], ca, par=pars[k], u=bodies[k], x=x))
             xs.append(x)
-        load = {"Fx": self.parameter("load", 0, "x"), "Fy": self.parameter("load", 0, "y"), "Fz": self.parameter("load", 0, "z")}
+        load = {
+            "Fx": self.parameter("load", 0, "x"),
+            "Fy": self.parameter("load", 0, "y"),
+            "Fz": self.parameter("load", 0, "z"),
+        }
         none = {"Mx": 0.0, "My": 0.0, "Mz": 0.0}
-        wrench = results(run["top_wrench"], ca, par=self.block("top_parameters", 0), b=bodies[n], x=xs[n], fe=load, me=none)
+        wrench = results(
+            run["top_wrench"], ca, par=self.block("top_parameters", 0), b=bodies[n], x=xs[n], fe=load, me=none
+        )
         forces, moments = [{k: wrench[k] for k in ("Fx", "Fy", "Fz")}], [{k: wrench[k] for k in ("Mx", "My", "Mz")}]
         for k in range(n, 0, -1):
             forces.insert(0, results(run["interface_force"], ca, par=pars[k - 1], b=bodies[k], up=forces[0]))
         friction = []
         for j in range(n - 1, -1, -1):
             own = {"Y": f[2 * j], "Z": f[2 * j + 1]}
-            local = results(run["surface_local"], ca, b=bodies[j], a=bodies[j + 1], x=xs[j + 1], y=xs[j], tot=forces[j],
-                            rim={"Fx": 0.0, "Fy": 0.0, "Fz": 0.0})  # fmt: skip
+            local = results(
+                run["surface_local"],
+                ca,
+                b=bodies[j],
+                a=bodies[j + 1],
+                x=xs[j + 1],
+                y=xs[j],
+                tot=forces[j],
+                rim={"Fx": 0.0, "Fy": 0.0, "Fz": 0.0},
+            )
             touch = results(run["contact"], ca, par=self.block("surface_parameters", j), loc=local, f=own)
             moments.insert(0, results(run["moment_to_world"], ca, b=bodies[j], loc={k: touch[k] for k in none}))
             friction += [own[name] - self.parameter("fp", j, name) - beta * touch[f"d{name}"] for name in ("Y", "Z")]
         rows = []
         for k in range(1, n + 1):
-            balance = results(run["angular_balance"], ca, par=pars[k - 1], b=bodies[k], lo=forces[k - 1], ml=moments[k - 1],
-                              up=forces[k], mu=moments[k])  # fmt: skip
+            balance = results(
+                run["angular_balance"],
+                ca,
+                par=pars[k - 1],
+                b=bodies[k],
+                lo=forces[k - 1],
+                ml=moments[k - 1],
+                up=forces[k],
+                mu=moments[k],
+            )
             rows += list(balance.values())[:2]
         return ca.vertcat(v, f), ca.vertcat(*(symbol for symbol, *_ in self.given)), ca.vertcat(*rows, *friction)
 
@@ -148,9 +190,10 @@ int main(void)
 """
 
 
-def timed(scene: Scene, numbers: dict[tuple[str, int, str], float], unknowns: Any, folder: Path, flags: tuple[str, ...] = ()
-          ) -> tuple[float, Any]:  # fmt: skip
-    """Nanoseconds of one Newton iteration by CasADi's C and LU with pivots, and the residual."""
+def timed(
+    scene: Scene, numbers: dict[tuple[str, int, str], float], unknowns: Any, folder: Path, flags: tuple[str, ...] = ()
+) -> tuple[float, Any]:
+    """Time of one Newton iteration by CasADi's C and LU with pivoting [ns], and the residual."""
     import casadi as ca
 
     stack = Stack(scene, ca)
@@ -163,8 +206,23 @@ def timed(scene: Scene, numbers: dict[tuple[str, int, str], float], unknowns: An
     built = build_model(scene.bearing.layout, scene.effects).info.folder
     sizes = [f"-DN={x.numel()}", f"-DP={p.numel()}", "-I", str(built), "-w"]
     sources = [str(folder / "main.c"), str(folder / "newton.c"), str(built / "linear.c")]
-    subprocess.run([*find_compiler().command, *FLAGS["c"], *FLAGS["user"], *flags, *sizes, *sources, "-o", str(folder / "peer"), "-lm"], check=True)
+    subprocess.run(
+        [
+            *find_compiler().command,
+            *FLAGS["c"],
+            *FLAGS["user"],
+            *flags,
+            *sizes,
+            *sources,
+            "-o",
+            str(folder / "peer"),
+            "-lm",
+        ],
+        check=True,
+    )
     values = [*unknowns, *(numbers[key] for _, *rest in stack.given for key in [tuple(rest)])]
-    done = subprocess.run([folder / "peer"], input=" ".join(repr(float(v)) for v in values), text=True, capture_output=True, check=True)
+    done = subprocess.run(
+        [folder / "peer"], input=" ".join(repr(float(v)) for v in values), text=True, capture_output=True, check=True
+    )
     words = done.stdout.split()
     return float(words[0]), np.array(words[1:], dtype=float)

@@ -1,7 +1,7 @@
-"""One device of each kind against friction circles and published formulas: `python benchmarks/devices.py`.
+"""Compare one device of each kind with friction circles and published formulas: `python benchmarks/devices.py [DIR]`.
 
-Draws docs/figures/devices.png and fills the table of docs/devices.md. Takes the folder to write into, with a copy of
-the page in it; without one, the docs of this checkout.
+Draws docs/figures/devices.png and fills the table of docs/devices.md. DIR is the folder to write to, with a copy of the
+page in it; default: the docs of this checkout.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is the tests' reference
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is that of the tests
 
 from drawing import Array, closed_push, ratio  # noqa: E402
 from reference.friction_circle import Transition, centres, force_at, transitions  # noqa: E402
 
 from msfp_gen import Bearing, load_scene, simulate  # noqa: E402
+from msfp_gen.common.output import replacing  # noqa: E402
 from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page  # noqa: E402
-from msfp_gen.output import replacing  # noqa: E402
 from msfp_gen.result import Result  # noqa: E402
 
 MARKS = ("<!-- numbers: python benchmarks/devices.py -->\n", "<!-- end -->\n")
@@ -34,11 +34,16 @@ HEAD = """\
 
 @dataclass(frozen=True)
 class Device:
-    """A scene, and what the published formula needs to know of its bearing.
+    """A scene, and the data of its bearing that the published formula needs.
 
-    lower, upper: surfaces below and above the pivot, outermost first, numbered from 1. joint: the surface whose centre
-    is the pivot; None: the pivot is the middle of the innermost slider. textbook: the formula takes R for the effective
-    radius, as that of the single pendulum does. at: displacements of the table [m].
+    Attributes:
+        title: as in figure and table.
+        scene: name of the preset.
+        source: of the formula.
+        lower, upper: surfaces below and above the pivot, outermost first, numbered from 1.
+        joint: surface whose sphere centre is the pivot; None: the pivot is the middle of the innermost slider.
+        textbook: the formula takes R for the effective radius, as that of the single pendulum does.
+        at: displacements of the table [m].
     """
 
     title: str
@@ -58,9 +63,15 @@ DEVICES = (
     Device("double, rigid slider", "double-push", DOUBLE, (1,), (2,), at=(0.05, 0.2, 0.35)),
     Device("double, articulated", "double-articulated-push", DOUBLE, (1,), (3,), 2, at=(0.05, 0.2, 0.35)),
     Device("triple", "triple-push", "Fenz & Constantinou 2008", (1, 2), (4, 3), at=(0.02, 0.07, 0.11, 0.133)),
-    Device("quintuple", "quintuple-push", "Lee & Constantinou 2016", (1, 2, 3), (6, 5, 4),
-           at=(0.03, 0.1, 0.2, 0.4, 0.58, 0.65, 0.69, 0.73)),
-)  # fmt: skip
+    Device(
+        "quintuple",
+        "quintuple-push",
+        "Lee & Constantinou 2016",
+        (1, 2, 3),
+        (6, 5, 4),
+        at=(0.03, 0.1, 0.2, 0.4, 0.58, 0.65, 0.69, 0.73),
+    ),
+)
 
 
 @cache
@@ -69,24 +80,24 @@ def run(device: Device) -> Result:
 
 
 @cache
-def story(device: Device) -> list[Transition]:
-    """What happens along the whole push, by friction circles."""
+def friction_circle_transitions(device: Device) -> list[Transition]:
+    """Transitions between sliding regimes in the whole push, by friction circles."""
     result = run(device)
     return transitions(closed_push(result), float(result.history.displacement[-1, 0]))
 
 
 @cache
 def circles(device: Device) -> tuple[Array, Array]:
-    """Displacements along the whole push, its corners and those of the table among them [m], and F/W by the circles."""
-    told, push = story(device), closed_push(run(device))
+    """Displacements of the push [m], with its transitions and those of the table, and F/W by friction circles."""
+    found, push = friction_circle_transitions(device), closed_push(run(device))
     end = float(run(device).history.displacement[-1, 0])
-    corners = [t.at.displacement for t in told if t.at.displacement > 0]
+    corners = [t.at.displacement for t in found if t.at.displacement > 0]
     u: Array = np.unique([*np.linspace(0.0025, 0.9999, 40) * end, *corners, *device.at])
-    return u, force_at(push, list(u), told) / push.load
+    return u, force_at(push, list(u), found) / push.load
 
 
 def effective_radii(bearing: Bearing, device: Device) -> dict[int, float]:
-    """Distance from the centre of every surface to the pivot, R - h [m]; for a single pendulum to the plate's top."""
+    """Distance from the centre of every surface to the pivot, R - h [m]; for a single pendulum to the top of the plate."""
     height = centres(bearing, np.zeros(bearing.layout.surfaces))[:, 1]
     if device.joint is not None:
         pivot = height[device.joint - 1]
@@ -99,29 +110,29 @@ def effective_radii(bearing: Bearing, device: Device) -> dict[int, float]:
 
 
 def thresholds(bearing: Bearing, device: Device, arms: bool) -> dict[int, float]:
-    """F/W at which every surface starts to slide: mu, or (arms) what friction at its true arm about the centre makes.
+    """F/W at which every surface starts to slide: mu, or with `arms` the value for friction at its true lever arm.
 
-    The contact lies at R from the centre and not at R - h: mu_bar = (mu R - mu' R') / (R_eff - R_eff'), with ' the
-    surface next inside. At the pivot that is zero, or the friction of the joint: with the side that slides first,
-    against the other.
+    The contact is at the distance R from the sphere centre, not R - h: mu_bar = (mu R - mu' R') / (R_eff - R_eff'), with
+    ' for the next surface inwards. At the pivot mu' R' is zero, or the friction moment of the joint, with opposite signs
+    for the side that slides first and the other one.
     """
     surfaces, radii = bearing.surfaces, effective_radii(bearing, device)
     if not arms:
         return {surface: surfaces[surface - 1].friction for surface in radii}
-    grip = {surface: s.friction * s.radius for surface, s in enumerate(surfaces, start=1)}
-    at_joint = 0.0 if device.joint is None else grip[device.joint]
-    first = min((chain for chain in (device.lower, device.upper) if chain), key=lambda chain: grip[chain[-1]])
+    moment = {surface: s.friction * s.radius for surface, s in enumerate(surfaces, start=1)}
+    at_joint = 0.0 if device.joint is None else moment[device.joint]
+    first = min((chain for chain in (device.lower, device.upper) if chain), key=lambda chain: moment[chain[-1]])
     found = {}
     for chain in filter(None, (device.lower, device.upper)):
         inner, radius = (-at_joint if chain == first else at_joint), 0.0
         for surface in reversed(chain):
-            found[surface] = (grip[surface] - inner) / (radii[surface] - radius)
-            inner, radius = grip[surface], radii[surface]
+            found[surface] = (moment[surface] - inner) / (radii[surface] - radius)
+            inner, radius = moment[surface], radii[surface]
     return found
 
 
 def displacement(bearing: Bearing, device: Device, force: Array, arms: bool) -> Array:
-    """Displacement u [m] of the small-angle formula at forces F/W: a slider tilts by F/W - mu, or hangs at a rim."""
+    """Displacement u [m] by the small-angle formula at forces F/W: a slider tilts by F/W - mu, up to its rim contact."""
     radii, starts = effective_radii(bearing, device), thresholds(bearing, device, arms)
     if device.textbook and not arms:
         radii = {surface: bearing.surfaces[surface - 1].radius for surface in radii}
@@ -129,8 +140,8 @@ def displacement(bearing: Bearing, device: Device, force: Array, arms: bool) -> 
     for chain in (device.lower, device.upper):
         tilt = np.zeros_like(force)
         for surface, inside in zip(chain, (*chain[1:], None), strict=False):
-            cup = bearing.surfaces[surface - 1]
-            tilt = np.minimum(np.maximum(force - starts[surface], 0.0), tilt + cup.capacity / cup.radius)
+            data = bearing.surfaces[surface - 1]
+            tilt = np.minimum(np.maximum(force - starts[surface], 0.0), tilt + data.capacity / data.radius)
             u += (radii[surface] - (radii[inside] if inside else 0.0)) * tilt
     return u
 
@@ -143,18 +154,30 @@ def formula(bearing: Bearing, device: Device, arms: bool = False) -> Callable[[A
 
 
 def figure(path: Path) -> None:
-    """F/W of every device: the run, friction circles, and the formula with and without the arms of friction."""
+    """Draw F/W of every device: the run, friction circles, and the formula with and without the arms of friction."""
     with page(11, 6.4, path) as whole:
         for device, axes in zip(DEVICES, whole.subplots(2, 3).flat, strict=True):
             result = run(device)
             bearing, u = result.scene.bearing, result.history.displacement[:, 0]
             grid = np.linspace(u[-1] / 500, u[-1], 500)
             axes.plot(u * MILLI, ratio(result)[:, 0], color=COLOURS[0], linewidth=3, alpha=0.5, label="run")
-            axes.plot(circles(device)[0] * MILLI, circles(device)[1], color=INK, linewidth=1, linestyle="--",
-                      label="friction circles")  # fmt: skip
+            axes.plot(
+                circles(device)[0] * MILLI,
+                circles(device)[1],
+                color=INK,
+                linewidth=1,
+                linestyle="--",
+                label="friction circles",
+            )
             axes.plot(grid * MILLI, formula(bearing, device)(grid), color=COLOURS[1], linewidth=1.2, label="published")
-            axes.plot(grid * MILLI, formula(bearing, device, True)(grid), color=COLOURS[2], linewidth=1.4,
-                      linestyle=":", label="with the arms of friction")  # fmt: skip
+            axes.plot(
+                grid * MILLI,
+                formula(bearing, device, True)(grid),
+                color=COLOURS[2],
+                linewidth=1.4,
+                linestyle=":",
+                label="with the arms of friction",
+            )
             axes.set_title(f"{device.title} ({bearing.layout.name.replace('_', ', ')})")
             axes.set(xlabel="displacement u [mm]", ylabel="F / W", xlim=(0, None), ylim=(0, None))
             axes.grid(color=FAINT, linewidth=0.4)
@@ -163,7 +186,7 @@ def figure(path: Path) -> None:
 
 
 def rows(device: Device) -> list[dict[str, float]]:
-    """F/W of the device at its displacements: u [m], run, circles, published, arms."""
+    """Rows of the table of one device: u [m], and F/W by run, friction circles, and formula without and with arms."""
     result = run(device)
     bearing, at = result.scene.bearing, np.array(device.at)
     columns = {
@@ -191,7 +214,7 @@ def table() -> str:
 
 
 def write_table(folder: Path) -> None:
-    """The page with its table measured anew."""
+    """Replace the table of the page."""
     text = (folder / "devices.md").read_text(encoding="utf-8")
     before, rest = text.split(MARKS[0])
     after = rest.split(MARKS[1])[1]

@@ -1,4 +1,4 @@
-"""What the figures of the results page share: the style of `msfp_gen.figures`, and parts of a run ready to draw."""
+"""Shared by the scripts that draw figures: the style of `msfp_gen.figures`, and quantities of a run."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.analysis.summary import axial_load
 from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page, panels
-from msfp_gen.summary import axial_load
-from msfp_gen.top import RigTop
+from msfp_gen.scene.top import RigTop
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,15 +20,28 @@ if TYPE_CHECKING:
 
     from msfp_gen.result import Result
 
-__all__ = ["COLOURS", "FAINT", "INK", "MILLI", "Array", "Runs", "closed_form", "closed_push", "cycle", "drawn",
-           "panels", "ratio", "tilts"]  # fmt: skip
+__all__ = [
+    "COLOURS",
+    "FAINT",
+    "INK",
+    "MILLI",
+    "Array",
+    "Runs",
+    "closed_form",
+    "closed_push",
+    "cycle",
+    "drawn",
+    "panels",
+    "ratio",
+    "tilts",
+]
 
 Array = NDArray[np.float64]
 Runs = Callable[[str], "Result"]  # a scene preset's name -> its run
 
 
 def drawn(path: Path, width: float, height: float) -> AbstractContextManager[Figure]:
-    """A figure in the project's style, written to `path` (whole or not at all) when the block ends without error."""
+    """A figure [inch] in the common style, written to `path` when the block ends without error."""
     return page(width, height, path)
 
 
@@ -41,7 +54,7 @@ def ratio(result: Result) -> Array:
 
 
 def tilts(result: Result) -> Array:
-    """delta_g = arccos(cos psi cos theta) of body g+1 against body g, ndarray, shape (T, n-1), [rad] (section 4.1)."""
+    """Relative tilt arccos(cos psi cos theta) of neighbouring bodies, shape (T, n-1) [rad] (PEER 2017/07, section 4.1)."""
     psi, theta = result.history.tilt_angles[..., 0], result.history.tilt_angles[..., 1]
     delta: Array = np.arccos(np.clip(np.cos(psi) * np.cos(theta), -1.0, 1.0))
     return delta
@@ -52,14 +65,14 @@ def cycle(result: Result, back: int = 1) -> slice:
     period = float(str(result.scene.motion.metadata["period"]))
     ends = result.scene.end - period * np.array([back, back - 1])
     start, stop = np.searchsorted(result.history.time, ends + 1e-9)
-    return slice(int(start) - 1, int(stop))  # from the row at or before its start: no gap where the loop closes
+    return slice(int(start) - 1, int(stop))  # from the row at or before the start, so that the loop closes
 
 
 def closed_form(result: Result, displacements: Array) -> Array:
     """F/N of the massless, rigid-plastic stack pushed from rest to each displacement [m], by friction circles.
 
-    The closed form pushes the top plate to +E1; here the base is pushed to +E1 under it. Mirrored, they are one run:
-    displacement across the bearing and force on the top support are both positive, as they are there.
+    The closed form pushes the top plate to +E1, the runs push the base to +E1. The two are mirror images: displacement
+    across the bearing and force on the top support are positive in both.
     """
     from reference.friction_circle import force_at
 
@@ -69,7 +82,7 @@ def closed_form(result: Result, displacements: Array) -> Array:
 
 
 def closed_push(result: Result) -> Push:
-    """The scene of a run on a rig, as the closed form takes it."""
+    """The scene of a run on a rig, as input of the closed form."""
     from reference.friction_circle import Push
 
     top = result.scene.top

@@ -1,11 +1,13 @@
-"""What effects cost, and that leaving them out is right: `python benchmarks/effects.py` prints the tables of
-docs/effects.md.
+"""Cost of effects, and error of leaving them out: `python benchmarks/effects.py` prints the tables of docs/effects.md.
 
-The first changes one effect of the full model at a time, on one scene. The second holds a run with all that
-the report models (and, where bodies part, uplift) against the run with the effects that the scene calls for: the time of
-either with rows at its own steps, the largest difference and the RMS of the difference of the top force over its peak in
-rows at even times. The third holds both to an error. Then what a row at an even time costs. Runs are repeated in turns and
-the fastest counts; the ratio comes last.
+- The first table changes one effect of the full model at a time, on one scene.
+- The second compares runs with all effects (with uplift only where bodies separate) with runs with selected effects:
+  the time of both with rows at the solver's own steps, and the largest and the RMS difference of the top force over its
+  peak, in rows at even times.
+- The third compares full and selected effects at equal error.
+- At the end the cost of a row at an even time, and the ratio of the full to the smallest model.
+
+Runs are repeated in turns and the fastest counts.
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ import numpy as np
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, load_scene, presets, simulate
 from msfp_gen.generator import generate
-from msfp_gen.layout import ModelSpec
+from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.result import Result
+from msfp_gen.specification.layout import ModelSpec
 
 SCENE, REPEATS = "fenz-test2", 15
 FULL = Effects()
@@ -41,7 +44,7 @@ VARIANTS: dict[str, Effects] = {
 
 
 def with_effects(scene: Scene, effects: Effects) -> Scene:
-    """The scene with other effects, its surfaces carrying what a law of friction needs."""
+    """The scene with other effects, and with the parameters that a friction law needs."""
     surfaces = scene.bearing.surfaces
     numbers = {
         "velocity": {"friction_slow": [surface.friction / 2 for surface in surfaces], "velocity_rate": 100.0},
@@ -52,7 +55,7 @@ def with_effects(scene: Scene, effects: Effects) -> Scene:
 
 
 def fastest(scenes: list[Scene], repeats: int = REPEATS) -> list[Result]:
-    """The fastest of several runs of each, taken in turns."""
+    """The fastest of several runs of each scene; the scenes are run in turns."""
     best: list[Result | None] = [None] * len(scenes)
     for _ in range(repeats):
         for index, scene in enumerate(scenes):
@@ -63,7 +66,7 @@ def fastest(scenes: list[Scene], repeats: int = REPEATS) -> list[Result]:
 
 
 def costs() -> None:
-    """One effect at a time."""
+    """Print the cost of one effect at a time."""
     scene = load_scene(SCENE)
     results = fastest([with_effects(scene, effects) for effects in VARIANTS.values()])
     first = results[0].counters
@@ -74,22 +77,25 @@ def costs() -> None:
         counters = result.counters
         each = counters.wall_time / counters.newton_iterations * first.newton_iterations / first.wall_time
         operations = generate(ModelSpec(scene.bearing.layout, effects), "model").operations
-        print(f"| {name} | {unknowns} | {states} | {operations} | {counters.steps} | "
-              f"{counters.wall_time / first.wall_time:.2f} | {each:.2f} |")  # fmt: skip
+        print(
+            f"| {name} | {unknowns} | {states} | {operations} | {counters.steps} | "
+            f"{counters.wall_time / first.wall_time:.2f} | {each:.2f} |"
+        )
 
 
 def sizes(scene: Scene, effects: Effects) -> tuple[int, int]:
-    """Unknowns of a step of all surfaces together, and states of friction and heat, which are local."""
+    """Unknowns of a step, and local states of friction and heat, of all surfaces."""
     surfaces, planar = scene.bearing.layout.surfaces, effects.dimension == "planar"
     angles = 1 if planar else 2 if effects.spin == "locked" else 3
-    apart = (2 if planar else 3) if effects.uplift else 0
+    separation = (2 if planar else 3) if effects.uplift else 0
     law = effects.law
-    local = (1 if planar else 2) + (law is not None) + (12 if law is not None and law.heats else 0)
-    return surfaces * (angles + apart), surfaces * local
+    heat = len(HEAT_KERNEL) if law is not None and law.depends_on_temperature else 0
+    local = (1 if planar else 2) + (law is not None) + heat
+    return surfaces * (angles + separation), surfaces * local
 
 
-def proofs() -> Iterator[tuple[str, Scene, Scene]]:
-    """Name, scene with everything, scene with what it calls for."""
+def pairs() -> Iterator[tuple[str, Scene, Scene]]:
+    """Name, scene with all effects, scene with selected effects."""
     for name in ("fenz-test1", "fenz-test2", "fenz-test3", "fenz-test4", "fenz-test5"):
         scene = replace(load_scene(name), output_step=0.02)
         yield name, replace(scene, effects=FULL), replace(scene, effects=Auto())
@@ -113,22 +119,25 @@ def _lifted() -> tuple[Scene, Scene]:
 
 
 def differences(one: Result, other: Result) -> tuple[float, float]:
-    """Largest difference and RMS difference of the top force, over its peak."""
-    apart = np.linalg.norm(one.history.top_force - other.history.top_force, axis=1)
+    """Largest and RMS difference of the top force, over its peak."""
+    difference = np.linalg.norm(one.history.top_force - other.history.top_force, axis=1)
     peak = np.linalg.norm(other.history.top_force[:, :2], axis=1).max() or np.abs(other.history.top_force).max()
-    return float(apart.max() / peak), float(np.sqrt(np.mean(apart**2)) / peak)
+    return float(difference.max() / peak), float(np.sqrt(np.mean(difference**2)) / peak)
 
 
-def proof() -> None:
-    """Everything against what the scene calls for."""
+def selection_table() -> None:
+    """Print the comparison of all effects with selected effects."""
     print("\n| scene | modelled | everything [ms] | chosen [ms] | ratio | largest | RMS |\n|" + "---|" * 7)
-    for name, everything, chosen in proofs():
+    for name, everything, chosen in pairs():
         largest, rms = differences(simulate(chosen), simulate(everything))
         full, fewer = fastest([replace(scene, output_step=None) for scene in (everything, chosen)], 5)
-        words = ", then ".join(_short(key) for key in fewer.provenance["model"].split(", then "))
+        models = ", then ".join(_short(key) for key in fewer.provenance["model"].split(", then "))
         times = [result.counters.wall_time for result in (full, fewer)]
-        print(f"| {name} | {words} | {times[0] * 1e3:.1f} | {times[1] * 1e3:.2f} | {times[0] / times[1]:.1f} | "
-              f"{largest:.1%} | {rms:.2%} |", flush=True)  # fmt: skip
+        print(
+            f"| {name} | {models} | {times[0] * 1e3:.1f} | {times[1] * 1e3:.2f} | {times[0] / times[1]:.1f} | "
+            f"{largest:.1%} | {rms:.2%} |",
+            flush=True,
+        )
 
 
 def _short(key: str) -> str:
@@ -137,7 +146,7 @@ def _short(key: str) -> str:
 
 
 def at_an_error(everything: Scene, chosen: Scene) -> None:
-    """Both at the loosest tolerance that keeps the force within an error of their own limits."""
+    """Print the cost of both at equal error: at the loosest tolerance with that error from their own converged run."""
     print("\n| largest error of force | everything | chosen | ratio |\n|" + "---|" * 4)
     tables = [list(errors(scene)) for scene in (everything, chosen)]
     for most in (1e-3, 5e-4, 1e-4, 5e-5):
@@ -149,18 +158,18 @@ def at_an_error(everything: Scene, chosen: Scene) -> None:
 
 
 def errors(scene: Scene) -> Iterator[tuple[float, float, float]]:
-    """Tolerance, largest error of the force over its peak in rows at even times, seconds without such rows."""
+    """Tolerance, largest error of the force over its peak in rows at even times, and wall time without such rows [s]."""
     rows = replace(scene, output_step=0.02)
     limit = simulate(replace(rows, solver=replace(scene.solver, method="esdirk4", rtol=1e-7)))
     for rtol in (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6):
         solver = replace(scene.solver, rtol=rtol)
         largest, _ = differences(simulate(replace(rows, solver=solver)), limit)
-        (own,) = fastest([replace(scene, solver=solver)])
-        yield rtol, largest, own.counters.wall_time
+        (timed,) = fastest([replace(scene, solver=solver)])
+        yield rtol, largest, timed.counters.wall_time
 
 
 def cost_of_a_row(scene: Scene) -> float:
-    """Seconds that a row at an even time costs, by many of them."""
+    """Wall time of one row at an even time [s], from runs with many of them."""
     count = 20_000
     few, many = (replace(scene, output_step=scene.end / rows) for rows in (count / 2, count))
     times = [result.counters.wall_time for result in fastest([few, many], 5)]
@@ -168,17 +177,17 @@ def cost_of_a_row(scene: Scene) -> float:
 
 
 def main() -> None:
-    """Print the tables, and the ratio of the smallest model to the full one."""
+    """Print the tables, and the ratio of the full to the smallest model."""
     costs()
-    proof()
+    selection_table()
     pair = [replace(load_scene(SCENE), effects=effects) for effects in (FULL, SMALL)]
     at_an_error(*pair)
     each = [f"{1e6 * cost_of_a_row(scene):.2f} us" for scene in pair]
-    print(f"\nA row at an even time: {each[0]} with everything, {each[1]} with what the scene calls for")
+    print(f"\nA row at an even time: {each[0]} with all effects, {each[1]} with selected effects")
     scene = load_scene(SCENE)
     full, small = fastest([replace(scene, effects=FULL), replace(scene, effects=Auto())])
     ratio = full.counters.wall_time / small.counters.wall_time
-    print(f"\n{SCENE}: spatial and inertial over what it calls for, {_short(small.provenance['model'])}: {ratio:.1f}")
+    print(f"\n{SCENE}: spatial and inertial over selected effects, {_short(small.provenance['model'])}: {ratio:.1f}")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
-"""The fuzz campaign of docs/stability.md: random valid scenes, each in a process that may be killed.
+"""The fuzz campaign of docs/stability.md: random valid scenes, run in a process that can be killed.
 
     python benchmarks/fuzz.py --scenes 10000 --seed 1
 
-Every run must end right or as a named failure: no number that is none, no crash, no hang, no success that energy, the
-friction disc or a second method (fuzz_second.py) contradicts. Exit code 1 otherwise, or if a thousandth of the
-sensible scenes fails. With --output the table goes to a JSON file; fuzz_page.py puts it into the page.
+Every run must end correctly or with a named failure: without values that are not finite, crashes or hangs, and without a
+success that contradicts the energy balance, the friction disc or a second method (fuzz_second.py). The exit code is 1
+otherwise, or if at least a thousandth of the sensible scenes fails. --output writes the table to a JSON file, from which
+fuzz_page.py fills the page.
 """
 
 from __future__ import annotations
@@ -27,21 +28,21 @@ from rich.progress import track
 from msfp_gen import Effects, Layout, build_model
 
 HERE = Path(__file__).parent
-LIMIT = 120.0  # [s] for one scene, a hundred times what most take and ten times the longest
-SAVED = 100  # scenes between two writings of the table
-ALLOWED = 1e-3  # share of sensible scenes that may fail
+LIMIT = 120.0  # wall time of one scene [s]; a hundred times that of most scenes, ten times that of the slowest
+SAVED = 100  # scenes between two writes of the table
+ALLOWED = 1e-3  # largest share of sensible scenes that fail
 Row = dict[str, Any]
 
 
 class Worker:
-    """A process that runs scenes by their number; killed where it hangs, started again where it died."""
+    """A process that runs scenes by their number. It is killed if it hangs, and restarted after that or a crash."""
 
     def __init__(self, seed: int, limit: float, which: str = "all") -> None:
         self.seed, self.limit, self.which = seed, limit, which
         self.process: subprocess.Popen[str] | None = None
 
     def ask(self, task: str, number: int) -> Row:
-        """What became of `task` ("run" or "check") for one scene; status "hang" or "crash" if the process did."""
+        """Result of `task` ("run" or "check") for one scene; its status is "hang" or "crash" if the process failed."""
         if self.process is None:
             command = [sys.executable, str(HERE / "fuzz_worker.py"), str(self.seed), self.which]
             self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -62,7 +63,7 @@ class Worker:
         return {"number": number, "status": "crash", "message": reason}
 
     def ended(self) -> int:
-        """The exit code of the process, once its pipes are closed."""
+        """Wait for the end of the process; returns its exit code."""
         assert self.process is not None
         process, self.process = self.process, None
         with process:
@@ -76,29 +77,32 @@ class Worker:
 
 
 def build_all(specs: list[Any]) -> None:
-    """Every model before the clock of a scene runs."""
+    """Build all models, so that the time limit of a scene does not include builds."""
     for layout, words in track(specs, "building models", disable=not sys.stderr.isatty()):
         build_model(Layout(*layout), Effects(**words))
 
 
-def campaign(worker: Worker, scenes: int, wanted: int) -> Iterator[tuple[Row, Row | None]]:
-    """Run scenes; hold a success against the second method whenever verdicts are behind what is wanted by then."""
-    verdicts = done = number = 0
+def campaign(worker: Worker, scenes: int, comparisons: int) -> Iterator[tuple[Row, Row | None]]:
+    """Run `scenes` scenes, and compare about `comparisons` successes with the second method, evenly distributed."""
+    compared = done = number = 0
     while done < scenes:
         row, found = worker.ask("run", number), None
         if row["status"] != "passed over":
             done += 1
-            if row["status"] == "ok" and row["checkable"] and verdicts < wanted * done / scenes:
+            if row["status"] == "ok" and row["checkable"] and compared < comparisons * done / scenes:
                 found = worker.ask("check", number)
-                verdicts += "agrees" in found
+                compared += "agrees" in found
             yield row, found
         number += 1
 
 
 def faults(rows: list[Row], checks: list[Row]) -> list[str]:
-    """What must not be, one line each."""
-    out = [f"{r['number']}: {r['status']}: {r['message']}" for r in rows
-           if r["status"] in ("hang", "crash", "refused") or r["status"].startswith("unnamed")]  # fmt: skip
+    """Everything that must not happen, one line each."""
+    out = [
+        f"{r['number']}: {r['status']}: {r['message']}"
+        for r in rows
+        if r["status"] in ("hang", "crash", "refused") or r["status"].startswith("unnamed")
+    ]
     out += [f"{r['number']}: not finite: {', '.join(r['not_finite'])}" for r in rows if r.get("not_finite")]
     out += [f"{r['number']}: success with {', '.join(r['wrong'])}" for r in rows if r.get("wrong")]
     out += [
@@ -108,7 +112,7 @@ def faults(rows: list[Row], checks: list[Row]) -> list[str]:
 
 
 def table(rows: list[Row], checks: list[Row]) -> Row:
-    """The campaign in numbers."""
+    """The results of the campaign as counts."""
     sensible = [r for r in rows if r.get("sensible")]
     failed = [r for r in sensible if r["status"] not in ("ok", "stopped")]
     counts: Counter[str] = Counter()
@@ -116,45 +120,49 @@ def table(rows: list[Row], checks: list[Row]) -> Row:
     for row in rows:
         counts.update(row.get("counts", {}))
         used.update(name for name, value in row.get("counts", {}).items() if value)
-    verdicts = [c for c in checks if "agrees" in c]
+    compared = [c for c in checks if "agrees" in c]
     return {
-        "scenes": len(rows), "models": len({r["spec"] for r in rows if "spec" in r}),
+        "scenes": len(rows),
+        "models": len({r["spec"] for r in rows if "spec" in r}),
         "ends": dict(Counter(r["status"] for r in rows).most_common()),
-        "sensible": len(sensible), "sensible_ends": dict(Counter(r["status"] for r in sensible).most_common()),
+        "sensible": len(sensible),
+        "sensible_ends": dict(Counter(r["status"] for r in sensible).most_common()),
         "sensible_failures": [f"{r['number']} {r['spec']}: {r['message']}" for r in failed],
         "faults": faults(rows, checks),
         "noted": sum(r["status"] == "ok" and r.get("noted", False) for r in rows),
         "sensible_noted": sum(r["status"] == "ok" and r.get("noted", False) for r in sensible),
         "longest": round(max(r.get("wall", 0.0) for r in rows), 1),
-        "checked": len(verdicts), "no_verdict": len(checks) - len(verdicts),
-        "largest_deviation": max((c["deviation"] for c in verdicts), default=None),
-        "counts": dict(counts), "scenes_with": dict(used),
-    }  # fmt: skip
+        "checked": len(compared),
+        "no_verdict": len(checks) - len(compared),
+        "largest_deviation": max((c["deviation"] for c in compared), default=None),
+        "counts": dict(counts),
+        "scenes_with": dict(used),
+    }
 
 
 def commit() -> str:
-    """Of the code that runs."""
-    asked = subprocess.run(["git", "-C", str(HERE), "describe", "--always", "--dirty"], capture_output=True, text=True)
-    return asked.stdout.strip()
+    """The commit of this checkout."""
+    done = subprocess.run(["git", "-C", str(HERE), "describe", "--always", "--dirty"], capture_output=True, text=True)
+    return done.stdout.strip()
 
 
 def save(found: Row, path: Path | None) -> None:
-    """Write what there is, so that a campaign that is stopped leaves its part."""
+    """Write the table so far, so that a campaign that is stopped leaves its results."""
     if path is not None:
         path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run, print the table, say by the exit code whether it is as it must be."""
+    """Run the campaign and print its table; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--check", type=int, default=500, help="successes to hold against the second method")
-    parser.add_argument("--limit", type=float, default=LIMIT, help="seconds for one scene")
+    parser.add_argument("--check", type=int, default=500, help="number of successes to compare with the second method")
+    parser.add_argument("--limit", type=float, default=LIMIT, help="wall time of one scene [s]")
     parser.add_argument("--output", type=Path, help="JSON file for the table")
     group = parser.add_mutually_exclusive_group()
-    group.add_argument("--short", dest="which", action="store_const", const="short", help="a few of the models")
-    group.add_argument("--sensible", dest="which", action="store_const", const="sensible", help="no other scenes")
+    group.add_argument("--short", dest="which", action="store_const", const="short", help="only a few of the models")
+    group.add_argument("--sensible", dest="which", action="store_const", const="sensible", help="only sensible scenes")
     given = parser.parse_args(words)
     which = given.which or "all"
     build_all(SHORT if which == "short" else SPECS)

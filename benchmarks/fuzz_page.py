@@ -1,4 +1,4 @@
-"""The tables of the fuzz campaign in docs/stability.md, from the JSON files that fuzz.py writes (one a seed).
+"""Write the tables of the fuzz campaign in docs/stability.md from the JSON files of fuzz.py, one per seed.
 
 python benchmarks/fuzz_page.py benchmarks/results/fuzz-*.json
 """
@@ -14,19 +14,19 @@ from typing import Any
 
 PAGE = Path(__file__).parents[1] / "docs" / "stability.md"
 MARKS = ("<!-- fuzz -->\n", "<!-- end of fuzz -->\n")
-RUNGS = ("other_starts", "halved_newton_steps", "fresh_tangents", "newton_failures", "quasistatic_starts")
+FALLBACKS = ("other_starts", "halved_newton_steps", "fresh_tangents", "newton_failures", "quasistatic_starts")
 
 
 def summed(parts: list[dict[str, Any]], name: str) -> Counter[str]:
-    """A table of counts over all files."""
+    """Sum of a table of counts over all files."""
     return sum((Counter(part[name]) for part in parts), Counter())
 
 
 def tables(parts: list[dict[str, Any]]) -> str:
-    """Ends of all scenes and of the sensible ones, and what each rung of Newton's ladder did."""
+    """Tables of the final status of all and of sensible scenes, and of the fallbacks of Newton's method."""
     scenes, sensible = (sum(part[name] for part in parts) for name in ("scenes", "sensible"))
     faults, failures = ([x for part in parts for x in part[name]] for name in ("faults", "sensible_failures"))
-    checked, silent = (sum(part[name] for part in parts) for name in ("checked", "no_verdict"))
+    compared, undecided = (sum(part[name] for part in parts) for name in ("checked", "no_verdict"))
     ends, good = summed(parts, "ends"), summed(parts, "sensible_ends")
     counts, used = summed(parts, "counts"), summed(parts, "scenes_with")
     worst = max((part["largest_deviation"] or 0.0 for part in parts), default=0.0)
@@ -34,23 +34,25 @@ def tables(parts: list[dict[str, Any]]) -> str:
     commits = ", ".join(sorted({part["commit"] for part in parts}))
     lines = [
         f"{scenes} scenes of {parts[0]['models']} models (seeds {drawn}; commit {commits}): {len(faults)} faults. Of {sensible} sensible ones "
-        f"{len(failures)} failed, {100 * len(failures) / max(sensible, 1):.2g} %. {checked} successes were held against the "
-        f"second method, the largest deviation {worst:.2f} of what is allowed; for {silent} more it found no solution of its own.",
+        f"{len(failures)} failed, {100 * len(failures) / max(sensible, 1):.2g} %. {compared} successes were compared with "
+        f"the second method; the largest deviation is {worst:.2f} of the permitted one. For {undecided} more the second method found no solution.",
         "",
-        "| end | scenes | sensible |",
+        "| status | scenes | sensible |",
         "|---|---|---|",
         *(f"| {end} | {number} | {good[end]} |" for end, number in ends.most_common()),
         "",
-        "| rung | times | a thousand steps | scenes that used it |",
+        "| fallback | uses | uses per thousand steps | scenes that used it |",
         "|---|---|---|---|",
-        *(f"| `{rung}` | {counts[rung]} | {1000 * counts[rung] / counts['steps']:.3g} | {100 * used[rung] / scenes:.1f} % |"
-          for rung in RUNGS),
-    ]  # fmt: skip
+        *(
+            f"| `{fallback}` | {counts[fallback]} | {1000 * counts[fallback] / counts['steps']:.3g} | {100 * used[fallback] / scenes:.1f} % |"
+            for fallback in FALLBACKS
+        ),
+    ]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
-    """Write them between the marks of the page."""
+    """Write the tables between the marks of the page."""
     parts = [json.loads(Path(name).read_text(encoding="utf-8")) for name in sys.argv[1:]]
     text = PAGE.read_text(encoding="utf-8")
     begin, end = (re.escape(mark) for mark in MARKS)

@@ -1,7 +1,7 @@
-"""Random valid scenes for the fuzz campaign, and which of them an engineer would call sensible.
+"""Random valid scenes for the fuzz campaign, and the criteria for sensible scenes.
 
-Scene number i of a seed is always the same. Most scenes are ordinary; every choice has a wide range too, out of which
-one in twenty is drawn: hard rims, no friction or a lot, loads near nothing, sliders of a gram, motion beyond capacity.
+Scene number i of a seed is always the same. Every parameter has a usual range, and a wide range from which one in twenty
+is drawn: stiff rims, no or high friction, loads near zero, sliders of a gram, motion beyond capacity.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top
-from msfp_gen.scene import InitialState
-from msfp_gen.top import MassTop, RigTop
+from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.top import MassTop, RigTop
 
 Layers = tuple[int, int, int]
-# What is built once and drawn from: layouts of 2 to 9 bodies, every effect in some of them.
+# The models: layouts of 2 to 9 bodies, with every effect in some of them.
 SPECS: list[tuple[Layers, dict[str, Any]]] = [
     ((2, 1, 0), {}),
     ((2, 0, 1), {"dimension": "planar"}),
@@ -47,10 +47,10 @@ SPECS: list[tuple[Layers, dict[str, Any]]] = [
     ((9, 4, 4), {"dimension": "planar"}),
     ((9, 4, 4), {}),
 ]
-SHORT = [spec for spec in SPECS if spec[0][0] <= 5][::4]  # for a test of a minute
-WIDE = 0.05  # share of choices out of the wide range
+SHORT = [spec for spec in SPECS if spec[0][0] <= 5][::4]  # models of the short campaign, about a minute
+WIDE = 0.05  # share of parameters drawn from the wide range
 GRAVITY = 9.8
-EXPLICIT_STEPS = 10_000  # what an explicit method may need
+EXPLICIT_STEPS = 10_000  # most steps of a run with an explicit method
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Draw:
         return float(self.rng.uniform(low, high))
 
     def decades(self, usual: tuple[float, float], wide: tuple[float, float] | None = None) -> float:
-        """Even over the logarithm of the usual range; now and then of the wide one."""
+        """Uniform in the logarithm over the usual range, or with probability WIDE over the wide one."""
         low, high = wide if wide is not None and self.chance(WIDE) else usual
         return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
 
@@ -83,7 +83,7 @@ class Draw:
 
 
 def a_bearing(draw: Draw, layout: Layers, law: str) -> Bearing:
-    """Radii that shrink inwards; in the wide range in any order."""
+    """A bearing whose radii decrease inwards; in the wide range in any order."""
     n, up, down = layout
     outer, ratio = draw.decades((0.3, 3.0), (0.05, 100.0)), draw.flat(0.35, 0.8)
     nested = [outer * ratio**i for i in range(up)] + [outer * ratio**i for i in range(down)][::-1]
@@ -91,12 +91,17 @@ def a_bearing(draw: Draw, layout: Layers, law: str) -> Bearing:
         draw.rng.shuffle(nested)
     bodies = [a_body(draw, outer, min(nested)) for _ in range(n - 1)]
     surfaces = [a_surface(draw, radius, law) for radius in nested]
-    return Bearing(layout=Layout(*layout), base_height=0.03, surfaces=surfaces, bodies=bodies,
-                   base_rim_radius=min(0.15 * outer, 0.4 * min(nested)))  # fmt: skip
+    return Bearing(
+        layout=Layout(*layout),
+        base_height=0.03,
+        surfaces=surfaces,
+        bodies=bodies,
+        base_rim_radius=min(0.15 * outer, 0.4 * min(nested)),
+    )
 
 
 def a_law(draw: Draw, law: str, friction: float) -> dict[str, float]:
-    """Numbers of a law: slower means less friction; a patch that feels tens of megapascals."""
+    """Parameters of a friction law: less friction at low velocity; a patch under tens of megapascals."""
     if law == "velocity":
         return {"friction_slow": friction * draw.flat(0.3, 1.0), "velocity_rate": draw.decades((10.0, 200.0))}
     return {"reference_pressure": 3e7, "patch_radius": draw.decades((0.03, 0.3))} if law == "pvt" else {}
@@ -130,7 +135,7 @@ def a_body(draw: Draw, outer: float, least: float) -> Body:
 
 
 def a_top(draw: Draw, layout: Layers) -> Top:
-    """A rig, a load or a mass. The plate of a single pendulum is its slider: nothing may hold its tilt."""
+    """A rig, a load or a mass. The plate of a single pendulum is its slider, so nothing restrains its tilt."""
     load = draw.decades((3e3, 5e6), (1.0, 1e7))
     held = 0.0 if layout[0] == 2 or draw.chance(0.5 * WIDE) else draw.decades((10.0, 100.0)) * load
     damping = draw.one([0.0, 0.01 * held])
@@ -144,13 +149,13 @@ def a_top(draw: Draw, layout: Layers) -> Top:
 
 
 def reach(bearing: Bearing) -> float:
-    """What the outer surfaces travel without a rim [m]."""
+    """Displacement that the outer surfaces allow without rim contact [m]."""
     ends = (bearing.surfaces[0], bearing.surfaces[-1])
     return min(s.capacity for s in ends) * (1 if len(bearing.surfaces) == 1 else 2)
 
 
 def a_motion(draw: Draw, bearing: Bearing, effects: Effects) -> Motion:
-    """Sine, circle, figure of eight, steady push or noise of random size and speed; a tenth of them shaken vertically."""
+    """Sine, circle, figure of eight, push or noise of random amplitude and speed; some of the noise is vertical too."""
     size = reach(bearing) * (draw.flat(1.0, 1.5) if draw.chance(2 * WIDE) else draw.flat(0.05, 0.8))
     frequency = min(draw.decades((0.1, 2.0), (1e-3, 50.0)), 0.5 / np.sqrt(size))  # 1 g at most
     planar, w = effects.dimension == "planar", 2 * np.pi * frequency
@@ -169,7 +174,10 @@ def a_motion(draw: Draw, bearing: Bearing, effects: Effects) -> Motion:
 
 
 def noise(draw: Draw, size: float, azimuth: float, planar: bool, vertical: float) -> Motion:
-    """Two to six seconds of accelerations like those of an earthquake, that displace by `size`; some shake vertically."""
+    """Earthquake-like motion of two to six seconds with peak displacement `size` [m], some with vertical motion.
+
+    vertical: largest peak vertical acceleration [g].
+    """
     duration, step = draw.flat(2.0, 6.0), 0.01
     t = np.arange(0.0, duration, step)
     waves = [(draw.decades((0.3, 5.0)), draw.flat(0, 6.28), draw.rng.normal(size=3)) for _ in range(8)]
@@ -185,13 +193,15 @@ def noise(draw: Draw, size: float, azimuth: float, planar: bool, vertical: float
 
 
 def a_start(draw: Draw, bearing: Bearing, top: Top, effects: Effects) -> InitialState | None:
-    """At rest in the middle, or a little off it; not against the springs of a rig, and not in a plane."""
+    """None for a start at rest at the centre, or a displaced state; not for rigs, whose springs would act, or planar models."""
     free = effects.dimension == "spatial" and not effects.uplift and not isinstance(top, RigTop)
     if not free or not draw.chance(2 * WIDE):
         return None
     rows = range(bearing.layout.surfaces)
-    q = [(0.3 * s.capacity / s.radius * draw.flat(-1, 1), 0.3 * s.capacity / s.radius * draw.flat(-1, 1), 0.0)
-         for s in bearing.surfaces]  # fmt: skip
+    q = [
+        (0.3 * s.capacity / s.radius * draw.flat(-1, 1), 0.3 * s.capacity / s.radius * draw.flat(-1, 1), 0.0)
+        for s in bearing.surfaces
+    ]
     return InitialState(
         q, [(0.0, 0.0, 0.0) for _ in rows], [(draw.flat(-0.6, 0.6), draw.flat(-0.6, 0.6)) for _ in rows]
     )
@@ -211,27 +221,35 @@ def case(seed: int, number: int, short: bool = False) -> Case:
     if explicit:
         duration = min(motion.duration, EXPLICIT_STEPS / 6 / explicit_rate(bearing, top))
     solver = Solver(method="dopri5" if explicit else "implicit", rtol=rtol, max_steps=100_000)
-    scene = Scene(bearing, motion, top, effects, solver, duration=duration, initial_state=start,
-                  output_step=draw.one([None, None, 0.01]) if motion.duration > 0.1 and not explicit else None,
-                  name=f"fuzz-{seed}-{number}")  # fmt: skip
+    scene = Scene(
+        bearing,
+        motion,
+        top,
+        effects,
+        solver,
+        duration=duration,
+        initial_state=start,
+        output_step=draw.one([None, None, 0.01]) if motion.duration > 0.1 and not explicit else None,
+        name=f"fuzz-{seed}-{number}",
+    )
     return Case(number, scene)
 
 
-# ---- what a scene asks -----------------------------------------------------------------------------------------
+# ---- properties of a scene -------------------------------------------------------------------------------------
 
 
 def load_of(top: Top) -> float:
-    """What presses [N]."""
+    """Axial load [N]."""
     if isinstance(top, MassTop):
         return top.mass * GRAVITY
     return top.axial_load if isinstance(top, RigTop) else -top.force[2]  # type: ignore[attr-defined]
 
 
 def explicit_rate(bearing: Bearing, top: Top) -> float:
-    """Steps a second that stability of an explicit method asks for: the fastest stuck mode over 3 [1/s].
+    """Steps per second for stability of an explicit method: the highest frequency of stuck sliders over 3 [1/s].
 
-    A slider turns against mu N R^2/d_y and its rims, k R^2; the lightest body has the least inertia about a sphere
-    centre, J + m (R - z)^2. A damper on a light plate is faster still.
+    The rotational stiffness of a slider is mu N R^2/d_y, and that of its rims k R^2; the lightest body has the least
+    inertia about a sphere centre, J + m (R - z)^2. A damper on a light plate may have a higher rate.
     """
     load, worst = load_of(top) + 1.0, 1.0
     stiffness = max(s.friction * load / s.yield_displacement for s in bearing.surfaces)
@@ -249,41 +267,43 @@ def explicit_rate(bearing: Bearing, top: Top) -> float:
 
 
 def wide(bearing: Bearing) -> bool:
-    """Whether each slider is a tenth as wide as the sphere it slides in: friction then presses within its footprint."""
+    """Whether the radius of every slider is at least a tenth of its sphere's, so that it does not tip under friction."""
     rows = enumerate(bearing.surfaces)
     return all(bearing.slider_rim_radius(i) >= max(0.1, s.friction) * s.radius for i, s in rows)
 
 
 def sensible(scene: Scene) -> bool:
-    """What an engineer would ask for; every line is a condition."""
+    """Whether the scene is sensible in practice; every line is a condition."""
     bearing, top, effects, solver = scene.bearing, scene.top, scene.effects, scene.solver
     load, radii = load_of(top), [s.radius for s in bearing.surfaces]
     m, p = bearing.layout.m, bearing.layout.p
     middle = [np.diff(radii[:m]), -np.diff(radii[m:])]
-    base, peak = scene.motion.displacement(np.linspace(0, scene.end, 400)), scene.motion.acceleration(
-        np.linspace(0, scene.end, 400))  # fmt: skip
+    base, peak = (
+        scene.motion.displacement(np.linspace(0, scene.end, 400)),
+        scene.motion.acceleration(np.linspace(0, scene.end, 400)),
+    )
     demand = float(np.linalg.norm(base[:, :2], axis=1).max())
     held = getattr(top, "rotational_stiffness", 0.0)
     return bool(
-        all(0.005 <= s.friction <= 0.2 for s in bearing.surfaces)  # neither ice nor rubber
-        and all(5e-5 <= s.yield_displacement <= 2e-3 for s in bearing.surfaces)  # sticks and slips, resolvably
+        all(0.005 <= s.friction <= 0.2 for s in bearing.surfaces)  # usual friction coefficients
+        and all(5e-5 <= s.yield_displacement <= 2e-3 for s in bearing.surfaces)  # usual yield displacements
         and all(1e6 <= s.rim_stiffness <= 1e8 for s in bearing.surfaces)
         and all(s.capacity <= 0.3 * s.radius for s in bearing.surfaces)  # tilts of 0.3 rad at most
         and min(radii[0], radii[-1]) >= 0.25
         and max(radii) <= 5.0
         and all((steps <= 0).all() for steps in middle)
-        and ((m and p) or len(radii) <= 2)  # radii shrink inwards
+        and ((m and p) or len(radii) <= 2)  # radii decrease inwards
         and all(0.05 <= b.mass <= 20.0 for b in bearing.bodies)
         and load >= 3e3
         and load >= 10 * sum(b.mass for b in bearing.bodies) * GRAVITY
-        and (bearing.layout.n == 2 or held >= 10.0 * load)  # the building or the rig holds the top plate level
+        and (bearing.layout.n == 2 or held >= 10.0 * load)  # building or rig restrains the tilt of the top plate
         and not (isinstance(top, RigTop) and not 30 * load <= top.stiffness <= 1e4 * load)
         and demand <= (0.8 if isinstance(top, RigTop) else 0.4) * reach(bearing)  # within capacity
         and np.abs(peak[:, :2]).max() <= 1.0 * GRAVITY
-        and (effects.uplift or np.abs(peak[:, 2]).max() <= 0.3 * GRAVITY)  # the load stays above zero
-        and solver.method == "implicit"  # the explicit one is there for comparison
+        and (effects.uplift or np.abs(peak[:, 2]).max() <= 0.3 * GRAVITY)  # the load does not vanish
+        and solver.method == "implicit"  # the explicit method is for comparison only
         and scene.initial_state is None
-        and not (isinstance(top, MassTop) and effects.sliders == "massless")  # inertia through slopes alone
+        and not (isinstance(top, MassTop) and effects.sliders == "massless")  # inertia acts only through the slopes
         and (not effects.uplift or wide(bearing))  # sliders that do not tip
         and 1e-5 <= solver.rtol <= 1e-3
     )

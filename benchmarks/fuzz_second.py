@@ -1,8 +1,8 @@
-"""A second method for runs: the report's balances by plain vectors (tests/reference), stepped by an implicit method of its own.
+"""A second method for runs: the balances of PEER 2017/07 in vector form (tests/reference) with an implicit method of its own.
 
-Nothing is shared with the package but the scene: kinematics, contact, rims and friction come from `reference`, which
-knows no condensation; all unknowns (2.119) and Y, Z are solved together, with Jacobians by complex steps; the method
-is the two-stage SDIRK of Alexander (1977). It goes over some rows of a run again, from the state of the first.
+Only the scene is shared with the package. Kinematics, contact, rims and friction come from `reference`, without
+condensation; all unknowns (2.119) and Y, Z are solved together, with Jacobians by complex steps. The method is the
+two-stage SDIRK of Alexander (1977). It repeats some rows of a run from the state of the first of them.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from reference import forces, kinematics, stack
 
 from msfp_gen import Scene
-from msfp_gen.history import History
-from msfp_gen.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.results.history import History
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 
 Array = Any
 GAMMA = 1 - 1 / np.sqrt(2)
@@ -29,12 +29,12 @@ E3 = np.array([0.0, 0.0, 1.0])
 
 
 class UnsolvedError(ArithmeticError):
-    """The second method found no solution: it says nothing about the first."""
+    """The second method found no solution, so the run is not checked."""
 
 
 @dataclass
 class Jacobian:
-    """The last Jacobian, for other stages of the same beta."""
+    """The last Jacobian, which is reused for stages with the same beta."""
 
     value: Array = None
     beta: float = 0.0
@@ -46,7 +46,7 @@ class Jacobian:
 
 @dataclass(frozen=True)
 class Marched:
-    """What is compared, at rows 1.. of the window: top force (k, 3) [N], angles (k, n-1, 3) [rad], Y and Z (k, n-1, 2)."""
+    """Results at rows 1.. of the window: top force (k, 3) [N], angles (k, n-1, 3) [rad], Y and Z (k, n-1, 2)."""
 
     force: Array
     q: Array
@@ -54,7 +54,7 @@ class Marched:
 
 
 class Second:
-    """One scene for the second method."""
+    """The second method for one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.bearing, self.top = scene, scene.bearing, scene.top
@@ -63,12 +63,12 @@ class Second:
         self.anchor = scene.motion.displacement(0.0)[:2]
         gravity = scene.bearing.gravity
         weight = sum(b.mass for b in self.bearing.bodies) * gravity
-        own = {
+        loads = {
             RigTop: lambda t: t.axial_load,
             MassTop: lambda t: t.mass * gravity,
             PrescribedTop: lambda t: -t.force[2],
         }
-        self.size = weight + own[type(self.top)](self.top)
+        self.size = weight + loads[type(self.top)](self.top)
 
     def base(self, t: float) -> Any:
         """Motion of the base at a time."""
@@ -119,15 +119,19 @@ class Second:
         return np.array(rows), forces.friction_rates(bearing, f, act.touch.slip, law), load.force
 
     def stage(self, t: float, start: tuple[Array, Array, Array], beta: float, guess: Array, known: Jacobian) -> Any:
-        """Solve one stage: rates v, contact angles, N and Y, Z, with q = Q + beta v, a = (v - V)/beta, f = F + beta f'."""
+        """Solve one stage for v, contact angles, N and Y, Z, with q = Q + beta v, a = (v - V)/beta, f = F + beta f'."""
         Q, V, F = start
         n, base = self.count, self.base(t)
         scale = np.concatenate([np.full(3 * n, 1.0), np.full(2 * n, 1.0), np.full(n, self.size), np.full(2 * n, 1.0)])
 
         def parts(x: Array) -> Any:
             x = x * scale
-            v, angles, normal, f = (x[: 3 * n].reshape(n, 3), x[3 * n : 5 * n].reshape(n, 2), x[5 * n : 6 * n],
-                                    x[6 * n :].reshape(n, 2))  # fmt: skip
+            v, angles, normal, f = (
+                x[: 3 * n].reshape(n, 3),
+                x[3 * n : 5 * n].reshape(n, 2),
+                x[5 * n : 6 * n],
+                x[6 * n :].reshape(n, 2),
+            )
             return kinematics.State(Q + beta * v, v, (v - V) / beta, base), f, angles, normal
 
         def residual(x: Array) -> Array:
@@ -141,7 +145,7 @@ class Second:
         return x * scale, state, f, rates, force
 
     def march(self, history: History, rows: range, halved: bool = False) -> Marched:
-        """From the state of the first row over the times of the others, each step whole or in two halves."""
+        """Integrate from the state of the first row to the times of the others, in one step each or in two halves."""
         i = rows[0]
         q, v, f = history.tilt_angles[i], history.tilt_rates[i], history.friction_state[i]
         guess = np.concatenate([v.ravel(), history.contact_angles[i].ravel(), history.normal_force[i], f.ravel()])
@@ -152,11 +156,11 @@ class Second:
             times = np.linspace(t0, t1, 3 if halved else 2)
             for a, b in pairwise(times):
                 q, v, f, guess, force = self.step(float(a), float(b - a), q, v, f, guess, known)
-            found.append((-force, q, f))  # of the bearing on its support
+            found.append((-force, q, f))  # the force of the bearing on its support
         return Marched(*(np.array(column) for column in zip(*found, strict=True)))
 
     def step(self, t: float, h: float, q: Array, v: Array, f: Array, guess: Array, known: Jacobian) -> Any:
-        """Two stages; stiffly accurate, so the last one is the end of the step."""
+        """One step of two stages; the method is stiffly accurate, so the second stage is the end of the step."""
         beta = GAMMA * h
         known.at(beta)
         guess, one, _, rates, _ = self.stage(t + beta, (q, v, f), beta, guess, known)
@@ -167,7 +171,7 @@ class Second:
 
 
 def newton(residual: Any, x: Array, known: Jacobian) -> Array:
-    """Newton, damped where its Jacobian is fresh; an old one serves as long as it takes two thirds off the residual."""
+    """Newton's method, damped with a new Jacobian; an old one is reused while it reduces the residual to a third."""
     r = residual(x)
     size = float(np.abs(r).max())
     for _ in range(80):

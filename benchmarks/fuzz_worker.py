@@ -1,6 +1,6 @@
-"""One worker of the fuzz campaign: reads lines "run NUMBER" or "check NUMBER", answers each with a line of JSON.
+"""One worker of the fuzz campaign: reads lines "run NUMBER" or "check NUMBER" and answers each with a line of JSON.
 
-Started by fuzz.py, which kills it where it hangs.
+fuzz.py starts it, and kills it if it hangs.
 """
 
 from __future__ import annotations
@@ -18,36 +18,40 @@ from fuzz_second import Second
 
 from msfp_gen import InputError, RunError, Scene, simulate
 from msfp_gen.result import Result
-from msfp_gen.top import MassTop
+from msfp_gen.scene.top import MassTop
 
-MEMORY = 4 << 30  # [bytes] a run that asks for more ends as a named failure, not as a machine without memory
-ROWS = 8  # of a run that the second method goes over
-NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard", "stiff")
+MEMORY = 4 << 30  # memory limit [bytes]; a run that needs more ends with a named failure
+ROWS = 8  # rows of a run that the second method repeats
+NAMES = ("newton", "step", "irregular", "uplift", "angle", "steps", "parted", "guard", "stiff", "law")
 
 
 def not_finite(result: Result) -> list[str]:
-    """Names of what holds a number that is none."""
+    """Names of arrays with values that are not finite."""
     arrays = {**vars(result.history), **result.history.energy}
     return [name for name, values in arrays.items() if isinstance(values, np.ndarray) and not np.isfinite(values).all()]
 
 
 def wrong(result: Result) -> list[str]:
-    """What cannot be of a run that claims to be right, whatever the scene."""
+    """Violations of conditions that every successful run must meet."""
     history, energy, rtol = result.history, result.history.energy, result.scene.solver.rtol
     surfaces = result.scene.bearing.surfaces
     rise = sum(float(s.max()) ** 2 / (2 * x.radius) for s, x in zip(history.sliding.T, surfaces, strict=True))
-    # Not what is put in alone: that is the difference of what the load and the base do, and next to nothing where springs
-    # that were bent at the start give back what the dampers take.
+    # The input alone is no measure: it is the difference of the work of load and base, and nearly zero where springs that
+    # were deformed at the start supply what the dampers dissipate.
     terms = [float(np.abs(values).max()) for name, values in energy.items() if name != "numerical"]
     peak = max(*terms, load_of(result.scene.top) * rise, 1e-12)
-    unresolved = 3 * float(history.normal_force.max()) * result.scene.solver.angle_tolerance * max(
-        s.friction * s.radius for s in surfaces)  # fmt: skip
+    unresolved = (
+        3
+        * float(history.normal_force.max())
+        * result.scene.solver.angle_tolerance
+        * max(s.friction * s.radius for s in surfaces)
+    )
     found = []
     closure = float(np.abs(energy["numerical"]).max())
     if closure > max(0.03, 30 * rtol) * peak + unresolved and "energy" not in {note.kind for note in result.notes}:
         found.append(f"energy {closure / peak:.2g}")
     disc = float(np.linalg.norm(history.friction_state, axis=2).max()) - 1
-    # The error control gives a step one tolerance beyond the disc; sliding takes it back, over some steps.
+    # The error control permits one tolerance beyond the unit disc per step; sliding corrects it within some steps.
     if disc > max(10 * rtol, 1e-9):
         found.append(f"disc {disc / rtol:.3g} rtol")
     if history.rim_force.min() < 0 or history.rim_force[history.gap > 0].any():
@@ -61,7 +65,7 @@ def wrong(result: Result) -> list[str]:
 
 
 def run(scene: Scene) -> dict[str, Any]:
-    """One scene: how it ended and what is wrong with it."""
+    """Run one scene: its status, message, counters and violations."""
     begin = time.perf_counter()
     result, message = None, ""
     try:
@@ -86,20 +90,25 @@ def run(scene: Scene) -> dict[str, Any]:
 
 
 def describe(scene: Scene) -> dict[str, Any]:
-    """What it is, and whether the second method knows all of it."""
+    """Properties of a scene, and whether the second method covers all of its effects."""
     effects = scene.effects
-    return {"spec": scene.spec.key, "top": scene.top.kind, "method": scene.solver.method, "sensible": sensible(scene),
-            "checkable": effects.friction == "constant" and not effects.uplift}  # fmt: skip
+    return {
+        "spec": scene.spec.key,
+        "top": scene.top.kind,
+        "method": scene.solver.method,
+        "sensible": sensible(scene),
+        "checkable": effects.friction == "constant" and not effects.uplift,
+    }
 
 
 def check(seed: int, number: int, short: bool) -> dict[str, Any]:
-    """Go over a few rows of a run by the second method, from a row drawn at random.
+    """Repeat a few rows of a run by the second method, from a random row.
 
-    deviation: largest difference over what is allowed, 1 at most where they agree. Allowed are the tolerances of the
-    run, one a row, and thrice what halved steps change in the second method.
+    `deviation` is the largest difference over the permitted one; at most 1 if both agree. Permitted is the tolerance of
+    the run per row, plus three times the change of the second method under halved steps.
     """
     scene = case(seed, number, short).scene
-    if scene.effects.dimension == "planar":  # psi and theta of an oblique plane are a turn with a little twist
+    if scene.effects.dimension == "planar":  # psi and theta in an oblique plane include a small twist
         scene = replace(scene, motion=scene.motion.rotated(-(scene.motion.plane() or 0.0)))
     run = simulate(replace(scene, output_step=None))
     history, solver = run.history, run.scene.solver
@@ -112,12 +121,12 @@ def check(seed: int, number: int, short: bool) -> dict[str, Any]:
         halved = second.march(history, rows, halved=True)
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         return {"number": number, "status": "no verdict", "message": str(error)}
-    kept = slice(rows[1], rows[-1] + 1)
+    compared = slice(rows[1], rows[-1] + 1)
     angles = solver.rtol * float(np.abs(history.tilt_angles).max()) + solver.angle_tolerance
     parts = {
-        "angles": (history.tilt_angles[kept], halved.q, whole.q, angles),
-        "friction": (history.friction_state[kept], halved.f, whole.f, 10 * solver.rtol),
-        "force": (history.top_force[kept], halved.force, whole.force, 10 * solver.rtol * second.size),
+        "angles": (history.tilt_angles[compared], halved.q, whole.q, angles),
+        "friction": (history.friction_state[compared], halved.f, whole.f, 10 * solver.rtol),
+        "force": (history.top_force[compared], halved.force, whole.force, 10 * solver.rtol * second.size),
     }
     over = {
         name: float(np.abs(run_ - best).max() / (len(rows) * unit + 3 * np.abs(best - coarse).max()))
@@ -128,7 +137,7 @@ def check(seed: int, number: int, short: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Tasks from standard input, lines of JSON to standard output."""
+    """Read tasks from standard input, write lines of JSON to standard output."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     seed, which = int(sys.argv[1]), sys.argv[2]
@@ -143,7 +152,9 @@ def main() -> None:
             print(json.dumps({"number": number, "status": "passed over"}), flush=True)
             continue
         row = {"number": number, **describe(scene), **run(scene)}
-        row["sensible"] = row["sensible"] and not row.get("beyond", False)  # a mass that resonates into its rims
+        row["sensible"] = row["sensible"] and not row.get(
+            "beyond", False
+        )  # except a mass whose resonance reaches the rims
         print(json.dumps(row), flush=True)
 
 

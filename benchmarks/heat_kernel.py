@@ -1,7 +1,7 @@
-"""The heat kernel 1/sqrt(t) as a sum of exponentials: `python benchmarks/heat_kernel.py`.
+"""Fit the heat kernel 1/sqrt(t) by a sum of exponentials: `python benchmarks/heat_kernel.py`.
 
-Fits the table in `generator/heat.py`, prints it, and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
-temperature by the sum beside the exact convolution.
+Prints the table of `generator/heat.py` and draws `docs/figures/heat-kernel.png`: the error of the sum, and a
+temperature computed by the sum and by the exact convolution.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ FASTEST, SLOWEST = 6.0, 0.4  # rates of the first and last term, over 1/SHORTEST
 
 
 def fit(count: int) -> tuple[Array, Array, float]:
-    """Rates in geometric progression, and the weights >= 0 with the least relative error over the range (a linear
-    programme); the integral over [0, SHORTEST] is exact."""
+    """Rates in geometric progression [1/s], weights >= 0 with the least relative error, and that error.
+
+    The weights solve a linear programme; the integral of the sum over [0, SHORTEST] is exact.
+    """
     from scipy.optimize import linprog
 
     rates = np.geomspace(FASTEST / SHORTEST, SLOWEST / LONGEST, count)
     times = np.geomspace(SHORTEST, LONGEST, 600)
-    scale = np.sqrt(rates)  # of the weights: keeps the columns alike
+    scale = np.sqrt(rates)  # scales the weights so that the columns have similar size
     terms = scale * np.exp(-np.outer(times, rates)) * np.sqrt(times)[:, None]
     bound = -np.ones((len(times), 1))
     first = scale * (1 - np.exp(-rates * SHORTEST)) / rates / (2 * np.sqrt(SHORTEST))
@@ -35,13 +37,15 @@ def fit(count: int) -> tuple[Array, Array, float]:
         np.r_[np.zeros(count), 1.0],
         A_ub=np.vstack([np.hstack([terms, bound]), np.hstack([-terms, bound])]),
         b_ub=np.r_[np.ones(len(times)), -np.ones(len(times))],
-        A_eq=np.r_[first, 0.0][None], b_eq=[1.0], method="highs",
-    )  # fmt: skip
+        A_eq=np.r_[first, 0.0][None],
+        b_eq=[1.0],
+        method="highs",
+    )
     return rates, scale * found.x[:-1], float(found.x[-1])
 
 
 def summed(times: Array) -> Array:
-    """The sum of exponentials of the table."""
+    """The sum of exponentials of HEAT_KERNEL at `times` [s]."""
     return sum(weight * np.exp(-rate * times) for rate, weight in HEAT_KERNEL)  # type: ignore[return-value]
 
 
@@ -57,9 +61,9 @@ def draw() -> None:
         for bound in (-HEAT_ERROR, HEAT_ERROR):
             error.axhline(100 * bound, color=COLOURS[1], lw=0.8, ls="--", label=f"bound ±{100 * HEAT_ERROR:g} %")
         error.legend(*[each[:1] for each in error.get_legend_handles_labels()])
-        error.set(xlabel="time since the heat came in [s]", ylabel="[%]", ylim=(-1, 1))
+        error.set(xlabel="time since the heat input [s]", ylabel="[%]", ylim=(-1, 1))
         exact, found = convolved(strokes, flux), marched(strokes, flux)
-        rise.plot(strokes, exact, color=COLOURS[0], label="convolution, every time with every other")
+        rise.plot(strokes, exact, color=COLOURS[0], label="exact convolution")
         rise.plot(strokes, found, color=COLOURS[1], ls="--", label=f"{len(HEAT_KERNEL)} exponential states")
         rise.set(xlabel="time [s]", ylabel="rise over flux √(D/π)/k [√s]")
         rise.legend()
@@ -67,7 +71,7 @@ def draw() -> None:
 
 
 def convolved(t: Array, flux: Array) -> Array:
-    """Duhamel's integral with a flux that is constant over each interval, exact."""
+    """Duhamel's integral, exact for a flux that is constant over each interval."""
     step, mean = t[1] - t[0], (flux[1:] + flux[:-1]) / 2
     gain = 2 * (np.sqrt(np.arange(1, len(t)) * step) - np.sqrt(np.arange(len(t) - 1) * step))
     from scipy.signal import fftconvolve
@@ -76,7 +80,7 @@ def convolved(t: Array, flux: Array) -> Array:
 
 
 def marched(t: Array, flux: Array) -> Array:
-    """The same by the exponential states, exact for such a flux."""
+    """The same integral by the exponential states, whose update is exact for such a flux."""
     step, mean = t[1] - t[0], (flux[1:] + flux[:-1]) / 2
     rate, weight = np.array(HEAT_KERNEL).T
     decay = np.exp(-rate * step)
@@ -88,7 +92,7 @@ def marched(t: Array, flux: Array) -> Array:
 
 
 def main() -> Any:
-    """Print the fit and draw."""
+    """Print the fit and draw the figure."""
     rates, weights, error = fit(len(HEAT_KERNEL))
     print(f"{len(rates)} terms, relative error {error:.3e} (table: {HEAT_ERROR:.1e})")
     for rate, weight in zip(rates, weights, strict=True):

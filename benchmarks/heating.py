@@ -1,4 +1,4 @@
-"""Draw docs/figures/heating.png: `python benchmarks/heating.py` runs examples/heating.toml with and without its law."""
+"""Draw docs/figures/heating.png: examples/heating.toml with and without its friction law. `python benchmarks/heating.py`"""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from drawing import COLOURS, MILLI, drawn, panels, ratio
 
 from msfp_gen import Scene, load_scene, simulate
-from msfp_gen.generator.friction_laws import own_numbers
 from msfp_gen.result import Result
+from msfp_gen.specification.friction_laws import law_parameter_names
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURE = ROOT / "docs" / "figures" / "heating.png"
@@ -18,12 +18,12 @@ FIGURE = ROOT / "docs" / "figures" / "heating.png"
 
 def without_law(scene: Scene) -> Scene:
     """The same scene with constant friction."""
-    plain = scene.bearing.replace(**dict.fromkeys(own_numbers()))
+    plain = scene.bearing.replace(**dict.fromkeys(law_parameter_names()))
     return replace(scene, bearing=plain, effects=replace(scene.effects, friction="constant"))
 
 
 def draw(heats: Result, constant: Result) -> None:
-    """Loops of both runs; friction and temperature in the dish."""
+    """Draw the loops of both runs, and temperature and friction of the dish."""
     rows = heats.history
     assert rows.temperature is not None
     with drawn(FIGURE, 11.0, 3.6) as figure:
@@ -40,13 +40,15 @@ def draw(heats: Result, constant: Result) -> None:
 
 
 def main() -> None:
-    """Run both and print what they differ by."""
+    """Run both scenes, draw them, and print the peak temperature and the ratio of the dissipated energies."""
     scene = load_scene(ROOT / "examples" / "heating.toml")
     heats, constant = simulate(scene), simulate(without_law(scene))
     draw(heats, constant)
     lost = [run.history.energy["friction_dissipated"][-1] for run in (heats, constant)]
-    print(f"peak temperature {heats.summary['peak_temperature'][0]:.0f} degC, "
-          f"energy lost over that at constant friction {lost[0] / lost[1]:.2f}")  # fmt: skip
+    print(
+        f"peak temperature {heats.summary['peak_temperature'][0]:.0f} degC, "
+        f"dissipated energy over that at constant friction {lost[0] / lost[1]:.2f}"
+    )
 
 
 if __name__ == "__main__":

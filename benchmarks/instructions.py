@@ -1,7 +1,7 @@
-"""Instructions that kernels and runs take: `python benchmarks/instructions.py`, some minutes, with valgrind installed.
+"""Count the instructions of kernels and runs: `python benchmarks/instructions.py`, some minutes, with valgrind installed.
 
-Counted by callgrind, so that they are the same on a busy machine. It knows no AVX-512: these are the AVX2 versions. Of a
-run, what is inside the loop in C (`msfp_run_advance`); of a kernel, one call. Rows of docs/performance.md.
+callgrind counts, so the numbers do not depend on the load of the machine. It does not support AVX-512: these are the AVX2
+versions. For a run it counts the loop in C (`msfp_run_advance`), for a kernel one call. Rows of docs/performance.md.
 """
 
 from __future__ import annotations
@@ -27,18 +27,22 @@ simulate(replace(scene, effects=Effects(**{effects!r}), solver=replace(scene.sol
 """
 RUNS = {
     "`fenz-test2`, 1e-4": ("fenz-test2", {}, 1e-4),
-    "the same, planar and massless, no rims": ("fenz-test2", {"dimension": "planar", "sliders": "massless", "rims": False}, 1e-4),
+    "the same, planar and massless, no rims": (
+        "fenz-test2",
+        {"dimension": "planar", "sliders": "massless", "rims": False},
+        1e-4,
+    ),
     "`ridgecrest-clc`, 3e-3": ("ridgecrest-clc", {}, 3e-3),
-}  # fmt: skip
+}
 KERNELS = ("one value of the residual", "one residual with its tangent", "one Newton iteration", "accelerations")
 
 
 def instructions(command: list[str], within: str, given: str = "") -> int:
-    """Instructions of a command inside one function and what it calls."""
+    """Instructions of a command inside the function `within` and the functions it calls."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        watch = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", f"--toggle-collect={within}"]
-        subprocess.run([*watch, *command], input=given, text=True, check=True, capture_output=True)
+        callgrind = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", f"--toggle-collect={within}"]
+        subprocess.run([*callgrind, *command], input=given, text=True, check=True, capture_output=True)
         found = re.search(r"^summary: (\d+)", out.read_text(), re.MULTILINE)
     if found is None:
         raise SystemExit(f"callgrind counted nothing inside {within}")
@@ -46,7 +50,7 @@ def instructions(command: list[str], within: str, given: str = "") -> int:
 
 
 def of_kernels(scene: Scene) -> list[float]:
-    """Instructions of one call of each kernel at a state of the scene."""
+    """Instructions of one call of each kernel, at a state of the scene."""
     text, folder = kernels.prepared(scene, kernels.state_of(scene))
     with tempfile.TemporaryDirectory() as target:
         program = str(kernels.compiled(kernels.HERE / "c" / "kernels.c", Path(target) / "kernels", folder))
@@ -54,9 +58,9 @@ def of_kernels(scene: Scene) -> list[float]:
 
 
 def main() -> None:
-    """Print a row for every run and kernel."""
+    """Print one row per run and kernel."""
     if not shutil.which("valgrind"):
-        raise SystemExit("valgrind is not installed: nothing to count with")
+        raise SystemExit("valgrind is not installed")
     print("| what | instructions |\n|---|---|")
     for text, (name, effects, rtol) in RUNS.items():
         program = RUN.format(name=name, effects=effects, rtol=rtol)

@@ -1,8 +1,8 @@
-"""One evaluation of built models: `python benchmarks/kernels.py`, each comparison with its ratio last.
+"""Time single evaluations of compiled models: `python benchmarks/kernels.py`; each comparison ends with its ratio.
 
-What a Newton iteration of the default step costs (residual, tangent, solve), against CasADi's C where it is installed; the
-accelerations against the articulated-body recursion of the same chain; cost and build against the number of bodies.
-States are from runs, all surfaces on the move; numbers are nanoseconds of CPU time, the best of many.
+It compares a Newton iteration of the default method (residual, tangent, solve) with CasADi's C, if that is installed; the
+accelerations with the articulated-body recursion of the same chain; and iteration and build for few and many bodies.
+States are from runs in which all surfaces move; times are nanoseconds of CPU time, the best of many.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ import casadi_peer
 import numpy as np
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Surface, Top, build_model, load_scene, simulate
-from msfp_gen.compiler import FLAGS, find_compiler
-from msfp_gen.packing import bodies_and_surfaces, load_values, top_values
+from msfp_gen.jit.compiler import FLAGS, find_compiler
+from msfp_gen.model.marshalling import bodies_and_surfaces, top_values
+from msfp_gen.scene.top import load_values
 
 HERE = Path(__file__).parent
 FULL = Effects()
@@ -29,7 +30,7 @@ BETA = 1.5e-3  # gamma h of a step on a record [s]
 
 
 class State(NamedTuple):
-    """What `kernels.c` reads, by name."""
+    """The input of `c/kernels.c`, by name."""
 
     bodies: np.ndarray
     surfaces: np.ndarray
@@ -43,16 +44,26 @@ class State(NamedTuple):
 
 
 def compiled(main: Path, target: Path, folder: Path | None = None) -> Path:
-    """A program of `main` and the sources of a built model, with the flags that built it."""
+    """Compile `main` with the sources of a built model, with the flags of the model; returns the program."""
     units = [] if folder is None else [str(p) for p in folder.glob("*.c") if not p.name.startswith("msfp_")]
     found = [] if folder is None else ["-I", str(folder)]
-    command = [*find_compiler().command, *FLAGS["c"], *FLAGS["user"], *found, str(main), *units, "-o", str(target), "-lm"]
+    command = [
+        *find_compiler().command,
+        *FLAGS["c"],
+        *FLAGS["user"],
+        *found,
+        str(main),
+        *units,
+        "-o",
+        str(target),
+        "-lm",
+    ]
     subprocess.run(command, check=True)
     return target
 
 
 def state_of(scene: Scene) -> State:
-    """The scene in its first half, where the slowest surface slides fastest."""
+    """The state in the first half of the run at which the slowest surface slides fastest."""
     history = simulate(scene).history
     speed = np.abs(history.slip_velocity).min(axis=1).max(axis=1)
     i = int(np.argmax(speed[: len(speed) // 2]))
@@ -60,19 +71,28 @@ def state_of(scene: Scene) -> State:
     bodies, surfaces = bodies_and_surfaces(scene.bearing, scene.effects)
     top = top_values(scene.top, motion.displacement(0.0)[:2])
     base = np.array([motion.evaluate(t, order) for order in range(3)])
-    return State(bodies, surfaces, top, base, load_values(scene.top), history.tilt_angles[i], history.tilt_rates[i],
-                 history.tilt_accelerations[i], history.friction_state[i])  # fmt: skip
+    return State(
+        bodies,
+        surfaces,
+        top,
+        base,
+        load_values(scene.top),
+        history.tilt_angles[i],
+        history.tilt_rates[i],
+        history.tilt_accelerations[i],
+        history.friction_state[i],
+    )
 
 
 def prepared(scene: Scene, state: State) -> tuple[str, Path]:
-    """What `kernels.c` reads, and the folder of the built model."""
+    """The input of `c/kernels.c` as text, and the folder of the built model."""
     model = build_model(scene.bearing.layout, scene.effects)
     text = " ".join(repr(float(x)) for value in (BETA, scene.bearing.gravity, *state) for x in np.ravel(value))
     return text, model.info.folder
 
 
 def timed(scene: Scene, state: State) -> list[float]:
-    """Value, tangent, Newton iteration, accelerations [ns]."""
+    """Times of residual, tangent, Newton iteration and accelerations [ns]."""
     text, sources = prepared(scene, state)
     with tempfile.TemporaryDirectory() as folder:
         program = compiled(HERE / "c" / "kernels.c", Path(folder) / "kernels", sources)
@@ -89,16 +109,21 @@ CASES = {
 
 
 def deep(layout: Layout) -> Scene:
-    """A stack of any depth on a circle: radii shrink towards the middle."""
+    """A scene on a circular path with a stack of any number of bodies, whose radii decrease towards the middle."""
     radii = [2.0 * 0.8**k for k in range(layout.m)] + [2.0 * 0.8**k for k in range(layout.p)][::-1]
-    bearing = Bearing(layout, 0.06, [Surface(r, 0.15, 0.05, 5e-4, 1e8, 1e4) for r in radii],
-                      [Body(0.06, 0.03, 50.0, (0.5, 0.8), 0.1, 0.003) for _ in radii])  # fmt: skip
-    return Scene(bearing=bearing, motion=Motion.circle(0.05, 3.0, cycles=0.5), effects=FULL,
-                 top=Top.rig(1e6, 1e9, 1e5, 1e9, 1e5))  # fmt: skip
+    bearing = Bearing(
+        layout,
+        0.06,
+        [Surface(r, 0.15, 0.05, 5e-4, 1e8, 1e4) for r in radii],
+        [Body(0.06, 0.03, 50.0, (0.5, 0.8), 0.1, 0.003) for _ in radii],
+    )
+    return Scene(
+        bearing=bearing, motion=Motion.circle(0.05, 3.0, cycles=0.5), effects=FULL, top=Top.rig(1e6, 1e9, 1e5, 1e9, 1e5)
+    )
 
 
 def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
-    """The parameters that the graph of CasADi takes, by record, index and field."""
+    """Parameters of the graph of CasADi, by record, index and field."""
     out: dict[tuple[str, int, str], float] = {("beta", 0, ""): BETA}
     layout, g = scene.bearing.layout, scene.bearing.gravity
     signs = (*layout.signs, 0)
@@ -119,7 +144,21 @@ def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
         for i, name in enumerate("YZ"):
             out["fp", k - 1, name] = state.f[k - 1, i]
         radius, capacity, mu, dy, kc, cc = state.surfaces[k - 1, :6]
-        values = {"sign": sign, "R": radius, "sc": capacity, "mu": mu, "dy": dy, "kc": kc, "cc": cc, "rs": 0.0, "pr": 0.0, "ks": 0.0, "cs": 0.0, "ca": 0.0, "sa": 0.0}
+        values = {
+            "sign": sign,
+            "R": radius,
+            "sc": capacity,
+            "mu": mu,
+            "dy": dy,
+            "kc": kc,
+            "cc": cc,
+            "rs": 0.0,
+            "pr": 0.0,
+            "ks": 0.0,
+            "cs": 0.0,
+            "ca": 0.0,
+            "sa": 0.0,
+        }
         out |= {("surface_parameters", k - 1, name): value for name, value in values.items()}
     names = ("k", "c", "kr", "cr", "m", "jt", "ja", "h", "x0x", "x0y")
     out |= {("top_parameters", 0, name): value for name, value in zip(names, state.top, strict=True)}
@@ -127,9 +166,11 @@ def numbers(scene: Scene, state: State) -> dict[tuple[str, int, str], float]:
 
 
 def against_casadi(scene: Scene, state: State, ours: float) -> None:
-    """One Newton iteration by CasADi's generated C, with our flags and with all that this machine has."""
+    """Print the time of one Newton iteration by CasADi's C, with the flags of this project and with -march=native."""
     if find_spec("casadi") is None:
-        print(f"Newton iteration {ours:.0f} ns; casadi is not installed (pip install casadi); times faster: not measured")
+        print(
+            f"Newton iteration {ours:.0f} ns; casadi is not installed (pip install casadi); times faster: not measured"
+        )
         return
     unknowns = [*state.v[:, :2].ravel(), *state.f.ravel()]
     given, times = numbers(scene, state), []
@@ -139,31 +180,41 @@ def against_casadi(scene: Scene, state: State, ours: float) -> None:
         times.append(seconds)
     model = build_model(scene.bearing.layout, scene.effects)
     stack = model.stack(scene.bearing, scene.top, anchor=scene.motion.displacement(0.0)[:2])
-    # At Y, Z held the moments of both must agree: beta = 0 keeps ours there.
-    mine = stack.condensed(state.q, state.v, state.a, state.f, state.base, state.load, BETA, 1.0, 1.0 / BETA, 0.0)[1]
-    apart = np.abs(residual[: len(mine)] - mine).max() / np.abs(mine).max()
-    print(f"Newton iteration (residual, tangent, solve), TFP spatial, spin locked: {ours:.0f} ns; CasADi's C and a dense "
-          f"solve {times[0]:.0f} ns, with -O3 -march=native {times[1]:.0f} ns; residuals apart by {apart:.0e}; "
-          f"times faster: {times[0] / ours:.1f}", flush=True)  # fmt: skip
+    # With beta = 0 the condensed residual is at the given Y, Z, so the moments of both must agree.
+    expected = stack.condensed(state.q, state.v, state.a, state.f, state.base, state.load, BETA, 1.0, 1.0 / BETA, 0.0)[
+        1
+    ]
+    difference = np.abs(residual[: len(expected)] - expected).max() / np.abs(expected).max()
+    print(
+        f"Newton iteration (residual, tangent, solve), TFP spatial, spin locked: {ours:.0f} ns; CasADi's C and a dense "
+        f"solve {times[0]:.0f} ns, with -O3 -march=native {times[1]:.0f} ns; residuals differ by {difference:.0e}; "
+        f"times faster: {times[0] / ours:.1f}",
+        flush=True,
+    )
 
 
 def against_the_recursion(ours: float) -> None:
-    """Accelerations against the articulated-body recursion in plain C, moments of the surfaces given."""
+    """Print the time of accelerations and of the articulated-body recursion in C, with given moments of the surfaces."""
     with tempfile.TemporaryDirectory() as folder:
         program = compiled(HERE / "c" / "recursion.c", Path(folder) / "recursion")
         theirs = float(subprocess.run([program], text=True, capture_output=True, check=True).stdout.split()[0])
-    print(f"accelerations, TFP: {ours:.0f} ns; articulated-body recursion of the same chain {theirs:.0f} ns; "
-          f"times slower: {ours / theirs:.1f}", flush=True)  # fmt: skip
+    print(
+        f"accelerations, TFP: {ours:.0f} ns; articulated-body recursion of the same chain {theirs:.0f} ns; "
+        f"times slower: {ours / theirs:.1f}",
+        flush=True,
+    )
 
 
 def against_depth() -> None:
-    """Newton iteration and build of ten surfaces over four."""
+    """Print the times of Newton iteration and build for ten surfaces and for four."""
     small, large = (deep(Layout(*counts)) for counts in ((5, 2, 2), (11, 5, 5)))
     states = [(scene, state_of(scene)) for scene in (small, large)]
     few, many = np.min([[timed(*each)[2] for each in states] for _ in range(5)], axis=0)  # in turn
     print(f"Newton iteration: (5,2,2) {few:.0f} ns, (11,5,5) {many:.0f} ns; ratio: {many / few:.2f}", flush=True)
     few, many = np.min([[build_seconds(scene.bearing.layout) for scene in (small, large)] for _ in range(3)], axis=0)
-    print(f"derive, emit, compile: (5,2,2) {few:.2f} s, (11,5,5) {many:.2f} s of CPU; ratio: {many / few:.2f}", flush=True)
+    print(
+        f"derive, emit, compile: (5,2,2) {few:.2f} s, (11,5,5) {many:.2f} s of CPU; ratio: {many / few:.2f}", flush=True
+    )
 
 
 BUILD = """
@@ -178,15 +229,17 @@ print(cpu() - begin)
 
 
 def build_seconds(layout: Layout) -> float:
-    """CPU seconds of `build_model` into a cache of its own, compilers included."""
+    """CPU time of `build_model` into an empty cache, with the compiler [s]."""
     with tempfile.TemporaryDirectory() as cache:
         command = [sys.executable, "-c", BUILD, str(layout.n), str(layout.m), str(layout.p)]
-        done = subprocess.run(command, env={**os.environ, "MSFP_GEN_CACHE": cache}, text=True, capture_output=True, check=True)
+        done = subprocess.run(
+            command, env={**os.environ, "MSFP_GEN_CACHE": cache}, text=True, capture_output=True, check=True
+        )
     return float(done.stdout)
 
 
 def main() -> None:
-    """Print the table, then a line for every comparison."""
+    """Print the table, then one line per comparison."""
     print("| effects, fenz-test2 | value [ns] | tangent [ns] | Newton iteration [ns] | accelerations [ns] |")
     print("|---|---|---|---|---|")
     for name, effects in CASES.items():

@@ -1,7 +1,7 @@
-"""What straightforward code makes of the hard cases: the third column of docs/stability.md.
+"""Errors of straightforward code in difficult cases: the third column of docs/stability.md.
 
-Each function is a small program as one would first write it, and returns what it got wrong, measured. None of them uses
-msfp-gen. `python benchmarks/naive.py` prints one line a case.
+Each function is a short program as one would first write it, and returns its measured error as text. None uses msfp-gen.
+`python benchmarks/naive.py` prints one line per case.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ G = 9.8
 def tilt_by_arc_cosine() -> str:
     """(2.100) as printed: s = R acos(t . t')."""
     lost = {angle: np.arccos(np.cos(angle)) / angle - 1 for angle in (1e-6, 1e-8)}
-    return f"acos: tilt off by {lost[1e-6]:.0e} of itself at 1e-6 rad; at 1e-8 rad it reads {1e-8 * (1 + lost[1e-8]):g}"
+    return f"acos: relative error of the tilt {lost[1e-6]:.0e} at 1e-6 rad; at 1e-8 rad the result is {1e-8 * (1 + lost[1e-8]):g}"
 
 
 def direction_of_no_tilt() -> str:
@@ -28,11 +28,11 @@ def direction_of_no_tilt() -> str:
     t = np.array([0.0, 0.0, 1.0])
     with np.errstate(invalid="ignore"):
         across = np.cross(t, t) / np.linalg.norm(np.cross(t, t))
-    return f"contact direction 0/0: {across[0]}; one such number and every later row is {across[0]}"
+    return f"contact direction 0/0: {across[0]}; one such number makes every later row {across[0]}"
 
 
 def wall_met_by_an_event() -> str:
-    """A wall that is switched on by the event of reaching it, for a body that starts inside: there is no event."""
+    """A wall that acts from the event of reaching it, for a body that starts inside it: there is no event."""
     met = solve_ivp(lambda t, y: [y[1], 0.0], (0, 1), [1e-3, 1.0], events=lambda t, y: y[0])
     return f"wall switched on by its event: {len(met.t_events[0])} events, the body is {met.y[0, -1]:.0f} m inside it"
 
@@ -46,11 +46,13 @@ def bounce_with_fixed_steps() -> str:
             v -= h * stiffness * max(x, 0.0) / 2.0
             x += h * v
         factors.append(abs(v) / 0.5)
-    return "fixed steps of 0.1 ms: rebound {:.2f}, {:.2f}, {:.0f} times the speed at 1e6, 1e8, 1e10 N/m".format(*factors)
+    return "fixed steps of 0.1 ms: rebound {:.2f}, {:.2f}, {:.0f} times the speed at 1e6, 1e8, 1e10 N/m".format(
+        *factors
+    )
 
 
 def two_walls_one_event() -> str:
-    """Two gaps that close a microsecond apart; the step is cut at the first event and goes on 1 ms from there."""
+    """Two gaps close one microsecond after another; the step is cut at the first event and the next one takes 1 ms."""
     first, second, speed, step = 0.0, 1e-6, 1.0, 1e-3
     late = first + step - second
     return f"one event a step: the second wall is noticed {1e3 * speed * late:.1f} mm inside at 1 m/s"
@@ -64,7 +66,7 @@ def friction_of_velocity() -> str:
 
 
 def quasi_static_by_ode(rtol: float = 1e-2) -> str:
-    """One massless pendulum on a spring, as an ODE in the sliding s and Y: solvers that report success, worst error."""
+    """One massless pendulum on a spring as an ODE in sliding s and Y: solvers that report success, and worst error."""
     N, R, mu, dy, k, A, w = 112e3, 0.473, 0.03, 1e-4, 1e6, 0.025, 0.25
 
     def rates(t: float, y: Array) -> list[float]:
@@ -73,19 +75,26 @@ def quasi_static_by_ode(rtol: float = 1e-2) -> str:
         slip = push / (k + N / R + mu * N * bent / dy)
         return [slip, bent * slip / dy]
 
-    runs = [solve_ivp(rates, (0, 25), [0.0, 0.0], m, rtol=rtol, atol=1e-2 * rtol) for m in ("RK45", "Radau", "BDF", "LSODA")]
+    runs = [
+        solve_ivp(rates, (0, 25), [0.0, 0.0], m, rtol=rtol, atol=1e-2 * rtol) for m in ("RK45", "Radau", "BDF", "LSODA")
+    ]
     wrong = [run for run in runs if run.success and np.abs(run.y[1]).max() > 1.1]
     worst = max(np.abs(run.y[1]).max() for run in runs)
     return f"quasi-static ODE, rtol {rtol:g}: {len(wrong)} of 4 solvers report success with |Y| up to {worst:.0f} (it is 1)"
 
 
 def explicit_steps_for_a_stuck_slider() -> str:
-    """A stuck slider of mass m on mu N/d_y for one second: right-hand sides that RK45 asks for."""
+    """A stuck slider of mass m on the stiffness mu N/d_y for one second: evaluations by RK45."""
     cost = {}
     for mass in (1.0, 1e-2):
         stiffness = 0.03 * 112e3 / 1e-4
-        run = solve_ivp(lambda t, y, m=mass, c=stiffness: [y[1], np.sin(t) - c / m * y[0]], (0, 0.1), [0.0, 0.0],
-                        rtol=1e-3, atol=1e-12)  # fmt: skip
+        run = solve_ivp(
+            lambda t, y, m=mass, c=stiffness: [y[1], np.sin(t) - c / m * y[0]],
+            (0, 0.1),
+            [0.0, 0.0],
+            rtol=1e-3,
+            atol=1e-12,
+        )
         cost[mass] = 10 * run.nfev
     return f"RK45: {cost[1.0] / 1e3:.0f} thousand evaluations a second of motion at 1 kg, {cost[1e-2] / 1e3:.0f} thousand at 10 g"
 
@@ -93,18 +102,20 @@ def explicit_steps_for_a_stuck_slider() -> str:
 def backward_euler_pendulum() -> str:
     """Ten periods of a frictionless swing with backward Euler, 100 steps a period: amplitude left."""
     h = 2 * np.pi / 100
-    return f"backward Euler, 100 steps a period: {100 * (1 + h * h) ** -500:.0f} % of a frictionless swing left after ten"
+    return (
+        f"backward Euler, 100 steps a period: {100 * (1 + h * h) ** -500:.0f} % of a frictionless swing left after ten"
+    )
 
 
 def formulas_for_the_usual_order() -> str:
-    """First slip by the stage formulas, which say that the inner surfaces go first, for section 4.2's friction."""
+    """First slip by the formulas of the sliding regimes, in which the inner surfaces slide first, in section 4.2."""
     friction = (0.064, 0.168, 0.168, 0.064)
     return f"formulas with mu_2 = mu_3 < mu_1 put the first slip of section 4.2 at F/N = {friction[1]}; it is near {min(friction)}"
 
 
 def two_accelerations() -> str:
-    """A slider in a bowl of 0.1 m with its centre of mass 0.08 m up, mu = 0.5, Y = 1, at theta = -0.3, pushed with
-    -1 N m: (J + m r^2) a + m g r sin(theta) + 1 = rho |P(a)| has two roots, and a root finder likes either."""
+    """A slider in a bowl of 0.1 m with its centre of mass at 0.08 m, mu = 0.5, Y = 1, theta = -0.3, moment -1 N m:
+    (J + m r^2) a + m g r sin(theta) + 1 = rho |P(a)| has two roots, and a root finder returns either."""
     mass, arm, inertia, rho, tilt = 1.0, 0.02, 1e-4, 0.1 * 0.5 / np.hypot(1, 0.5), -0.3
 
     def moment(a: Array) -> Array:
@@ -117,7 +128,7 @@ def two_accelerations() -> str:
 
 
 def normal_force_as_a_length() -> str:
-    """N = |P|/sqrt(1 + mu^2) of an interface pulled with 5 kN."""
+    """N = |P|/sqrt(1 + mu^2) of an interface under a tension of 5 kN."""
     pulled = np.array([0.0, 0.0, -5e3])
     return f"N = |P| under a pull of 5 kN: +{np.linalg.norm(pulled):.0f} N, and friction to match"
 
@@ -126,7 +137,7 @@ def rise_of_a_flat_bowl() -> str:
     """R - sqrt(R^2 - x^2) at x = 0.1 mm."""
     x = 1e-4
     lost = [abs((R - np.sqrt(R * R - x * x)) / (x * x / (R + np.sqrt(R * R - x * x))) - 1) for R in (1.0, 100.0, 1e4)]
-    return f"R - sqrt(R^2 - x^2) at 0.1 mm: off by {lost[0]:.0e}, {lost[1]:.0e}, {lost[2]:.0e} at 1 m, 100 m, 10 km"
+    return f"R - sqrt(R^2 - x^2) at 0.1 mm: relative errors {lost[0]:.0e}, {lost[1]:.0e}, {lost[2]:.0e} at 1 m, 100 m, 10 km"
 
 
 def euler_rates() -> str:
@@ -135,7 +146,7 @@ def euler_rates() -> str:
 
 
 def velocity_jump_by_differences() -> str:
-    """A base that starts at 0.2 m/s: the peak acceleration that differences of its samples give."""
+    """A base that starts at 0.2 m/s: peak acceleration by differences of its samples."""
     peaks = [0.2 / dt for dt in (0.01, 0.001)]
     return f"a jump of 0.2 m/s differenced: {peaks[0]:.0f} m/s^2 at 100 samples a second, {peaks[1]:.0f} at 1000"
 
@@ -149,13 +160,13 @@ def six_hundred_seconds_by_rk45() -> str:
 
 
 def pulse_between_steps() -> str:
-    """An oscillator at rest, a pulse of 50 m/s^2 and 5 ms at 30 s of 60: does an adaptive solver see it?"""
+    """An oscillator at rest with a pulse of 50 m/s^2 and 5 ms at 30 s of 60: response by an adaptive solver."""
     run = solve_ivp(lambda t, y: [y[1], -y[0] + 50.0 * (30.0 < t < 30.005)], (0, 60), [0.0, 0.0])
     return f"adaptive steps over a 5 ms pulse: response {np.abs(run.y[0]).max():g} m in {len(run.t) - 1} steps (it is 0.25 m)"
 
 
 def unrolled_expressions() -> str:
-    """Operations in the acceleration equations of a chain of pendulums, expanded in SymPy, by length."""
+    """Operations in the expanded acceleration equations of a chain of pendulums in SymPy, by number of bodies."""
     import sympy as sp
 
     t, counts = sp.Symbol("t"), []
@@ -195,7 +206,7 @@ CASES: list[Callable[[], str]] = [
 
 
 def main() -> None:
-    """One line a case."""
+    """Print one line per case."""
     for case in CASES:
         print(f"{case.__name__:36s} {case()}", flush=True)
 

@@ -1,6 +1,6 @@
-"""Regenerate every figure of chapter 4 and docs/results.md, numbers included: `python benchmarks/report_figures.py`.
+"""Draw the figures of chapter 4 of PEER 2017/07 and write docs/results.md: `python benchmarks/report_figures.py [DIR]`.
 
-Takes the folder to write into; without one, the docs of this checkout.
+DIR is the folder to write to; default: the docs of this checkout.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is the tests' reference
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is that of the tests
 
 import inertia_study  # noqa: E402
 import results_page  # noqa: E402
@@ -27,20 +27,26 @@ MARKS = {"u_star": "u*", "u_star_star": "u**", "u_dr1": "u_dr1", "u_dr4": "u_dr4
 TESTS = tuple(f"fenz-test{number}" for number in range(1, 6))
 AMPLITUDES = (125, 88, 50, 25, 12, 5)  # [mm], section 4.3
 PLAIN = ("fenz-test2", "fenz-test5", "ridgecrest-clc")  # drawn as `msfp-gen run SCENE --plot` draws them
-ROWS = 4000  # of a cycle
+ROWS = 4000  # rows per cycle
 U, F = "displacement across the bearing u [mm]", "force over axial load F / N"
 
 
 def stages(runs: Runs, path: Path) -> None:
-    """Figure 4.1: force and relative angles of the monotonic run, with its stages and the closed form."""
+    """Figure 4.1: force and relative angles of the monotonic run, with its sliding regimes and the closed form."""
     result = runs("fenz-monotonic")
     u = result.history.displacement[:, 0] * MILLI
     grid = np.linspace(1e-5, u[-1] / MILLI, 150)
     with drawn(path, 11, 4.8) as figure:
         left, right = panels(figure, "(a) Force and displacement", "(b) Relative angles")
         left.plot(u, ratio(result)[:, 0], color=COLOURS[0], label="fenz-monotonic")
-        left.plot(grid * MILLI, closed_form(result, grid), color=INK, linestyle="--", linewidth=0.9,
-                  label="closed form: friction circles,\nmassless, rigid-plastic")  # fmt: skip
+        left.plot(
+            grid * MILLI,
+            closed_form(result, grid),
+            color=INK,
+            linestyle="--",
+            linewidth=0.9,
+            label="closed form: friction circles,\nmassless, rigid-plastic",
+        )
         left.set(xlabel=U, ylabel=F, xlim=(-3, 145), ylim=(0, 0.42))
         left.legend(loc="lower right", frameon=True, facecolor="white", edgecolor="none", framealpha=1)
         for index, delta in enumerate(tilts(result).T):
@@ -53,18 +59,27 @@ def stages(runs: Runs, path: Path) -> None:
             for x in edges[1:-1]:
                 axes.axvline(x, color=FAINT, linewidth=0.9, linestyle=":")
             for name, low, high in zip(("I", "II", "III", "IV", "V"), edges, edges[1:], strict=False):
-                # Stage I is too narrow to hold its name.
+                # Regime I is narrower than its label.
                 place = -1.0 if name == "I" else (low + high) / 2
                 axes.annotate(name, (place, 0.985), xycoords=("data", "axes fraction"), ha="center", va="top")
         for (key, symbol), x in zip(MARKS.items(), edges[1:], strict=False):
-            last = key == "u_dr4"  # the curve runs up on its right
-            left.annotate(f"{symbol} = {found[key] * MILLI:.1f} mm", (x, 0.92), xycoords=("data", "axes fraction"),
-                          xytext=(-2 if last else 2, 0), textcoords="offset points", rotation=90, va="top",
-                          ha="right" if last else "left", fontsize=8, color=INK)  # fmt: skip
+            last = key == "u_dr4"  # its label stands on the left, since the curve rises on the right
+            left.annotate(
+                f"{symbol} = {found[key] * MILLI:.1f} mm",
+                (x, 0.92),
+                xycoords=("data", "axes fraction"),
+                xytext=(-2 if last else 2, 0),
+                textcoords="offset points",
+                rotation=90,
+                va="top",
+                ha="right" if last else "left",
+                fontsize=8,
+                color=INK,
+            )
 
 
 def loops(runs: Runs, path: Path) -> None:
-    """Figure 4.2: the loops of tests 1 to 5, last cycle in colour over all that led to it in grey."""
+    """Figure 4.2: the loops of tests 1 to 5, last cycle in colour, the preceding motion in grey."""
     with drawn(path, 8.2, 5.6) as figure:
         (axes,) = panels(figure, "Loops of tests 1 to 5 (table 4.1)")
         inset = axes.inset_axes((0.09, 0.66, 0.25, 0.27))
@@ -91,12 +106,25 @@ def unusual(runs: Runs, path: Path) -> None:
     with drawn(path, 7, 5) as figure:
         (axes,) = panels(figure, "Inner surfaces rougher than the outer ones")
         axes.plot(u, ratio(result)[:, 0], color=COLOURS[0], label="unusual-tfp")
-        axes.plot(grid * MILLI, closed_form(result, grid), color=INK, linestyle="--", linewidth=0.9,
-                  label="closed form of the first push")  # fmt: skip
-        for surface, event in sorted({e.surface: e for e in reversed(result.events)
-                                      if e.kind == "rim_contact" and e.displacement[0] > 0}.items()):  # fmt: skip
-            axes.plot(event.displacement[0] * MILLI, event.top_force[0] / result.summary["axial_load"], marker="v",
-                      linestyle="none", color=COLOURS[surface], label=f"rim {surface} first met")  # fmt: skip
+        axes.plot(
+            grid * MILLI,
+            closed_form(result, grid),
+            color=INK,
+            linestyle="--",
+            linewidth=0.9,
+            label="closed form of the first push",
+        )
+        for surface, event in sorted(
+            {e.surface: e for e in reversed(result.events) if e.kind == "rim_contact" and e.displacement[0] > 0}.items()
+        ):
+            axes.plot(
+                event.displacement[0] * MILLI,
+                event.top_force[0] / result.summary["axial_load"],
+                marker="v",
+                linestyle="none",
+                color=COLOURS[surface],
+                label=f"first contact of rim {surface}",
+            )
         axes.set(xlabel=U, ylabel=F)
         axes.legend(loc="upper left")
 
@@ -120,21 +148,21 @@ def orbits(runs: Runs, path: Path, *, kind: str) -> None:
 
 
 def write_figures(runs: Runs, folder: Path) -> None:
-    """Every figure but the inertia study's, as PNG files in `folder`."""
+    """Write all figures except that of the inertia study to `folder`, as PNG."""
     stages(runs, folder / "fenz-stages.png")
     loops(runs, folder / "fenz-loops.png")
     unusual(runs, folder / "unusual-tfp.png")
     for kind in ("circle", "eight"):
         orbits(runs, folder / f"becker-{kind}.png", kind=kind)
     for name in PLAIN:
-        plot_result(simulate(presets.scene(name)), folder / f"{name}.png")  # on the solver's own steps
+        plot_result(simulate(presets.scene(name)), folder / f"{name}.png")  # rows at the solver's own steps
 
 
 @cache
 def run(name: str) -> Result:
-    """The run of a scene preset, made once; a run that fails ends the script.
+    """The run of a preset scene, cached; a failed run ends the script.
 
-    Periodic scenes get rows enough to draw smooth orbits and to compare cycles: the solver's own steps are far apart.
+    Periodic scenes get many rows, for smooth orbits and the comparison of cycles: the solver's own steps are long.
     """
     scene = presets.scene(name)
     if period := scene.motion.metadata.get("period"):

@@ -1,6 +1,6 @@
-"""How far the normal force strays under a rigid supported mass: the table in docs/model.md.
+"""Range of the normal force under a rigid supported mass: prints the table of docs/model.md.
 
-Runs both earthquake scenes on every preset bearing and prints Markdown: `python benchmarks/rigid_mass.py`.
+Runs both earthquake scenes on three preset bearings: `python benchmarks/rigid_mass.py`.
 """
 
 from __future__ import annotations

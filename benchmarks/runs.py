@@ -1,8 +1,8 @@
-"""Whole runs against what else can do them: `python benchmarks/runs.py`, each row with its ratio last.
+"""Compare whole runs with other methods and programs: `python benchmarks/runs.py`; each row ends with its ratio.
 
-Effects are fixed: spatial, spin locked, sliders with inertia, rims. Times are CPU seconds of one core, the best of some
-runs; errors are against references that the timed runs have no part in, and two references against each other say how
-far these can be believed. The explicit reference of the record takes minutes: `--all` computes it.
+Effects are fixed: spatial, spin locked, sliders with inertia, rims. Times are CPU seconds of one core, the best of several
+runs. Errors are relative to reference runs that are not timed; the difference of two references shows their accuracy. The
+explicit reference of the record takes minutes: `--all` computes it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen import Effects, Scene, load_scene, simulate
-from msfp_gen.accuracy.opensees import run_opensees
 from msfp_gen.errors import InputError
 from msfp_gen.result import Result
+from msfp_gen.studies.accuracy.opensees import run_opensees
 
 Array = NDArray[np.float64]
 FULL = Effects()
@@ -26,7 +26,7 @@ REPEATS = 7
 
 
 def fixed(name: str, effects: Effects = FULL) -> Scene:
-    """A preset scene with its effects written out."""
+    """A preset scene with given effects."""
     return replace(load_scene(name), effects=effects)
 
 
@@ -36,21 +36,32 @@ def solved(scene: Scene, method: str, rtol: float, step: float | None = None) ->
 
 
 def cpu(scene: Scene, method: str, rtol: float, repeats: int = REPEATS) -> float:
-    """CPU seconds of the steps, rows at the solver's own times, the fastest of some runs."""
+    """CPU time of the integration with rows at the solver's own steps [s], the fastest of several runs."""
     return min(solved(scene, method, rtol).counters.wall_time for _ in range(repeats))
 
 
 def difference(a: Array, b: Array) -> tuple[float, float]:
     """RMS and largest difference of two forces (T, 3) relative to the peak of the second."""
     rows = min(len(a), len(b))
-    apart = np.linalg.norm(a[:rows] - b[:rows], axis=1)
+    distance = np.linalg.norm(a[:rows] - b[:rows], axis=1)
     peak = np.linalg.norm(b[:rows], axis=1).max()
-    return float(np.sqrt(np.mean(apart**2)) / peak), float(apart.max() / peak)
+    return float(np.sqrt(np.mean(distance**2)) / peak), float(distance.max() / peak)
 
 
-def cheapest(scene: Scene, method: str, tolerances: tuple[float, ...], limit: float, reference: Array, step: float,
-             kind: int, columns: slice) -> tuple[float, float, Result]:  # fmt: skip
-    """The loosest tolerance whose force is within `limit` of the reference, that error and the run."""
+def cheapest(
+    scene: Scene,
+    method: str,
+    tolerances: tuple[float, ...],
+    limit: float,
+    reference: Array,
+    step: float,
+    kind: int,
+    columns: slice,
+) -> tuple[float, float, Result]:
+    """The loosest tolerance whose force is within `limit` of the reference, that error, and the run.
+
+    kind: 0 for the RMS error, 1 for the largest. columns: components of the force that are compared.
+    """
     for rtol in tolerances:
         run = solved(scene, method, rtol, step)
         error = difference(run.history.top_force[:, columns], reference[:, columns])[kind]
@@ -59,21 +70,26 @@ def cheapest(scene: Scene, method: str, tolerances: tuple[float, ...], limit: fl
     raise SystemExit(f"{method} meets {limit} at none of {tolerances}")
 
 
-def against_the_report() -> None:
-    """fenz-test2: the method of the report, full Newton inside dopri5."""
+def against_dopri5() -> None:
+    """fenz-test2: the method of PEER 2017/07, dopri5 with Newton on all unknowns."""
     scene, step, along = fixed("fenz-test2"), 0.05, slice(0, 1)
     reference = solved(scene, "implicit", 1e-7, step).history.top_force
     rtol, error, _ = cheapest(scene, "implicit", (1e-3, 3e-4, 1e-4, 3e-5, 1e-5), 1e-3, reference, step, 1, along)
-    theirs, their_error, run = cheapest(scene, "dopri5", (1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 1e-3, reference, step, 1, along)
+    theirs, their_error, run = cheapest(
+        scene, "dopri5", (1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 1e-3, reference, step, 1, along
+    )
     check = difference(run.history.top_force[:, along], reference[:, along])[1]
     ours, seconds = cpu(scene, "implicit", rtol), run.counters.wall_time
-    print(f"fenz-test2, largest force error < 1e-3 of the peak: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e}), "
-          f"dopri5 {theirs:g} {seconds:.1f} s, {run.counters.steps} steps ({their_error:.1e}); both references apart by {check:.1e}; "
-          f"times faster: {seconds / ours:.0f}", flush=True)  # fmt: skip
+    print(
+        f"fenz-test2, largest force error < 1e-3 of the peak: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e}), "
+        f"dopri5 {theirs:g} {seconds:.1f} s, {run.counters.steps} steps ({their_error:.1e}); the references differ by {check:.1e}; "
+        f"times faster: {seconds / ours:.0f}",
+        flush=True,
+    )
 
 
 def against_opensees() -> None:
-    """becker-eight-125: TripleFrictionPendulum, each against its own converged limit."""
+    """becker-eight-125: TripleFrictionPendulum of OpenSees; errors are relative to the converged run of each program."""
     scene = fixed("becker-eight-125")
     flat = slice(0, 2)
     step = scene.end / 2000
@@ -83,8 +99,8 @@ def against_opensees() -> None:
     text = f"becker-eight-125, RMS force error < 2e-3: implicit {rtol:g} {1e3 * ours:.2f} ms ({error:.1e})"
     try:
         limit = run_opensees(scene, 64_000).force
-    except InputError as told:
-        print(f"{text}; {told}; times faster: not measured", flush=True)
+    except InputError as error_text:
+        print(f"{text}; {error_text}; times faster: not measured", flush=True)
         return
     for steps in (500, 1000, 1500, 2000, 3000, 4000, 8000, 16_000):
         begin = time.process_time()
@@ -93,50 +109,61 @@ def against_opensees() -> None:
         theirs = difference(force, limit)[0]
         if theirs < 2e-3:
             seconds = min(seconds, *(opensees_seconds(scene, steps) for _ in range(4)))
-            print(f"{text}, OpenSees {steps} steps {1e3 * seconds:.1f} ms ({theirs:.1e}); "
-                  f"times faster: {seconds / ours:.1f}", flush=True)  # fmt: skip
+            print(
+                f"{text}, OpenSees {steps} steps {1e3 * seconds:.1f} ms ({theirs:.1e}); "
+                f"times faster: {seconds / ours:.1f}",
+                flush=True,
+            )
             return
     print(f"{text}, OpenSees not within 2e-3 at 16000 steps; times faster: not measured", flush=True)
 
 
 def opensees_seconds(scene: Scene, steps: int) -> float:
-    """CPU seconds of one run by OpenSees."""
+    """CPU time of one run by OpenSees [s]."""
     begin = time.process_time()
     run_opensees(scene, steps)
     return time.process_time() - begin
 
 
-def against_the_clock(explicit: bool) -> None:
-    """ridgecrest-clc: real time. The sliders ring undamped in the model; both references are given."""
+def against_real_time(explicit: bool) -> None:
+    """ridgecrest-clc: real time. References are without the undamped ringing of sliders and, with `explicit`, with it."""
     scene, step = fixed("ridgecrest-clc"), 0.005
-    quiet = solved(fixed("ridgecrest-clc", replace(FULL, sliders="massless")), "implicit", 1e-5, step).history.top_force
-    rtol, error, run = cheapest(scene, "implicit", (3e-2, 1e-2, 3e-3, 1e-3, 3e-4), 5e-3, quiet, step, 0, slice(0, 3))
+    filtered = solved(
+        fixed("ridgecrest-clc", replace(FULL, sliders="massless")), "implicit", 1e-5, step
+    ).history.top_force
+    rtol, error, run = cheapest(scene, "implicit", (3e-2, 1e-2, 3e-3, 1e-3, 3e-4), 5e-3, filtered, step, 0, slice(0, 3))
     ours, text = cpu(scene, "implicit", rtol), ""
     if explicit:
         ringing = solved(scene, "dopri5", 1e-6, step).history.top_force
         text = f" and {difference(run.history.top_force, ringing)[0]:.1e} of the explicit one that resolves the ringing"
-    print(f"ridgecrest-clc, 60 s: implicit {rtol:g} {1e3 * ours:.1f} ms, RMS force error {error:.1e} of the peak against "
-          f"the reference without ringing{text}; times real time: {scene.end / ours:.0f}", flush=True)  # fmt: skip
+    print(
+        f"ridgecrest-clc, 60 s: implicit {rtol:g} {1e3 * ours:.1f} ms, RMS force error {error:.1e} of the peak against "
+        f"the reference without ringing{text}; times real time: {scene.end / ours:.0f}",
+        flush=True,
+    )
 
 
 def planar() -> None:
-    """fenz-test2: what leaving out the third dimension and the sliders' inertia saves."""
+    """fenz-test2: time saved by a planar model without inertia of the sliders."""
     small = replace(FULL, dimension="planar", sliders="massless", rims=False)
     full, light = (cpu(fixed("fenz-test2", effects), "implicit", 1e-4, 15) for effects in (FULL, small))
-    print(f"fenz-test2, implicit 1e-4: spatial with inertia {1e3 * full:.2f} ms, planar massless {1e3 * light:.2f} ms; "
-          f"times cheaper: {full / light:.1f}", flush=True)  # fmt: skip
+    print(
+        f"fenz-test2, implicit 1e-4: spatial with inertia {1e3 * full:.2f} ms, planar massless {1e3 * light:.2f} ms; "
+        f"times cheaper: {full / light:.1f}",
+        flush=True,
+    )
 
 
 def main() -> None:
-    """Print a line for every comparison."""
+    """Print one line per comparison."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--all", action="store_true", help="with the explicit reference of the record, some minutes")
     chosen = parser.parse_args()
-    with patch("time.perf_counter", time.process_time):  # a run then counts its CPU time
-        against_the_clock(chosen.all)
+    with patch("time.perf_counter", time.process_time):  # runs then measure CPU time
+        against_real_time(chosen.all)
         planar()
         against_opensees()
-        against_the_report()
+        against_dopri5()
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""What a build and a run cost here, then against others, in batches and in instructions (docs/performance.md).
+"""Time builds and runs on this machine, then run the other benchmarks of docs/performance.md: `python benchmarks/speed.py`.
 
-Builds go to a cache of their own that is thrown away; every run is repeated and its fastest wall time counts.
+Builds go to a temporary cache. Every run is repeated and its fastest wall time counts.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ print(time.perf_counter() - begin)
 
 
 def cold_build(layout: str, cache: str) -> float:
-    """Seconds of `msfp-gen generate` for a layout that the cache does not hold, interpreter start included."""
+    """Wall time of `msfp-gen generate` for a layout that is not in the cache, with the start of the interpreter [s]."""
     begin = time.perf_counter()
     subprocess.run(
         [sys.executable, "-m", "msfp_gen", "generate", *layout.split()],
@@ -39,7 +39,7 @@ def cold_build(layout: str, cache: str) -> float:
 
 
 def warm_build(cache: str) -> float:
-    """Seconds of `build_model` in a new process that finds the model in the cache."""
+    """Wall time of `build_model` in a new process that finds the model in the cache [s]."""
     done = subprocess.run(
         [sys.executable, "-c", WARM],
         check=True,
@@ -51,7 +51,7 @@ def warm_build(cache: str) -> float:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print both tables, then run the other scripts."""
     from msfp_gen import load_scene, simulate
 
     with tempfile.TemporaryDirectory() as cache:

@@ -7,22 +7,23 @@ from pathlib import Path
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
-from msfp_gen.layout import Effects, Layout, ModelSpec
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 TARGET = Path(__file__).with_name("equations.md")
-ROWS = 6  # statements in one block: small blocks render everywhere
+ROWS = 6  # statements in one block; long blocks do not render everywhere
 
-INTRODUCTION = r"""# The equations, as the generator holds them
+INTRODUCTION = r"""# The equations, as the generator writes them
 
 Written by `docs/make_equations.py` from the same programs that become C; do not edit. Equation numbers are those of
-PEER Report 2017/07; [model.md](model.md) explains what is computed and why.
+PEER Report 2017/07 ("PEER 2017/07"); [model.md](model.md) explains what is computed and why, and
+[glossary.md](glossary.md) the terms.
 
 ## A small stack, assembled
 
-The planar stack $(n, m, p) = (2, 1, 0)$, one slider in one bowl, over a base that translates by $u_{g1}, u_{g3}$. The
-rim is open. The outside applies $F_1, F_3$ and $M_2$ to the top plate at $r_{22}$; $\lambda_{1}^{2}$ is the transverse
-moment of inertia of body 2 (2.118), $d_1$ the yield displacement ($R_0/R_1$ of the report), $H(x)$ is 1 for $x > 0$ and
-else 0. Unknown are $\ddot\theta_2$, $\tilde\theta_1$ and $N_1$ (2.119)."""
+The planar stack $(n, m, p) = (2, 1, 0)$ is one slider in one dish, over a base that translates by $u_{g1}, u_{g3}$. The
+rim is not in contact. The force $F_1, F_3$ and the moment $M_2$ act on the top plate at $r_{22}$. $\lambda_{1}^{2}$ is
+the transverse moment of inertia of body 2 (2.118), $d_1$ the yield displacement ($R_0/R_1$ of PEER 2017/07), and $H(x)$
+is 1 for $x > 0$ and 0 otherwise. The unknowns are $\ddot\theta_2$, $\tilde\theta_1$ and $N_1$ (2.119)."""
 
 ASSEMBLED = {
     "E1": ("Linear momentum along $E_1$ (3.28):", " = 0"),
@@ -31,22 +32,22 @@ ASSEMBLED = {
     "dY": ("Friction (3.18):", r" = \dot{Y}_1"),
 }
 
-PASSES = r"""## One body and one surface, spatial
+PROGRAMS = r"""## One body and one surface, spatial
 
 These are the statements of one body $k$ (between surfaces $k-1$ and $k$) and of one surface $\gamma$ (between bodies
-$\gamma$ and $\gamma+1$), in the order in which they run. The C loops over bodies and surfaces, so that they hold for
-every stack.
+$\gamma$ and $\gamma+1$), in the order of execution. The C code loops over bodies and surfaces, so they apply to every
+stack.
 
-- $\sigma = +1$ where a surface is concave up, $-1$ where it is concave down; the radius below the base and that above
-  the top plate count as 0.
+- $\sigma = +1$ where a surface is concave up, $-1$ where it is concave down; the radii below the base and above the top
+  plate are 0.
 - Subscripts $x, y, z$ are components along $E_1, E_2, E_3$; 1, 2, 3 are components along the basis of the body below
   the surface (of the body itself in the angular balance).
 - $r_{k}^{c}$ is the sphere centre above body $k$, $r_{kc}$ of (3.4) and (3.8), and $r_{nn}$ for the top plate.
-- $P_k, M_k$ is the wrench through interface $k$ on the body above, the moment about the sphere centre; $P_n, M_n$ is
-  $-F_{top}, -M_{top}$. $F_E, M_E$ is what the outside prescribes of it.
+- $P_k, M_k$ is the wrench of interface $k$ on the body above, the moment about the sphere centre; $P_n, M_n$ is
+  $-F_{top}, -M_{top}$. $F_E, M_E$ is the prescribed part of $F_{top}, M_{top}$.
 - $r_{s\gamma}, p_{s\gamma}$ are rim radius and rim offset of the slider of surface $\gamma$.
 - $S_{\psi_k}, C_{\psi_k}, S_{\theta_k}, C_{\theta_k}$ are sines and cosines of the angles of body $k$.
-- $x_1, x_2, \dots$ are numbers that a program keeps to itself."""
+- $x_1, x_2, \dots$ are local intermediate values of a program."""
 
 TITLES = {
     "arms": "Distances along the axis, from (3.4)-(3.11)",
@@ -57,7 +58,7 @@ TITLES = {
     "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",
     "surface_local": "Contact force and slip rotation in the basis of the body below (3.12), (3.19)",
     "contact": "Normal force and its position in closed form, friction (3.13)-(3.19)",
-    "report_contact": "The same at given unknowns, as the report states it (3.13)-(3.19)",
+    "report_contact": "The same at given unknowns, as stated in PEER 2017/07 (3.13)-(3.19)",
     "moment_to_world": "Moment about the sphere centre",
     "linear_balance": "Balance of linear momentum (3.26), (3.28): left side less right side",
     "angular_balance": "Balance of angular momentum (3.27), (3.29): left side less right side",
@@ -81,7 +82,7 @@ def assembled_section() -> list[str]:
 
 
 def program_sections() -> list[str]:
-    """The statements of every pass."""
+    """The statements of every program."""
     programs = {program.name: program for program in derive(ModelSpec(Layout.tfp(), Effects())).programs}
     parts = []
     for name, title in TITLES.items():
@@ -93,11 +94,11 @@ def program_sections() -> list[str]:
 
 def text() -> str:
     """The whole page."""
-    return "\n\n".join([INTRODUCTION, *assembled_section(), PASSES, *program_sections()]) + "\n"
+    return "\n\n".join([INTRODUCTION, *assembled_section(), PROGRAMS, *program_sections()]) + "\n"
 
 
 def main() -> None:
-    """Replace the page in one rename."""
+    """Write the page to a temporary file and rename it."""
     part = TARGET.with_suffix(".part")
     part.write_text(text(), encoding="utf-8")
     part.replace(TARGET)

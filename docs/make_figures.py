@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/figures.md and docs/tutorial.md: `python docs/make_figures.py [FOLDER]`."""
+"""Draw the figures of docs/figures.md and docs/tutorial.md: `python docs/make_figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import run_tutorial
 
 from msfp_gen import figures, load_scene, simulate
-from msfp_gen.records import baseline_corrected, bundled, response_spectrum
+from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.result import Result
 
 FOLDER = Path(__file__).resolve().parent / "figures"
@@ -23,7 +23,7 @@ TOLERANCES = 10.0 ** -np.arange(2, 7)
 
 
 def run(name: str, sliders: str = "inertial", **solver: Any) -> Result:
-    """The run of a preset, with rows close enough for smooth curves."""
+    """The run of a preset, with enough rows for smooth curves."""
     scene = load_scene(name)
     step = min(scene.end / ROWS, scene.motion.max_step or scene.end)
     effects = replace(scene.effects, sliders=sliders)
@@ -31,7 +31,7 @@ def run(name: str, sliders: str = "inertial", **solver: Any) -> Result:
 
 
 def draw_runs(folder: Path) -> None:
-    """Figures of test 5 of the report, of an orbit and of an earthquake."""
+    """Figures of test 5 of PEER 2017/07, of an orbit and of an earthquake."""
     test, quake = run("fenz-test5"), run("ridgecrest-clc")
     for name in ("loops", "sliding", "stages", "energy"):
         figures.FIGURES[name](test, folder / f"gallery-{name}.png")
@@ -44,7 +44,7 @@ def draw_runs(folder: Path) -> None:
 
 
 def draw_tutorial(folder: Path) -> None:
-    """The pictures of the tutorial, by its own commands."""
+    """The figures of the tutorial, made by its own commands."""
     with TemporaryDirectory() as name:
         for _ in run_tutorial.follow(Path(name)):
             pass
@@ -53,7 +53,7 @@ def draw_tutorial(folder: Path) -> None:
 
 
 def draw_record(folder: Path) -> None:
-    """What correction did to a record, and its spectra."""
+    """A record before and after correction, and its response spectra."""
     raw = bundled(RECORD)
     corrected = baseline_corrected(raw, duration=60.0)
     figures.plot_correction(raw, corrected, folder / "gallery-correction.png")

@@ -1,8 +1,8 @@
-"""Do what docs/tutorial.md says: `python docs/run_tutorial.py FOLDER`. For its test, and for its pictures.
+"""Run the commands of docs/tutorial.md: `python docs/run_tutorial.py FOLDER`. Its test and its figures use this script.
 
-A block marked `sh` is commands, one a line; one marked `toml` or `python` is the file that its first line names; one
-marked `text` is what the commands before it print: lines, and what is behind `...`, are left out. The first block of
-commands installs, and is not run.
+A block marked `sh` contains commands, one per line. A block marked `toml` or `python` is a file named in its first
+line. A block marked `text` is the output of the preceding commands; lines, and the rest of a line after `...`, may be
+left out. The first block of commands installs the package and is not run.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Block(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Commands that were run, everything they printed, and what the page shows of it."""
+    """Commands, their complete output, and the output that the page shows."""
 
     commands: list[str]
     printed: str
@@ -36,13 +36,13 @@ class Step(NamedTuple):
 
 
 def blocks() -> list[Block]:
-    """Every fenced block of the page, in order."""
+    """All fenced blocks of the page, in order."""
     text = PAGE.read_text(encoding="utf-8")
     return [Block(*found) for found in re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)]
 
 
 def run(command: str, folder: Path) -> str:
-    """Run a command of the page with the Python of this process; what it prints."""
+    """Run a command of the page with the Python of this process; returns its output."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     words, variables = shlex.split(command, comments=True), {**os.environ, "PATH": path}
     done = subprocess.run(words, cwd=folder, env=variables, capture_output=True, text=True, check=False)
@@ -52,7 +52,7 @@ def run(command: str, folder: Path) -> str:
 
 
 def follow(folder: Path, run: Callable[[str, Path], str] = run) -> Iterator[Step]:
-    """Follow the page in `folder`; a step for every block of commands. `run` takes each command and the folder."""
+    """Follow the page in `folder`; yields one step per block of commands. `run` runs a command in the folder."""
     install, *rest = blocks()
     assert install.language == "sh", "the page begins with the installation"
     step = None

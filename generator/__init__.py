@@ -1,6 +1,7 @@
-"""The generator: layout and effects in, C out. Pure: no disk, no compiler, no numbers.
+"""The generator: derives the equations of a layout with its effects and emits them as C.
 
-`generate` reads as the list of its stages: derive -> lower -> emit.
+It reads and writes no files, runs no compiler and contains no values of a bearing. `generate` calls its stages in
+order: derive -> lower -> emit.
 """
 
 from __future__ import annotations
@@ -10,12 +11,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from msfp_gen.layout import ModelSpec
+    from msfp_gen.specification.layout import ModelSpec
 
 
 @dataclass(frozen=True)
 class Generated:
-    """The emitted files and what they hold."""
+    """Result of `generate`.
+
+    Attributes:
+        files: file name -> text.
+        statements: number of statements of all programs, tangents included.
+        operations: number of arithmetic operations of all programs, tangents included.
+        stages: name of a stage -> its wall time [s].
+    """
 
     files: dict[str, str]
     statements: int
@@ -23,27 +31,26 @@ class Generated:
     stages: dict[str, float]
 
 
-def generate(spec: ModelSpec, module: str, batch: bool = False) -> Generated:
-    """Derive, lower and emit one model; `module` names the extension, `batch` asks for kernels of many runs at once.
+def generate(spec: ModelSpec, module: str) -> Generated:
+    """Derive, lower and emit one model.
 
-    Returns the text of every generated file, the number of statements and of arithmetic operations of
-    the programs (of one body and one surface: C loops over them), and the seconds of each stage.
+    Statements and operations are counted for one body and one surface, since the C code loops over them.
+
+    Args:
+        spec: layout and effects.
+        module: name of the extension module.
     """
     from .derive import derive
     from .emit import emit
     from .lower import lower
 
-    marks = [time.perf_counter()]
-
-    def done() -> None:
-        marks.append(time.perf_counter())
-
+    times = [time.perf_counter()]
     equations = derive(spec)
-    done()
+    times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
-    done()
-    files = emit(equations, kernels, module, batch)
-    done()
-    stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), marks, marks[1:], strict=False)}
+    times.append(time.perf_counter())
+    files = emit(equations, kernels, module)
+    times.append(time.perf_counter())
+    stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), times, times[1:], strict=False)}
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
     return Generated(files, statements, sum(k.operations + k.tangent_operations for k in kernels), stages)

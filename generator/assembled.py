@@ -1,6 +1,7 @@
-"""A small stack assembled from the programs, scalar by scalar, to hold against the report.
+"""Explicit equations of a small stack, assembled from the programs for comparison with PEER 2017/07.
 
-Only for stacks this small, and only for people: the C is emitted from the programs as they are.
+It serves documentation and tests only: the C code is emitted from the programs, and expanded expressions of larger
+stacks would be too long.
 """
 
 from __future__ import annotations
@@ -9,21 +10,27 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from msfp_gen.layout import Effects, Layout, ModelSpec
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 from .derive import derive
-from .latex import to_latex, written
+from .latex import result_statements, to_latex
 from .program import Program
 
 Values = Mapping[str, sp.Expr]
-"""Stored fields of a block, by name."""
+"""Stored field of a block -> its value."""
 
 NAMES = {
-    "ell_1": r"\ell_{1}", "ell_2": r"\ell_{2}", "lambda_2": r"\lambda_{1}^{2}", "thetat_1": r"\tilde{\theta}_{1}",
-    "ddu_g1": r"\ddot{u}_{g1}", "ddu_g3": r"\ddot{u}_{g3}",
-    "dtheta_1": r"\dot{\theta}_{1}", "dtheta_2": r"\dot{\theta}_{2}",
-    "ddtheta_1": r"\ddot{\theta}_{1}", "ddtheta_2": r"\ddot{\theta}_{2}",
-}  # fmt: skip
+    "ell_1": r"\ell_{1}",
+    "ell_2": r"\ell_{2}",
+    "lambda_2": r"\lambda_{1}^{2}",
+    "thetat_1": r"\tilde{\theta}_{1}",
+    "ddu_g1": r"\ddot{u}_{g1}",
+    "ddu_g3": r"\ddot{u}_{g3}",
+    "dtheta_1": r"\dot{\theta}_{1}",
+    "dtheta_2": r"\dot{\theta}_{2}",
+    "ddtheta_1": r"\ddot{\theta}_{1}",
+    "ddtheta_2": r"\ddot{\theta}_{2}",
+}
 NO_FORCE = {"Fx": sp.Integer(0), "Fz": sp.Integer(0)}
 NO_RIG = dict.fromkeys(("k", "c", "kr", "cr", "m", "jt", "ja", "h", "g", "x0x", "x0z"), sp.Integer(0))
 
@@ -33,28 +40,37 @@ def symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
 
 
-def evaluated(program: Program, **inputs: Values) -> dict[str, sp.Expr]:
-    """The results of a program with its inputs put in and every statement put into the next."""
-    known = {symbol(f"{alias}_{field}"): sp.sympify(value)
-             for alias, fields in inputs.items() for field, value in fields.items()}
-    for statement in written(program, program.results):
+def evaluate(program: Program, **inputs: Values) -> dict[str, sp.Expr]:
+    """Results of a program as expanded expressions of its inputs; `inputs` are the values of each alias."""
+    known = {
+        symbol(f"{alias}_{field}"): sp.sympify(value)
+        for alias, fields in inputs.items()
+        for field, value in fields.items()
+    }
+    for statement in result_statements(program, program.results):
         known[statement.target] = statement.expression.xreplace(known)
     return {field: expression.xreplace(known) for field, expression in program.results.items()}
 
 
-def between(height: str, centroid: str, lower: sp.Expr, upper: sp.Expr) -> dict[str, sp.Expr]:
-    """Dimensions of a body between two concave-up surfaces."""
-    return {"height": symbol(height), "centroid": symbol(centroid), "sign_lower": sp.Integer(1),
-            "sign_upper": sp.Integer(1), "radius_lower": lower, "radius_upper": upper}
+def dimensions(height: str, centroid: str, lower: sp.Expr, upper: sp.Expr) -> dict[str, sp.Expr]:
+    """Dimensions of a body between two concave-up surfaces of radii `lower` and `upper`."""
+    return {
+        "height": symbol(height),
+        "centroid": symbol(centroid),
+        "sign_lower": sp.Integer(1),
+        "sign_upper": sp.Integer(1),
+        "radius_lower": lower,
+        "radius_upper": upper,
+    }
 
 
-def angles(k: int) -> dict[str, sp.Expr]:
-    """Coordinates of body k."""
+def coordinates(k: int) -> dict[str, sp.Expr]:
+    """Tilt angle of body k with its first and second time derivative."""
     return {"theta": symbol(f"theta_{k}"), "theta1": symbol(f"dtheta_{k}"), "theta2": symbol(f"ddtheta_{k}")}
 
 
-def ground() -> dict[str, sp.Expr]:
-    """What carries the base: the frame E at r_01."""
+def ground_motion() -> dict[str, sp.Expr]:
+    """Kinematics of the ground, which takes the place of the body below the base: the frame E at r_01."""
     fields = dict.fromkeys(("t1z", "t3x", "wy", "wpy", "aly", "alpy"), sp.Integer(0))
     fields |= {"t1x": sp.Integer(1), "t3z": sp.Integer(1)}
     for field, dots in (("C", ""), ("V", "d"), ("A", "dd")):
@@ -63,36 +79,50 @@ def ground() -> dict[str, sp.Expr]:
 
 
 def assembled() -> dict[str, sp.Expr]:
-    """The planar stack (n, m, p) = (2, 1, 0) written out, without rim and rig.
+    """Explicit equations of the planar stack (n, m, p) = (2, 1, 0) without rim contact and rig.
 
-    Keys: `E1`, `E3` (3.28) [N] and `t2` (3.29) [N m], left side less right side as `Model.residual` gives them, and
-    `dY` (3.18) [1/s]. The base translates and rocks: u_g1, u_g3, theta_1. The outside applies F_1, F_3 and M_2 to the
-    top plate at r_22.
+    The base translates by u_g1, u_g3 and rotates by theta_1. The force F_1, F_3 and the moment M_2 act on the top plate
+    at r_22.
+
+    Returns:
+        `E1`, `E3`: linear momentum (3.28) [N]; `t2`: angular momentum (3.29) [N m], left side less right side as in
+        `Model.residual`; `dY`: friction rate (3.18) [1/s].
     """
     spec = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar", rims=False))
     p = {program.name: program for program in derive(spec).programs}
     R, zero = symbol("R_1"), sp.Integer(0)
-    lower = evaluated(p["arms"], d=between("ell_1", "z_1", zero, R))
-    plate = evaluated(p["arms"], d=between("ell_2", "z_2", R, zero))
+    lower = evaluate(p["arms"], d=dimensions("ell_1", "z_1", zero, R))
+    plate = evaluate(p["arms"], d=dimensions("ell_2", "z_2", R, zero))
     plate |= {"m": symbol("m_2"), "jt": symbol("lambda_2"), "ja": zero, "g": symbol("g")}
-    base = evaluated(p["forward"], par=lower, u=ground(), x=angles(1))
-    body = evaluated(p["forward"], par=plate, u=base, x=angles(2))
+    base = evaluate(p["forward"], par=lower, u=ground_motion(), x=coordinates(1))
+    body = evaluate(p["forward"], par=plate, u=base, x=coordinates(2))
 
-    local = evaluated(p["surface_local"], b=base, a=body, x=angles(2), y=angles(1), tot=NO_FORCE, rim=NO_FORCE)
+    local = evaluate(p["surface_local"], b=base, a=body, x=coordinates(2), y=coordinates(1), tot=NO_FORCE, rim=NO_FORCE)
     surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1")}
-    touch = evaluated(p["report_contact"], par=surface, x={"theta": symbol("thetat_1"), "N": symbol("N_1")},
-                      f={"Y": symbol("Y_1")}, loc=local)
-    force = evaluated(p["force_to_world"], b=base, loc={"Fx": touch["px"], "Fz": touch["pz"]})
-    moment = evaluated(p["moment_to_world"], b=base, loc={"My": touch["My"]})
-    top = evaluated(p["top_wrench"], par=NO_RIG, b=body, x=angles(2),
-                    fe={"Fx": symbol("F_1"), "Fz": symbol("F_3")}, me={"My": symbol("M_2")})
-    linear = evaluated(p["linear_balance"], par=plate, b=body, lo=force, up=top)
-    angular = evaluated(p["angular_balance"], par=plate, b=body, lo=force, ml=moment, up=top, mu=top)
+    touch = evaluate(
+        p["report_contact"],
+        par=surface,
+        x={"theta": symbol("thetat_1"), "N": symbol("N_1")},
+        f={"Y": symbol("Y_1")},
+        loc=local,
+    )
+    force = evaluate(p["force_to_world"], b=base, loc={"Fx": touch["px"], "Fz": touch["pz"]})
+    moment = evaluate(p["moment_to_world"], b=base, loc={"My": touch["My"]})
+    top = evaluate(
+        p["top_wrench"],
+        par=NO_RIG,
+        b=body,
+        x=coordinates(2),
+        fe={"Fx": symbol("F_1"), "Fz": symbol("F_3")},
+        me={"My": symbol("M_2")},
+    )
+    linear = evaluate(p["linear_balance"], par=plate, b=body, lo=force, up=top)
+    angular = evaluate(p["angular_balance"], par=plate, b=body, lo=force, ml=moment, up=top, mu=top)
     return {"E1": linear["rx"], "E3": linear["rz"], "t2": angular["ry"], "dY": touch["dY"]}
 
 
 def readable(expression: sp.Expr) -> sp.Expr:
-    """An assembled expression in few terms: angles summed, masses and forces in front."""
+    """An assembled expression in few terms: products of sines and cosines combined, masses and forces factored out."""
     from sympy.simplify.fu import TR8
 
     def by_angle(factor: sp.Expr) -> sp.Expr:
@@ -103,12 +133,12 @@ def readable(expression: sp.Expr) -> sp.Expr:
 
 
 def over_level_base(expression: sp.Expr) -> sp.Expr:
-    """An assembled expression where the base translates only."""
+    """An assembled expression for a base that translates without rotation: theta_1 = 0."""
     return expression.xreplace({symbol(f"{dots}theta_1"): sp.Integer(0) for dots in ("", "d", "dd")})
 
 
 def assembled_latex() -> dict[str, list[str]]:
-    """LaTeX of `assembled` over a level base: the terms of each sum, signs included."""
+    """LaTeX of `assembled` for a base without rotation: the signed terms of each sum."""
     names = {symbol(name): text for name, text in NAMES.items()}
     rows: dict[str, list[str]] = {}
     for name, expression in assembled().items():

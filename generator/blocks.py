@@ -1,4 +1,4 @@
-"""The records that programs exchange: what C stores per body, per surface and at the top.
+"""The blocks that programs exchange: the numbers that C stores per body, per surface and at the top.
 
 The order of the fields here is the order in memory; the emitted header spells it out.
 In a planar model polar vectors keep (E1, E3), axial ones keep E2.
@@ -45,13 +45,13 @@ class Blocks:
     points: Block
     base_motion: Block
     energy: Block
-    seat: Block
+    unilateral: Block
     coefficient: Block | None = None
     """The friction coefficient as an unknown, where it follows a law."""
 
 
 def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
-    """What a user gives: dimensions, masses, surfaces, the top."""
+    """Parameters: dimensions, masses, surfaces, the top."""
     return {
         "dimensions": new("dimensions")
         .scalar("height", "m", "l, height of the body")
@@ -83,10 +83,10 @@ def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("cc", "N s/m", "rim damping (3.23)")
         .scalar("rs", "m", "radius of the slider that carries the contact patch")
         .scalar("pr", "m", "p, height of the rim contact above the slider's face (3.25)")
-        .scalar("ks", "N/m", "stiffness of the seat, along the force through the surface (docs/uplift.md)")
-        .scalar("cs", "s/m", "damping of the seat, over its stiffness and compression")
-        .scalar("ca", "-", "cosine of the half-angle of the footprint, as the resultant sees it")
-        .scalar("sa", "-", "its sine")
+        .scalar("ks", "N/m", "stiffness of the unilateral contact, along the interface force (docs/uplift.md)")
+        .scalar("cs", "s/m", "damping of the unilateral contact, over its stiffness and compression")
+        .scalar("ca", "-", "cosine of the half-angle of the footprint, friction angle included")
+        .scalar("sa", "-", "sine of that angle")
         .build(),
         "top_parameters": new("top_parameters")
         .scalar("k", "N/m", "horizontal stiffness of the rig")
@@ -104,7 +104,7 @@ def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _coordinates(new: Maker, uplift: bool) -> Block:
-    """Angles of a body; with uplift also how far its sphere centre below has left that of the surface."""
+    """Angles of a body, and with uplift the separation of its lower sphere centre from that of the surface below."""
     builder = (
         new("coordinates")
         .scalar("psi", "rad", "psi, first Euler angle", 0)
@@ -162,7 +162,7 @@ def _motion(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
-    """What passes through a surface, and what decides it."""
+    """Interface force and moment of a surface, its friction and its contact."""
     return {
         "vector": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
         "moment": new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
@@ -203,7 +203,7 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
-    """Gap and rim of a surface."""
+    """Gap, rim and unilateral contact of a surface."""
     return {
         "rim": new("rim")
         .vector("f", "N", "F_c (3.22), basis of the body below", POLAR)
@@ -219,10 +219,10 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("theta1", "rad/s", "its rate")
         .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
-        "seat": new("seat")
+        "unilateral": new("unilateral")
         .vector("F", "N", "force on the body above, along E1, E2, E3", POLAR)
         .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)
-        .scalar("grip", "-", "1 + damping: the seat does not pull below zero")
+        .scalar("grip", "-", "1 + damping share of the force; where it is not positive the contact is open")
         .scalar("stored", "J", "elastic energy")
         .scalar("power", "W", "rate of the elastic energy")
         .build(),
@@ -230,20 +230,20 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
-    """What a body's balances and the top give."""
+    """Residuals of the balances of a body, and the boundary conditions at the top."""
     return {
         "top_wrench": new("top_wrench")
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
         .build(),
         "support": new("support")
-        .scalar("psi", "rad", "psi of what the rotational stiffness holds the top plate to", 0)
-        .scalar("theta", "rad", "its theta")
+        .scalar("psi", "rad", "psi of the support of the top plate", 0)
+        .scalar("theta", "rad", "theta of the support of the top plate")
         .scalar("psi1", "rad/s", "d psi/dt", 0)
         .scalar("theta1", "rad/s", "d theta/dt")
         .build(),
         "upright": new("upright")
-        .vector("e", "-", "the direction it holds the top plate's t_3 to", POLAR)
+        .vector("e", "-", "axis of the support, in line with the t_3 of the top plate at rest", POLAR)
         .vector("w", "rad/s", "its angular velocity", AXIAL)
         .build(),
         "linear": new("linear")
@@ -256,13 +256,13 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def make_blocks(planar: bool, uplift: bool = False) -> Blocks:
-    """The blocks of a planar or spatial model, with or without bodies that part."""
+    """The blocks of a planar or spatial model, with or without uplift."""
 
     def new(name: str) -> BlockBuilder:
         return BlockBuilder(name, planar)
 
-    rooms = (_parameters, _motion, _interfaces, _rims, _balances)
-    return Blocks(**{name: block for room in rooms for name, block in room(new, uplift).items()})
+    groups = (_parameters, _motion, _interfaces, _rims, _balances)
+    return Blocks(**{name: block for group in groups for name, block in group(new, uplift).items()})
 
 
 def _points(new: Maker) -> Block:

@@ -79,15 +79,15 @@ def point(p: Program, centre: Vector, distance: sp.Expr, t3: Vector) -> tuple[Ve
     return p.let_vector(r, "r"), v, p.rate_vector(v)
 
 
-def seat_of(p: Program, up: Symbols, x: Symbols) -> Vector:
-    """Sphere centre of the body at its lower end: that of the surface below, moved by delta where bodies may part."""
+def centre_below(p: Program, up: Symbols, x: Symbols) -> Vector:
+    """Sphere centre of the body at its lower end: that of the surface below plus, with uplift, the separation."""
     p.declare_rates(up["C"], up["V"])
     p.declare_rates(up["V"], up["A"])
     if "d" not in x:
         return up["C"]  # type: ignore[no-any-return]
     p.declare_rates(x["d"], x["d1"])
     p.declare_rates(x["d1"], x["d2"])
-    return p.let_vector(add(up["C"], x["d"]), "seat")
+    return p.let_vector(add(up["C"], x["d"]), "centre")
 
 
 def forward(b: Blocks) -> Program:
@@ -100,9 +100,9 @@ def forward(b: Blocks) -> Program:
     up: Symbols = p.read(b.body, "u", active=("t1", "t2", "t3", "w", "al", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=True)
     out = turn(p, up, x)
-    seat = seat_of(p, up, x)
-    out["C"], out["V"], out["A"] = point(p, seat, par["e"], out["t3"])
-    out["rc"], out["vc"], out["ac"] = point(p, seat, par["c"], out["t3"])
+    centre = centre_below(p, up, x)
+    out["C"], out["V"], out["A"] = point(p, centre, par["e"], out["t3"])
+    out["rc"], out["vc"], out["ac"] = point(p, centre, par["c"], out["t3"])
     p.write(b.body, out, tangents=[q for q in b.body.quantities if q not in ("rc", "vc")])
     return p
 
@@ -114,7 +114,7 @@ def named_points(b: Blocks) -> Program:
     up: Symbols = p.read(b.body, "u", active=False)
     x: Symbols = p.read(b.coordinates, "x", active=False)
     t3 = turn(p, up, x)["t3"]
-    seat = seat_of(p, up, x)
+    centre = centre_below(p, up, x)
     concave_up = (1 + d["sign_lower"]) / 2
     bottom = p.let(-d["sign_lower"] * d["radius_lower"])
     centroid = p.let(bottom + concave_up * d["centroid"] + (1 - concave_up) * (d["height"] - d["centroid"]))
@@ -122,7 +122,7 @@ def named_points(b: Blocks) -> Program:
     distances = {"lo": bottom, "cm": centroid, "up": top, "sc": p.let(top + d["sign_upper"] * d["radius_upper"])}
     out: Symbols = {}
     for name, distance in distances.items():
-        out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, seat, distance, t3)
+        out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, centre, distance, t3)
     p.write(b.points, out, tangents=False)
     return p
 

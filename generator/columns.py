@@ -1,10 +1,10 @@
-"""Columns of the tangent of the condensed equations: what one unknown changes for one body.
+"""Columns of the tangent of the condensed equations: the variation of one body with one unknown.
 
-A tilt of a body turns it, and all that stands on it, about the sphere centre below it: a screw (turning and
-translation, each with two time derivatives) that is one and the same for every body above. Seen in axes that turn
-along, a body feels no more of it than the rates of the turning; its basis stays. So a column costs a body a few
-products, whatever stands below it (docs/model.md, "The tangent"). What a body's own unknowns change at the surface
-below it comes on top (`own`).
+A tilt of a body turns it, and all bodies above it, about the sphere centre below it: a twist (rotation and
+translation, each with two time derivatives) that is the same for every body above. In the body-fixed frame the basis
+of a body does not change under it; only its angular velocity and acceleration do. A column therefore costs a few
+products per body, however many bodies lie below (docs/model.md, "The tangent"). The variation of the surface below a
+body with the unknowns of that body is added (`local_variation`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .vectors import add, cross, project, scale, subtract
 Symbols = dict[str, Any]
 ORDERS = (0, 1, 2)
 TILTS = {"psi": ("sp", "cp"), "theta": ("st", "ct")}
-"""Angles that turn a body's axes, with the fields of a body that hold their sine and cosine."""
+"""Tilt angles of a body, with the fields of a body that hold their sine and cosine."""
 
 
 def repeated(block: Block, name: str, unknowns: tuple[str, ...]) -> Block:
-    """A block for every unknown, one after the other."""
+    """The fields of `block` once per unknown, one after the other."""
     return Block(
         name,
         tuple(replace(f, name=f"{u}_{f.name}") for u in unknowns for f in block.fields),
@@ -41,54 +41,56 @@ def repeated(block: Block, name: str, unknowns: tuple[str, ...]) -> Block:
 
 @dataclass(frozen=True)
 class Columns:
-    """The blocks of columns, beside those of the equations themselves."""
+    """The blocks that only the columns of the tangent use."""
 
     seed: Block
-    screw: Block
-    screws: Block
-    own: Block
-    owns: Block
+    twist: Block
+    twists: Block
+    variation: Block
+    variations: Block
     turning: Block
 
 
 def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns:
-    """The blocks of columns of a model with these unknowns a body."""
+    """The blocks of the columns of a model whose bodies have these unknowns."""
     seed = BlockBuilder("seed", planar)
-    screw = BlockBuilder("screw", planar)
+    twist = BlockBuilder("twist", planar)
     for order, per in zip(ORDERS, ("", "/s", "/s^2"), strict=True):
         seed.scalar(f"s{order}", "-", f"derivative {order} in time of an angle, per unit of the unknown")
-        screw.vector(f"q{order}", f"rad{per}", "turning, or its derivative in time", AXIAL)
-        screw.vector(f"t{order}", f"m{per}", "translation of what is at the origin, likewise", POLAR)
-    own = BlockBuilder("own", planar)
-    own.vector("dw", "rad/s", "omega'_above - omega'_below, basis of the body below", AXIAL)
+        twist.vector(f"q{order}", f"rad{per}", "rotation, or its derivative in time", AXIAL)
+        twist.vector(f"t{order}", f"m{per}", "translation of the point at the origin, or its derivative", POLAR)
+    variation = BlockBuilder("variation", planar)
+    variation.vector("dw", "rad/s", "omega'_above - omega'_below, basis of the body below", AXIAL)
     if "tilt" in b.local.quantities:
-        own.scalar("tilt", "-", "cosine of the angle between the axes of the two bodies")
-    own.vector("p", "N", "force through the surface, as the body's axes turn, basis of the body below", POLAR)
-    own.vector("F", "N", "the same along E1, E2, E3", POLAR)
-    own.vector("M", "N m", "moment of the surface in the body's basis, likewise", AXIAL)
+        variation.scalar("tilt", "-", "cosine of the angle between the axes of the two bodies")
+    variation.vector(
+        "p", "N", "variation of the interface force by rotation of the body, basis of the body below", POLAR
+    )
+    variation.vector("F", "N", "the same variation along E1, E2, E3", POLAR)
+    variation.vector("M", "N m", "variation of the moment of the surface, basis of the body above", AXIAL)
     turning = BlockBuilder("turning", planar)
-    for block in (own, turning) if "phi" in unknowns else (turning,):
+    for block in (variation, turning) if "phi" in unknowns else (turning,):
         block.vector("wp", "rad/s", "omega', with spin (3.12)", AXIAL)
         block.vector("alp", "rad/s^2", "d omega'/dt", AXIAL)
-    one, mine = screw.build(), own.build()
-    tilts = repeated(one, "screws", tuple(u for u in unknowns if u in TILTS))
-    return Columns(seed.build(), one, tilts, mine, repeated(mine, "owns", unknowns), turning.build())
+    one, local = twist.build(), variation.build()
+    tilts = repeated(one, "twists", tuple(u for u in unknowns if u in TILTS))
+    return Columns(seed.build(), one, tilts, local, repeated(local, "variations", unknowns), turning.build())
 
 
 def axes(up: Symbols, body: Symbols) -> dict[str, tuple[Vector, Vector, Vector]]:
-    """What each tilt of a body turns it about, with the angular velocity and acceleration of that axis (2.4), (2.5)."""
+    """Axis of each tilt angle, with the angular velocity and acceleration of that axis (2.4), (2.5)."""
     return {"psi": (up["t1"], up["w"], up["al"]), "theta": (body["t2"], body["w"], body["al"])}
 
 
-def screws(b: Blocks, c: Columns) -> Program:
-    """The screws of a body's tilts: turning about the sphere centre below, differentiated twice in time."""
-    p = Program("screws", "how the tilts of a body move it and all that stands on it: (2.4), (2.5), (2.36)")
+def twists(b: Blocks, c: Columns) -> Program:
+    """Twists of the tilt angles of a body about the sphere centre below it, with two time derivatives."""
+    p = Program("twists", "twists of a body and all bodies above it by its tilt angles: (2.4), (2.5), (2.36)")
     s: Symbols = p.read(c.seed, "s", active=False)
     up: Symbols = p.read(b.body, "u", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     out: Symbols = {}
     for angle, (axis, w, al) in axes(up, body).items():
-        if f"{angle}_q0" not in c.screws.quantities:
+        if f"{angle}_q0" not in c.twists.quantities:
             continue
         p.rates = {s["s0"]: s["s1"], s["s1"]: s["s2"]}
         p.declare_rates(up["C"], up["V"])
@@ -101,15 +103,15 @@ def screws(b: Blocks, c: Columns) -> Program:
             out |= {f"{angle}_q{order}": turned, f"{angle}_t{order}": moved}
             if order < 2:
                 turned, moved = p.rate_vector(turned), p.rate_vector(moved)
-    p.write(c.screws, out, tangents=False)
+    p.write(c.twists, out, tangents=False)
     return p
 
 
-def carried(b: Blocks, c: Columns) -> Program:
-    """A body after a small screw: what the top feels of the columns."""
-    p = Program("carried", "a body after a small screw")
+def transported_twist(b: Blocks, c: Columns) -> Program:
+    """Kinematics of a body after an infinitesimal twist in the fixed frame; used at the top plate."""
+    p = Program("transported_twist", "a body after an infinitesimal twist")
     body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.screw, "s")
+    s: Symbols = p.read(c.twist, "s")
     out = {**body, "t3": add(body["t3"], cross(s["q0"], body["t3"]))}
     for w, al in (("w", "al"), ("wp", "alp")):
         out[w] = add(body[w], s["q1"], cross(s["q0"], body[w]))
@@ -123,22 +125,24 @@ def carried(b: Blocks, c: Columns) -> Program:
     return p
 
 
-def felt(b: Blocks, c: Columns) -> Program:
-    """What a body feels of a small screw in axes that turn along."""
-    p = Program("felt", "turning of a body after a small screw, in axes that turn along")
+def variation_of_rates(b: Blocks, c: Columns) -> Program:
+    """Variation of angular velocity and acceleration under an infinitesimal twist, in the body-fixed frame."""
+    p = Program(
+        "variation_of_rates", "angular velocity and acceleration of a body after a twist, in the body-fixed frame"
+    )
     body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.screw, "s")
+    s: Symbols = p.read(c.twist, "s")
     alp = add(body["alp"], s["q2"], cross(s["q1"], body["wp"]))
     p.write(c.turning, {"wp": add(body["wp"], s["q1"]), "alp": alp})
     return p
 
 
-def carried_force(b: Blocks, c: Columns, massless: bool) -> Program:
-    """Force below a body from the force above (3.26), (3.28), both in axes that turn along: gravity turns instead."""
-    p = Program("carried_force", "force below a body from the force above: (3.26), (3.28) in axes that turn along")
+def transported_force(b: Blocks, c: Columns, massless: bool) -> Program:
+    """Force below a body from that above (3.26), (3.28), both in the body-fixed frame, in which gravity rotates."""
+    p = Program("transported_force", "force below a body from the force above: (3.26), (3.28) in the body-fixed frame")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.screw, "s")
+    s: Symbols = p.read(c.twist, "s")
     above: Symbols = p.read(b.vector, "up")
     gravity: Vector = (sp.Integer(0), sp.Integer(0), par["g"])
     asked = subtract(gravity, cross(s["q0"], gravity))
@@ -149,11 +153,13 @@ def carried_force(b: Blocks, c: Columns, massless: bool) -> Program:
     return p
 
 
-def seen_wrench(b: Blocks, c: Columns) -> Program:
-    """Force and moment at the top in axes that turn along; the moment in the body's basis."""
-    p = Program("seen_wrench", "force and moment at the top in axes that turn along; the moment in the body's basis")
+def transported_wrench(b: Blocks, c: Columns) -> Program:
+    """Force and moment at the top in the body-fixed frame; the moment along the body's basis vectors."""
+    p = Program(
+        "transported_wrench", "force and moment at the top in the body-fixed frame; the moment in the body's basis"
+    )
     body: Symbols = p.read(b.body, "b", active=False)
-    s: Symbols = p.read(c.screw, "s")
+    s: Symbols = p.read(c.twist, "s")
     force: Symbols = p.read(b.vector, "f")
     moment: Symbols = p.read(b.moment, "m")
     seen = subtract(moment["M"], cross(s["q0"], moment["M"]))
@@ -163,7 +169,7 @@ def seen_wrench(b: Blocks, c: Columns) -> Program:
 
 
 def force_to_local(b: Blocks) -> Program:
-    """Force through a surface in the basis of the body below."""
+    """Interface force of a surface in the basis of the body below."""
     p = Program("force_to_local", "force: from E to the basis of the body below")
     body: Symbols = p.read(b.body, "b", active=False)
     force: Symbols = p.read(b.vector, "f")
@@ -177,8 +183,8 @@ def basis_above(p: Program, body: Symbols) -> tuple[Vector, Vector, Vector]:
 
 
 def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program:
-    """(3.27), (3.29) in axes that turn along: forces along E, moments in the basis of the body below their surface."""
-    p = Program("turning_balance", "balance of angular momentum (3.27), (3.29) in axes that turn along")
+    """(3.27), (3.29) in the body-fixed frame: forces along E, moments in the basis of the body below their surface."""
+    p = Program("turning_balance", "balance of angular momentum (3.27), (3.29) in the body-fixed frame")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     turning: Symbols = p.read(c.turning, "w", active=() if massless else ("wp", "alp"))
@@ -199,9 +205,9 @@ def turning_balance(b: Blocks, c: Columns, massless: bool, rows: int) -> Program
     return p
 
 
-def own(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program:
-    """What each unknown of a body changes at the surface below it, by differentiation along that unknown."""
-    p = Program("own", "what a body's own unknowns change at the surface below it")
+def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program:
+    """Derivatives of slip, force and moment of the surface below a body with respect to each unknown of that body."""
+    p = Program("local_variation", "variation of the surface below a body with the unknowns of that body")
     s: Symbols = p.read(c.seed, "s", active=False)
     up: Symbols = p.read(b.body, "u", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
@@ -226,22 +232,29 @@ def own(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program:
             p.rates |= {sine: s["s0"] * cosine, cosine: -s["s0"] * sine}
             turning = p.let_vector(scale(s["s0"], axes(up, body)[angle][0]))
         turned = p.let_vector(cross(turning, force["F"]))
-        found = {"dw": p.rate_vector(slip), "tilt": p.rate(tilt), "p": project(below, turned), "F": turned,
-                 "M": p.rate_vector(seen), "wp": wp, "alp": alp}  # fmt: skip
-        out |= {f"{angle}_{name}": found[name] for name in c.own.quantities}
-    p.write(c.owns, out, tangents=False)
+        found = {
+            "dw": p.rate_vector(slip),
+            "tilt": p.rate(tilt),
+            "p": project(below, turned),
+            "F": turned,
+            "M": p.rate_vector(seen),
+            "wp": wp,
+            "alp": alp,
+        }
+        out |= {f"{angle}_{name}": found[name] for name in c.variation.quantities}
+    p.write(c.variations, out, tangents=False)
     return p
 
 
 def programs(b: Blocks, c: Columns, massless: bool, unknowns: tuple[str, ...]) -> list[Program]:
-    """All programs of the columns."""
+    """All programs of the columns of the tangent."""
     return [
-        screws(b, c),
-        carried(b, c),
-        felt(b, c),
-        carried_force(b, c, massless),
-        seen_wrench(b, c),
+        twists(b, c),
+        transported_twist(b, c),
+        variation_of_rates(b, c),
+        transported_force(b, c, massless),
+        transported_wrench(b, c),
         force_to_local(b),
         turning_balance(b, c, massless, len(unknowns)),
-        own(b, c, unknowns),
+        local_variation(b, c, unknowns),
     ]

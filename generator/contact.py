@@ -1,6 +1,6 @@
-"""One sliding surface: normal and friction force, slip, Bouc-Wen rates, drilling moment, rim.
+"""Programs of one sliding surface: normal and friction force, slip velocity, Bouc-Wen rates, drilling moment, rim.
 
-All vectors here are along the basis t_i of the body below the surface.
+All vectors have components along the basis t_i of the body below the surface.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from typing import Any
 
 import sympy as sp
 
-from . import friction_laws, laws
+from msfp_gen.specification import friction_laws
+from msfp_gen.specification.hysteresis import HYSTERESIS
+
+from . import laws
 from .blocks import Blocks
 from .functions import ArcTan2, Modulus, Step
-from .hysteresis import HYSTERESIS
 from .program import Program, Vector
 from .vectors import add, dot, scale
 
@@ -23,25 +25,30 @@ SPIN_SMOOTHING = sp.Float("0.01")
 
 
 def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
-    """sqrt(x^2 + y^2); |x| where y vanishes identically (planar)."""
+    """sqrt(x^2 + y^2); |x| where y is identically zero (planar models)."""
     return Modulus(x) if y == 0 else sp.sqrt(x**2 + y**2)
 
 
 @dataclass(frozen=True)
-class Law:
-    """What the effects choose about friction."""
+class FrictionModel:
+    """Friction of a model, as its effects define it.
+
+    Attributes:
+        bouc_wen: name of the hysteresis law.
+        patch: whether a drilling moment of the contact patch resists spin.
+        coefficient: friction law; None for a constant friction coefficient.
+    """
 
     bouc_wen: str
     patch: bool
     coefficient: friction_laws.Law | None = None
-    """The law of mu; None: constant."""
 
 
 Basis = tuple[Vector, Vector, Vector]
 
 
 def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.Expr, cos_theta: sp.Expr) -> Basis:
-    """t~_1, t~_2, t~_3 (2.85), (3.13): R(psi~, theta~) applied to the basis of the body below."""
+    """Contact basis t~_1, t~_2, t~_3 (2.85), (3.13): the basis of the body below, rotated by psi~ and theta~."""
     zero = sp.Integer(0)
     t1: Vector = (cos_theta, p.let(sin_psi * sin_theta), p.let(-cos_psi * sin_theta))
     t2: Vector = (zero, cos_psi, sin_psi)
@@ -49,13 +56,16 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
     return t1, t2, t3
 
 
-def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
-    """dY/dt and dZ/dt (3.18), with 1/d_y for R/R_0; the law of `hysteresis` has the switches.
+def bouc_wen_rates(
+    p: Program, friction_model: FrictionModel, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr
+) -> Symbols:
+    """dY/dt and dZ/dt (3.18) with 1/d_y for R/R_0, and the switches of the hysteresis law.
 
-    YY, YZ, ZY, ZZ are their derivatives at constant slip velocity: what solves a stage for Y and Z.
+    YY, YZ, ZY, ZZ are their derivatives with respect to Y and Z at constant slip velocity. An implicit stage solves for
+    Y and Z with them.
     """
     yu, zv = p.let(Y * u), p.let(Z * v)
-    a, b = HYSTERESIS[law.bouc_wen].switches(yu, zv, lambda x: p.let(Step(p.let(x))))
+    a, b = HYSTERESIS[friction_model.bouc_wen].switches(yu, zv, lambda x: p.let(Step(p.let(x))))
     drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
     return {
         "dY": p.let((u - Y * drive) / dy, "dY"),
@@ -67,24 +77,35 @@ def bouc_wen_rates(p: Program, law: Law, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: 
     }
 
 
-def slip(p: Program, law: Law, par: Symbols, base: Basis, f: Symbols, dw: Vector) -> tuple[sp.Expr, Symbols]:
-    """Sign R; and the slip velocity (3.19), (2.98) with the Bouc-Wen rates (3.18)."""
+def slip(
+    p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, f: Symbols, dw: Vector
+) -> tuple[sp.Expr, Symbols]:
+    """Signed radius sign R, and the slip velocity u, v (3.19), (2.98) with the Bouc-Wen rates (3.18)."""
     t1, t2, _ = base
-    sliding = p.let(par["sign"] * par["R"])
+    signed_radius = p.let(par["sign"] * par["R"])
     # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
-    u, v = p.let(-sliding * dot(dw, t2), "u"), p.let(sliding * dot(dw, t1), "v")
-    return sliding, {**bouc_wen_rates(p, law, f["Y"], f["Z"], u, v, par["dy"]), "u": u, "v": v}
+    u, v = p.let(-signed_radius * dot(dw, t2), "u"), p.let(signed_radius * dot(dw, t1), "v")
+    rates = bouc_wen_rates(p, friction_model, f["Y"], f["Z"], u, v, par["dy"])
+    return signed_radius, {**rates, "u": u, "v": v}
 
 
-def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Symbols, dw: Vector, sliding: sp.Expr
-             ) -> Symbols:  # fmt: skip
-    """The moment of the contact about the sphere centre, and the power of its drilling part."""
+def friction(
+    p: Program,
+    friction_model: FrictionModel,
+    par: Symbols,
+    base: Basis,
+    N: sp.Expr,
+    f: Symbols,
+    dw: Vector,
+    signed_radius: sp.Expr,
+) -> Symbols:
+    """Moment M of the contact force about the sphere centre [N m], and power of the drilling moment [W]."""
     t1, t2, t3 = base
-    # (3.14)-(3.17): the normal force passes through the centre; -sign R t~_3 x F_f is what is left.
-    arm = p.let(sliding * par["mu"] * N)
+    # (3.14)-(3.17): the normal force has no moment about the sphere centre, friction has -sign R t~_3 x F_f.
+    arm = p.let(signed_radius * par["mu"] * N)
     moment = add(scale(p.let(arm * f["Y"]), t2), scale(p.let(-arm * f["Z"]), t1))
     drill = sp.Integer(0)
-    if law.patch:
+    if friction_model.patch:
         spin = p.let(dot(dw, t3))
         size = p.let(-sp.Rational(2, 3) * par["mu"] * par["rs"] * N * spin / sp.sqrt(spin**2 + SPIN_SMOOTHING**2))
         moment = add(moment, scale(size, t3))
@@ -92,30 +113,34 @@ def friction(p: Program, law: Law, par: Symbols, base: Basis, N: sp.Expr, f: Sym
     return {"M": p.let_vector(moment, "M"), "drill": drill}
 
 
-def report_contact(b: Blocks, law: Law) -> Program:
-    """Contact force and moment at given unknowns psi~, theta~, N: (3.13)-(3.19) as the report states them."""
+def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
+    """Contact force and moment at given unknowns psi~, theta~, N: (3.13)-(3.19) as stated in PEER 2017/07."""
     p = Program("report_contact", "contact force and moment at given psi~, theta~, N: (3.13)-(3.19)")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     x: Symbols = p.read(b.unknowns, "x")
     f: Symbols = p.read(b.friction, "f")
     loc: Symbols = p.read(b.local, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(g(x[a])) for a in ("psi", "theta") for g in (sp.sin, sp.cos)))
-    sliding, rates = slip(p, law, par, base, f, loc["dw"])
-    par, heat = laws.stated(p, b, law.coefficient, par, loc, x["N"], f, rates)
-    out = {**rates, **friction(p, law, par, base, x["N"], f, loc["dw"], sliding)}
+    signed_radius, rates = slip(p, friction_model, par, base, f, loc["dw"])
+    par, heat = laws.evaluate_law(p, b, friction_model.coefficient, par, loc, x["N"], f, rates)
+    out = {**rates, **friction(p, friction_model, par, base, x["N"], f, loc["dw"], signed_radius)}
     t1, t2, t3 = base
     mu_n = p.let(-par["mu"] * x["N"])
     force = add(scale(x["N"], t3), scale(p.let(mu_n * f["Y"]), t1), scale(p.let(mu_n * f["Z"]), t2))  # (3.15)-(3.17)
-    p.write(b.report_contact, {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat},
-            tangents=("p", "M", "dY", "dZ"))  # fmt: skip
+    p.write(
+        b.report_contact,
+        {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat},
+        tangents=("p", "M", "dY", "dZ"),
+    )
     return p
 
 
 def closed_form(p: Program, par: Symbols, force: Vector, f: Symbols) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-    """N and the sines and cosines of psi~, theta~ from the contact force: the inverse of (3.15)-(3.17).
+    """N and (sin psi~, cos psi~, sin theta~, cos theta~) at a given contact force: the inverse of (3.15)-(3.17).
 
-    P = N e with e = (-mu Y, -mu Z, 1) along t~_i. Rotating about axis 2 must bring e_1 to p_1, then
-    about axis 1 (e_2, w) to (p_2, p_3), where p = P/N.
+    The contact force is P = N e with e = (-mu Y, -mu Z, 1) along t~_i. Let p = P/N. The rotation theta~ about axis 2
+    takes the first component e_1 to p_1 and the third to w. The rotation psi~ about axis 1 then takes (e_2, w) to
+    (p_2, p_3).
     """
     ex, ey = p.let(-par["mu"] * f["Y"]), p.let(-par["mu"] * f["Z"])
     length = p.let(sp.sqrt(1 + ex**2 + ey**2))
@@ -131,24 +156,24 @@ def closed_form(p: Program, par: Symbols, force: Vector, f: Symbols) -> tuple[sp
     return N, (p.let((ey * pz - w * py) / norm), p.let((ey * py + w * pz) / norm), sin_theta, cos_theta)
 
 
-def contact(b: Blocks, law: Law) -> Program:
-    """Contact moment, N and position of the normal at a given contact force (closed form) with the Bouc-Wen rates."""
+def contact(b: Blocks, friction_model: FrictionModel) -> Program:
+    """Normal force, contact position and moment at a given contact force (closed form), with the Bouc-Wen rates."""
     p = Program(
         "contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)"
     )
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     loc: Symbols = p.read(b.local, "loc")
     f: Symbols = p.read(b.friction, "f")
-    given = laws.unknown(p, b, law.coefficient, par)
+    given = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
     N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], f)
     base = contact_basis(p, sp_, cp_, st_, ct_)
-    sliding, rates = slip(p, law, par, base, f, loc["dw"])
-    out = {**rates, **friction(p, law, given, base, N, f, loc["dw"], sliding)}
-    out |= laws.lawful(p, law.coefficient, par, given, loc, N, f, rates)
+    signed_radius, rates = slip(p, friction_model, par, base, f, loc["dw"])
+    out = {**rates, **friction(p, friction_model, given, base, N, f, loc["dw"], signed_radius)}
+    out |= laws.law_results(p, friction_model.coefficient, par, given, loc, N, f, rates)
     p.write(
         b.contact,
         {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
-        tangents=("M", "dY", "dZ", "N") if law.coefficient is None else ("M", "dY", "dZ", "mu", "N"),
+        tangents=("M", "dY", "dZ", "N") if friction_model.coefficient is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_LOCAL",
     )
     p.lanes = True
@@ -156,12 +181,12 @@ def contact(b: Blocks, law: Law) -> Program:
 
 
 def gap(b: Blocks) -> Program:
-    """Sliding displacement and gap (3.20), (3.21); arccos by atan2, exact at zero tilt."""
+    """Sliding displacement (3.20) and gap (3.21); the arccos is written as an atan2, which is exact at zero tilt."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
-    turned: Symbols = p.read(b.body, "a", active=False)
-    across = p.let(norm(turned["st"], p.let(turned["sp"] * turned["ct"])))
-    s = p.let(par["R"] * ArcTan2(across, p.let(turned["cp"] * turned["ct"])))
+    above: Symbols = p.read(b.body, "a", active=False)
+    sine = p.let(norm(above["st"], p.let(above["sp"] * above["ct"])))
+    s = p.let(par["R"] * ArcTan2(sine, p.let(above["cp"] * above["ct"])))
     p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
     return p
 
@@ -169,10 +194,10 @@ def gap(b: Blocks) -> Program:
 def rim(b: Blocks) -> Program:
     """Rim contact (3.20)-(3.25): gap, force and its moment about the sphere centre.
 
-    The rim sits on the slider: the body above a concave-up surface, the body below a concave-down one.
-    The caller applies it only while it pushes (docs/model.md, choice 4).
+    The force acts on the slider: the body above a concave-up surface, the body below a concave-down one. The runtime
+    applies it only while it is compressive (docs/model.md, choice 4).
     """
-    p = Program("rim", "rim contact (3.20)-(3.25); the caller applies it only while it pushes")
+    p = Program("rim", "rim contact (3.20)-(3.25); applied only while the force is compressive")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     x: Symbols = p.read(b.rim_coordinates, "x")
     sin_psi, cos_psi = p.let(sp.sin(x["psi"])), p.let(sp.cos(x["psi"]))
@@ -189,11 +214,13 @@ def rim(b: Blocks) -> Program:
     size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
     up = p.let((1 + par["sign"]) / 2)
     down = p.let((1 - par["sign"]) / 2)
-    # (3.24): the other body's axis projected on the face of the slider, normalised.
+    # (3.24): the axis of the other body, projected on the face of the slider and normalised.
     toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
     force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
     slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
-    arm = p.let(-par["sign"] * (par["R"] - par["pr"]))  # (3.25); the part r f_b is along the force
+    arm = p.let(
+        -par["sign"] * (par["R"] - par["pr"])
+    )  # (3.25); the component r f_b is parallel to the force and has no moment
     moment = p.let_vector(
         scale(
             arm,

@@ -1,10 +1,10 @@
-"""Derive: all programs of one model from its specification."""
+"""Derivation: collects the programs of one model from its specification."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from msfp_gen.layout import ModelSpec
+from msfp_gen.specification.layout import ModelSpec
 
 from . import body, columns, contact, laws, seat, top
 from .blocks import Blocks, make_blocks
@@ -13,40 +13,46 @@ from .program import Program
 
 @dataclass(frozen=True)
 class Equations:
-    """The straight-line programs of one body, one surface and the top, and the blocks between them."""
+    """The equations of one model.
+
+    Attributes:
+        spec: layout and effects.
+        blocks: records that the programs exchange.
+        programs: straight-line programs of one body, one surface and the top plate.
+    """
 
     spec: ModelSpec
     blocks: Blocks
     programs: tuple[Program, ...]
     column_blocks: columns.Columns | None = None
-    """Blocks of the tangent's columns, where they are those of rigid bodies on each other."""
+    """Blocks of the tangent where an unknown moves all bodies above as one rigid body; None with uplift."""
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Coordinates of one body whose accelerations are unknown."""
+        """Names of the coordinates of one body whose accelerations are unknown."""
         return unknowns(self.spec)
 
     @property
     def separations(self) -> tuple[str, ...]:
-        """Components of one surface's separation that are unknown."""
+        """Names of the separation components of one surface whose accelerations are unknown; empty without uplift."""
         if not self.spec.effects.uplift:
             return ()
         return ("dx", "dz") if self.spec.effects.dimension == "planar" else ("dx", "dy", "dz")
 
 
 def unknowns(spec: ModelSpec) -> tuple[str, ...]:
-    """Coordinates of one body whose accelerations are unknown."""
+    """Names of the coordinates of one body whose accelerations are unknown."""
     if spec.effects.dimension == "planar":
         return ("theta",)
     return ("psi", "theta") if spec.effects.spin == "locked" else ("psi", "theta", "phi")
 
 
 def derive(spec: ModelSpec) -> Equations:
-    """Derive the programs; what an effect leaves out never enters them."""
+    """Derive the programs of one model. An effect that is off contributes neither fields nor statements."""
     effects = spec.effects
-    blocks = laws.with_law(make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift), effects.law)
+    blocks = laws.add_law_fields(make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift), effects.law)
     patch = effects.spin == "patch" and effects.dimension == "spatial"
-    law = contact.Law(effects.bouc_wen, patch, effects.law)
+    law = contact.FrictionModel(effects.bouc_wen, patch, effects.law)
     massless = effects.sliders == "massless"
     programs = [
         body.arms(blocks),

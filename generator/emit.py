@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from importlib import resources
 
 import sympy as sp
 
+from msfp_gen.specification import contract
+from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
 from .derive import Equations
 from .heat import HEAT_KERNEL
-from .lower import Kernel, column, own_inputs
+from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c
 from .program import Block, Use
 
@@ -52,13 +54,13 @@ class Function:
 
 def jacobian(kernel: Kernel) -> tuple[tuple[str, ...], tuple[tuple[int, str], ...]]:
     """Text of the derivatives of a program's results with respect to its own inputs, row by row of what is wanted."""
-    sources = own_inputs(kernel.program)
+    sources = ordered_active_inputs(kernel.program)
     assert kernel.program.output is not None
     rows = [f.name for f in kernel.program.output.block.fields if f.name in kernel.program.tangents]
     lines: list[str] = []
     stores: list[tuple[int, str]] = []
     for i, source in enumerate(sources):
-        statements, results = column(kernel, source)
+        statements, results = jacobian_column(kernel, source)
         lines += [f"{s.target} = {to_c(s.expression)}" for s in statements]
         stores += [(row * len(sources) + i, to_c(sp.sympify(results[name]))) for row, name in enumerate(rows)]
     return tuple(lines), tuple(stores)
@@ -162,20 +164,66 @@ def scalar_quantities(block: Block) -> list[tuple[str, int | None, str]]:
     ]
 
 
+def shape_of(spec: ModelSpec) -> Callable[[contract.Quantity], tuple[int, ...]]:
+    """Shapes of the fields of a row in numbers, for the wrapper."""
+    lengths = {
+        contract.Extent.SURFACES: spec.layout.surfaces,
+        contract.Extent.COORDINATES: 6 if spec.effects.uplift else 3,
+        contract.Extent.WORKS: len(contract.WORKS),
+    }
+    return lambda quantity: tuple(lengths[n] if isinstance(n, contract.Extent) else n for n in quantity.shape)
+
+
 def lanes(surfaces: int) -> int:
-    """Surfaces side by side in C: rounded up so that vectors of two or four are full."""
+    """Surfaces that C evaluates in one vector: their number rounded up so that vectors of two or four are full."""
     return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
 
 
-LANE_VALUES = ("forward", "upright", "top_wrench", "interface_force", "surface_local", "contact", "moment_to_world",
-               "angular_balance", "screws", "own", "felt")  # fmt: skip
-"""Programs of one evaluation of the condensed equations, which a batch runs for several bearings at once."""
-LANE_TANGENTS = ("top_wrench", "carried", "felt", "carried_force", "seen_wrench", "force_to_local", "turning_balance")
-"""Those of which it takes columns."""
+def value_enums(effects: Effects) -> list[tuple[str, str, str, str, list[tuple[str, str]]]]:
+    """Enumerations of the values of a body, a surface and the top: type, prefix, meaning, count, entries."""
+    surface = contract.SURFACE + (contract.SURFACE_UPLIFT if effects.uplift else ())
+    law = [(name, "of the friction law") for name in effects.law.columns] if effects.law is not None else []
+    return [
+        (
+            f"{kind}_value",
+            f"MSFP_{kind.upper()}_VALUE_",
+            meaning,
+            f"MSFP_{kind.upper()}_VALUES",
+            [(v.name, f"[{v.unit}] {v.meaning}") for v in values] + more,
+        )
+        for kind, meaning, values, more in (
+            ("body", "Values of a body in order; the base comes first", contract.BODY, []),
+            ("surface", "Values of a surface in order, the lowest surface first", surface, law),
+            ("top", "Values of the top in order", contract.TOP, []),
+        )
+    ]
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: bool = False) -> dict[str, str]:
-    """Render all generated files: {file name: text}; with those of a batch where one is wanted."""
+def word_enums() -> list[tuple[str, str, str, str, list[tuple[str, str, str]]]]:
+    """Enumerations whose names Python knows: type, prefix, meaning, count, (name, enumerator, meaning)."""
+    statuses = tuple(status for status in contract.STATUSES if status.compiled)
+    plain = {"ok": "MSFP_OK", "stopped": "MSFP_STOPPED"}
+    return [
+        (
+            kind,
+            prefix,
+            meaning,
+            last,
+            [(e.name, plain.get(e.name, prefix + e.name.upper()), e.meaning) for e in entries],
+        )
+        for kind, prefix, meaning, last, entries in (
+            ("status", "MSFP_E_", "How a run or an evaluation ended", "MSFP_STATUSES", statuses),
+            ("integral", "MSFP_WORK_", "Integrals over a run [J]", "MSFP_WORKS", contract.WORKS),
+            ("event_kind", "MSFP_EVENT_", "Kinds of events", "MSFP_EVENT_KINDS", contract.EVENT_KINDS),
+            ("count", "MSFP_COUNT_", "Counters of a run", "MSFP_COUNTS", contract.COUNTERS),
+            ("method", "MSFP_METHOD_", "Methods of integration", "MSFP_METHODS", contract.METHODS),
+            ("monitor", "MSFP_MONITOR_", "Monitors of what a model leaves out", "MSFP_MONITORS", contract.MONITORS),
+        )
+    ]
+
+
+def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
+    """Render all generated files: {file name: text}."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = resources.files("msfp_gen.templates")
@@ -188,8 +236,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         autoescape=False,
     )
     spec = equations.spec
-    rooms = [room for room in (equations.blocks, equations.column_blocks) if room is not None]
-    blocks = [b for room in rooms for f in fields(room) if (b := getattr(room, f.name)) is not None]
+    groups = [group for group in (equations.blocks, equations.column_blocks) if group is not None]
+    blocks = [b for group in groups for f in fields(group) if (b := getattr(group, f.name)) is not None]
     law = spec.effects.law
     context = {
         "version": __version__,
@@ -209,16 +257,23 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str, batch: 
         "scalars": scalar_quantities,
         "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields) + (law is not None),
         "law": law,
-        "flows": spec.effects.flows,
-        "heat": HEAT_KERNEL if law is not None and law.heats else (),
+        "flows": spec.effects.permits_quasistatic_steps,
+        "heat": HEAT_KERNEL if law is not None and law.depends_on_temperature else (),
+        "values": value_enums(spec.effects),
+        "words": word_enums(),
+        "row": contract.row(spec.effects),
+        "shape": shape_of(spec),
+        "columns": {
+            "body": contract.names(contract.BODY),
+            "surface": contract.surface_values(spec.effects),
+            "top": contract.names(contract.TOP),
+        },
+        "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
-        "batch": batch,
-        "lane_values": LANE_VALUES,
-        "lane_tangents": LANE_TANGENTS,
     }
     names = {
         "msfp_model.h": "msfp_model.h.jinja",
         "msfp_kernels.h": "msfp_kernels.h.jinja",
         f"{module}.pyx": "module.pyx.jinja",
-    } | ({"msfp_lane_kernels.h": "msfp_lane_kernels.h.jinja"} if batch else {})
+    }
     return {name: environment.get_template(template).render(context, file=name) for name, template in names.items()}

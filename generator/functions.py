@@ -1,4 +1,4 @@
-"""Functions that SymPy lacks or differentiates otherwise than is wanted; `printer.py` and `latex.py` know them."""
+"""Functions that SymPy lacks or differentiates to distributions; `printer.py` and `latex.py` print them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import sympy as sp
 
 
 class Step(sp.Function):  # type: ignore[misc]
-    """1 for a positive argument, else 0: the switches a, b of (3.18). Its derivative is zero on both sides."""
+    """Heaviside function, 1 for a positive argument and 0 otherwise: the switches a, b of (3.18). Derivative: 0."""
 
     nargs = 1
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Zero on both sides of the switch."""
+        """Zero on both sides of the discontinuity."""
         return sp.Integer(0)
 
 
 class ArcTan2(sp.Function):  # type: ignore[misc]
-    """atan2 of a sine and a cosine, with its derivative off the branch cut (SymPy's own adds a distribution on it)."""
+    """atan2 of a sine and a cosine, with the derivative that holds off the branch cut."""
 
     nargs = 2
 
@@ -27,7 +27,7 @@ class ArcTan2(sp.Function):  # type: ignore[misc]
 
 
 class Modulus(sp.Function):  # type: ignore[misc]
-    """|x|, with the derivative +-1 that it has on either side."""
+    """|x|, with the derivative +1 for positive x and -1 otherwise."""
 
     nargs = 1
 

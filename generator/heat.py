@@ -1,32 +1,34 @@
-"""The heat of friction: the kernel 1/sqrt(t) of a half-space as a sum of exponentials, each one state of a surface.
+"""Frictional heating: the kernel 1/sqrt(t) of a half-space as a sum of exponentials, each one state of a surface.
 
-T = T_0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau) over tau (Carslaw and Jaeger; Kumar et al. 2015). With
-1/sqrt(tau) = sum of w_i exp(-lambda_i tau) it becomes T = T_0 + sum of h_i with dh_i/dt = -lambda_i h_i + w_i flux.
+The temperature is T = T_0 + sqrt(D/pi)/k times the integral of q(t - tau)/sqrt(tau) over tau (Carslaw and Jaeger; Kumar
+et al. 2015). With 1/sqrt(tau) approximated by the sum of w_i exp(-lambda_i tau) it becomes T = T_0 + sum of h_i, where
+dh_i/dt = -lambda_i h_i + w_i flux.
 
-Rates go in geometric progression; weights are those with the least relative error over [SHORTEST, LONGEST], none
-negative, and with the exact integral over [0, SHORTEST]. `benchmarks/heat_kernel.py` fits them.
+The rates lambda_i form a geometric progression. The weights w_i minimise the largest relative error over [SHORTEST,
+LONGEST] under two conditions: none is negative, and the integral over [0, SHORTEST] is exact. They are fitted by
+`benchmarks/heat_kernel.py`.
 """
 
 from __future__ import annotations
 
-from .friction_laws import HEAT_TIMES
+from msfp_gen.specification.friction_laws import HEAT_TIMES
 
 SHORTEST, LONGEST = HEAT_TIMES
-"""Times between which the sum is a fit [s]; after the last of them heat is forgotten."""
+"""Range of times over which the sum approximates the kernel [s]; heat older than LONGEST is neglected."""
 HEAT_ERROR = 1.8e-3
-"""Bound of the relative error between them."""
+"""Bound of the relative error of the kernel in that range [-]."""
 HEAT_ONSET = 6e-3
-"""Bound of half the integral of |error| over [0, SHORTEST] [s^1/2]: what a flux that changes within that time adds, per
-unit of change (docs/friction.md)."""
+"""Bound of half the integral of |error| over [0, SHORTEST] [s^1/2]: temperature error per unit change of a flux that
+changes within that time (docs/friction.md)."""
 
 HEAT_KERNEL: tuple[tuple[float, float], ...] = (
-    (6.0000000000e+03, 1.2078817073e+02),
-    (1.6832329748e+03, 2.8458871434e+01),
-    (4.7221220791e+02, 1.5622216602e+01),
-    (1.3247385991e+02, 8.3021979222e+00),
-    (3.7164061550e+01, 4.3187491334e+00),
-    (1.0425962313e+01, 2.3486816271e+00),
-    (2.9248872599e+00, 1.2081621465e+00),
+    (6.0000000000e03, 1.2078817073e02),
+    (1.6832329748e03, 2.8458871434e01),
+    (4.7221220791e02, 1.5622216602e01),
+    (1.3247385991e02, 8.3021979222e00),
+    (3.7164061550e01, 4.3187491334e00),
+    (1.0425962313e01, 2.3486816271e00),
+    (2.9248872599e00, 1.2081621465e00),
     (8.2054444726e-01, 6.5997556553e-01),
     (2.3019457849e-01, 3.3852067045e-01),
     (6.4578517522e-02, 1.8581755062e-01),

@@ -1,7 +1,7 @@
-"""The programs as LaTeX, for people: `docs/make_equations.py` writes `docs/equations.md` with this.
+"""Programs as LaTeX; `docs/make_equations.py` writes `docs/equations.md` with it.
 
-Nothing is typed by hand but names: what stands for a stored number (`SYMBOLS`) and which body or surface an
-argument of a program belongs to (`PLACES`). The equations themselves are those that become C. Pure.
+Only names are defined by hand: the mathematical symbol of each stored number (`SYMBOLS`), and the body or surface that
+an argument of a program belongs to (`PLACES`). The equations are those that are emitted as C.
 """
 
 from __future__ import annotations
@@ -12,29 +12,75 @@ from typing import Any
 import sympy as sp
 from sympy.printing.latex import LatexPrinter
 
-from .lower import live
+from .lower import needed_statements
 from .program import AXES, Block, Program, Statement, Use
 
-# Kind of record -> quantity -> symbol: @ is the number of the body or surface, # the component.
+# Kind of record -> quantity -> LaTeX symbol: @ stands for the number of the body or surface, # for the component.
 SYMBOLS: dict[str, dict[str, str]] = {
-    "dimensions": {"height": r"\ell_{@}", "centroid": r"z_{@}",
-                   "sign_lower": r"\sigma_{@-1}", "sign_upper": r"\sigma_{@}",
-                   "radius_lower": r"R_{@-1}", "radius_upper": r"R_{@}"},
+    "dimensions": {
+        "height": r"\ell_{@}",
+        "centroid": r"z_{@}",
+        "sign_lower": r"\sigma_{@-1}",
+        "sign_upper": r"\sigma_{@}",
+        "radius_lower": r"R_{@-1}",
+        "radius_upper": r"R_{@}",
+    },
     "arms": {"c": r"c_{@}", "e": r"e_{@}"},
-    "body_parameters": {"c": r"c_{@}", "e": r"e_{@}", "m": r"m_{@}",
-                        "jt": r"\lambda_{1}^{@}", "ja": r"\lambda_{3}^{@}", "g": "g"},
-    "surface_parameters": {"sign": r"\sigma_{@}", "R": r"R_{@}", "sc": r"s_{c@}", "mu": r"\mu_{@}", "dy": r"d_{@}",
-                           "kc": r"k_{c@}", "cc": r"c_{c@}", "rs": r"r_{s@}", "pr": r"p_{s@}"},
-    "coordinates": {"psi": r"\psi_{@}", "theta": r"\theta_{@}", "phi": r"\phi_{@}",
-                    "psi1": r"\dot{\psi}_{@}", "theta1": r"\dot{\theta}_{@}", "phi1": r"\dot{\phi}_{@}",
-                    "psi2": r"\ddot{\psi}_{@}", "theta2": r"\ddot{\theta}_{@}", "phi2": r"\ddot{\phi}_{@}"},
-    "rim_coordinates": {"psi": r"\psi_{@}", "theta": r"\theta_{@}",
-                        "psi1": r"\dot{\psi}_{@}", "theta1": r"\dot{\theta}_{@}"},
-    "body": {"t1": r"t_{1#}^{@}", "t2": r"t_{2#}^{@}", "t3": r"t_{3#}^{@}",
-             "w": r"\omega_{@,#}", "wp": r"\omega'_{@,#}", "al": r"\dot{\omega}_{@,#}", "alp": r"\dot{\omega}'_{@,#}",
-             "C": r"r_{@,#}^{c}", "V": r"\dot{r}_{@,#}^{c}", "A": r"\ddot{r}_{@,#}^{c}",
-             "rc": r"r_{@,#}", "vc": r"\dot{r}_{@,#}", "ac": r"\ddot{r}_{@,#}",
-             "sp": r"S_{\psi_{@}}", "cp": r"C_{\psi_{@}}", "st": r"S_{\theta_{@}}", "ct": r"C_{\theta_{@}}"},
+    "body_parameters": {
+        "c": r"c_{@}",
+        "e": r"e_{@}",
+        "m": r"m_{@}",
+        "jt": r"\lambda_{1}^{@}",
+        "ja": r"\lambda_{3}^{@}",
+        "g": "g",
+    },
+    "surface_parameters": {
+        "sign": r"\sigma_{@}",
+        "R": r"R_{@}",
+        "sc": r"s_{c@}",
+        "mu": r"\mu_{@}",
+        "dy": r"d_{@}",
+        "kc": r"k_{c@}",
+        "cc": r"c_{c@}",
+        "rs": r"r_{s@}",
+        "pr": r"p_{s@}",
+    },
+    "coordinates": {
+        "psi": r"\psi_{@}",
+        "theta": r"\theta_{@}",
+        "phi": r"\phi_{@}",
+        "psi1": r"\dot{\psi}_{@}",
+        "theta1": r"\dot{\theta}_{@}",
+        "phi1": r"\dot{\phi}_{@}",
+        "psi2": r"\ddot{\psi}_{@}",
+        "theta2": r"\ddot{\theta}_{@}",
+        "phi2": r"\ddot{\phi}_{@}",
+    },
+    "rim_coordinates": {
+        "psi": r"\psi_{@}",
+        "theta": r"\theta_{@}",
+        "psi1": r"\dot{\psi}_{@}",
+        "theta1": r"\dot{\theta}_{@}",
+    },
+    "body": {
+        "t1": r"t_{1#}^{@}",
+        "t2": r"t_{2#}^{@}",
+        "t3": r"t_{3#}^{@}",
+        "w": r"\omega_{@,#}",
+        "wp": r"\omega'_{@,#}",
+        "al": r"\dot{\omega}_{@,#}",
+        "alp": r"\dot{\omega}'_{@,#}",
+        "C": r"r_{@,#}^{c}",
+        "V": r"\dot{r}_{@,#}^{c}",
+        "A": r"\ddot{r}_{@,#}^{c}",
+        "rc": r"r_{@,#}",
+        "vc": r"\dot{r}_{@,#}",
+        "ac": r"\ddot{r}_{@,#}",
+        "sp": r"S_{\psi_{@}}",
+        "cp": r"C_{\psi_{@}}",
+        "st": r"S_{\theta_{@}}",
+        "ct": r"C_{\theta_{@}}",
+    },
     "force": {"F": r"P_{@,#}"},
     "moment": {"M": r"M_{@,#}"},
     "rim_force": {"F": r"F_{c@,#}"},
@@ -42,13 +88,31 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "local": {"p": r"p_{@,#}", "dw": r"\Delta\omega'_{@,#}"},
     "friction": {"Y": r"Y_{@}", "Z": r"Z_{@}"},
     "unknowns": {"psi": r"\tilde{\psi}_{@}", "theta": r"\tilde{\theta}_{@}", "N": r"N_{@}"},
-    "contact": {"M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}", "N": r"N_{@}",
-                "sp": r"\sin\tilde{\psi}_{@}", "cp": r"\cos\tilde{\psi}_{@}",
-                "st": r"\sin\tilde{\theta}_{@}", "ct": r"\cos\tilde{\theta}_{@}",
-                "u": r"\tilde{u}_{@}", "v": r"\tilde{v}_{@}"},
+    "contact": {
+        "M": r"M_{@,#}",
+        "dY": r"\dot{Y}_{@}",
+        "dZ": r"\dot{Z}_{@}",
+        "N": r"N_{@}",
+        "sp": r"\sin\tilde{\psi}_{@}",
+        "cp": r"\cos\tilde{\psi}_{@}",
+        "st": r"\sin\tilde{\theta}_{@}",
+        "ct": r"\cos\tilde{\theta}_{@}",
+        "u": r"\tilde{u}_{@}",
+        "v": r"\tilde{v}_{@}",
+    },
     "report_contact": {"p": r"p_{@,#}", "M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}"},
-    "top_parameters": {"k": "k_{T}", "c": "c_{T}", "kr": "k_{R}", "cr": "c_{R}", "m": "m_{T}", "jt": r"\lambda_{1}^{T}",
-                       "ja": r"\lambda_{3}^{T}", "h": "h_{T}", "g": "g", "x0": "u_{0,#}"},
+    "top_parameters": {
+        "k": "k_{T}",
+        "c": "c_{T}",
+        "kr": "k_{R}",
+        "cr": "c_{R}",
+        "m": "m_{T}",
+        "jt": r"\lambda_{1}^{T}",
+        "ja": r"\lambda_{3}^{T}",
+        "h": "h_{T}",
+        "g": "g",
+        "x0": "u_{0,#}",
+    },
     "top_force": {"F": r"F_{E,#}"},
     "top_moment": {"M": r"M_{E,#}"},
     "top_wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
@@ -57,18 +121,25 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "linear": {"r": r"\epsilon_{@,#}"},
     "angular": {"r": r"\eta_{@,#}"},
 }
-# Components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
+# Kinds with components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
 LOCAL_KINDS = {"local", "local_moment", "rim_force", "contact", "report_contact", "rim", "angular"}
 
-# Program -> alias -> number of its body or surface.
+# Program -> alias of an argument -> number of its body or surface.
 PLACES: dict[str, dict[str, str]] = {
     "arms": {"d": "k", "out": "k"},
     "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
     "gap": {"par": r"\gamma", "a": r"\gamma+1", "out": r"\gamma"},
     "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},
     "interface_force": {"par": "k", "b": "k", "up": "k", "out": "k-1"},
-    "surface_local": {"b": r"\gamma", "a": r"\gamma+1", "x": r"\gamma+1", "y": r"\gamma", "tot": r"\gamma",
-                      "rim": r"\gamma", "out": r"\gamma"},
+    "surface_local": {
+        "b": r"\gamma",
+        "a": r"\gamma+1",
+        "x": r"\gamma+1",
+        "y": r"\gamma",
+        "tot": r"\gamma",
+        "rim": r"\gamma",
+        "out": r"\gamma",
+    },
     "contact": {"par": r"\gamma", "loc": r"\gamma", "f": r"\gamma", "out": r"\gamma"},
     "moment_to_world": {"b": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "report_contact": {"par": r"\gamma", "x": r"\gamma", "f": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
@@ -76,13 +147,17 @@ PLACES: dict[str, dict[str, str]] = {
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
     "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
 }
-# Where an argument is another kind of record than its block's name says.
-KINDS = {("surface_local", "rim"): "rim_force", ("moment_to_world", "loc"): "local_moment",
-         ("top_wrench", "fe"): "top_force", ("top_wrench", "me"): "top_moment"}
+# (program, alias) -> kind of record, where it differs from the name of the block.
+KINDS = {
+    ("surface_local", "rim"): "rim_force",
+    ("moment_to_world", "loc"): "local_moment",
+    ("top_wrench", "fe"): "top_force",
+    ("top_wrench", "me"): "top_moment",
+}
 
 
 class Latex(LatexPrinter):  # type: ignore[misc]
-    """SymPy's LaTeX with the project's own functions."""
+    """LaTeX printer of SymPy with the functions of `functions.py`."""
 
     def _function(self, name: str, expr: sp.Function, exp: Any) -> str:
         text = rf"\operatorname{{{name}}}\left({', '.join(self._print(a) for a in expr.args)}\right)"
@@ -99,12 +174,12 @@ class Latex(LatexPrinter):  # type: ignore[misc]
 
 
 def to_latex(expression: sp.Expr, names: Mapping[sp.Symbol, str]) -> str:
-    """LaTeX of one expression; `names` says how symbols are written."""
+    """LaTeX of an expression; `names` is the LaTeX of each symbol."""
     return str(Latex({"symbol_names": dict(names)}).doprint(expression))
 
 
 def field_names(block: Block, kind: str, index: str) -> dict[str, str]:
-    """LaTeX of the stored fields of a block for body or surface `index`; what has no symbol is left out."""
+    """Stored field of a block -> its LaTeX for body or surface `index`; fields without a symbol are left out."""
     marks = dict(zip(AXES, "123" if kind in LOCAL_KINDS else AXES, strict=True))
     out: dict[str, str] = {}
     for quantity, symbol in SYMBOLS[kind].items():
@@ -116,28 +191,32 @@ def field_names(block: Block, kind: str, index: str) -> dict[str, str]:
 
 
 def names_of(program: Program, use: Use) -> dict[str, str]:
-    """LaTeX of the fields of one argument of a program."""
+    """Stored field of one argument of a program -> its LaTeX."""
     kind = KINDS.get((program.name, use.alias), use.block.name)
     return field_names(use.block, kind, PLACES[program.name][use.alias])
 
 
-def written(program: Program, results: Iterable[str]) -> tuple[Statement, ...]:
-    """The statements that some results need, in their order."""
-    return live(program, {s for name in results for s in program.results[name].free_symbols})
+def result_statements(program: Program, results: Iterable[str]) -> tuple[Statement, ...]:
+    """Statements on which the named results depend, in order of execution."""
+    symbols = {s for name in results for s in program.results[name].free_symbols}
+    return needed_statements(program.statements, symbols)
 
 
 def statements(program: Program) -> list[tuple[str, str]]:
-    """Left and right sides, as LaTeX, of a program: results under their symbols, what lies between as x_1, x_2, ..."""
+    """Left and right sides of the statements of a program as LaTeX; intermediate values are x_1, x_2, ..."""
     assert program.output is not None
-    names = {sp.Symbol(f"{use.alias}_{field}", real=True): text
-             for use in program.inputs for field, text in names_of(program, use).items()}
+    names = {
+        sp.Symbol(f"{use.alias}_{field}", real=True): text
+        for use in program.inputs
+        for field, text in names_of(program, use).items()
+    }
     results = names_of(program, program.output)
     names.update({program.results[field]: text for field, text in results.items() if program.results[field].is_Symbol})
     rows: list[tuple[str, str]] = []
-    between = 0
-    for statement in written(program, results):
+    count = 0
+    for statement in result_statements(program, results):
         if statement.target not in names:
-            between += 1
-            names[statement.target] = f"x_{{{between}}}"
+            count += 1
+            names[statement.target] = f"x_{{{count}}}"
         rows.append((names[statement.target], to_latex(statement.expression, names)))
     return rows

@@ -1,8 +1,8 @@
-"""Laws of the friction coefficient: what a law adds to the blocks of a model and to the programs of one surface.
+"""Friction laws: the fields that a law adds to the blocks, and the statements that it adds to the contact programs.
 
-A law makes the coefficient mu of the contact one more local unknown beside Y and Z, because the normal force, the slip
-and the temperature that decide it depend on mu in turn: in `contact` its law is one more row to be solved. At given
-psi~, theta~ and N, in `report_contact`, mu follows in one line. With constant friction nothing here is called.
+With a law, the friction coefficient mu is a local unknown of the contact, besides Y and Z: it depends on normal force,
+slip and temperature, which depend on mu in turn. The program `contact` therefore has one more equation to solve. In
+`report_contact` psi~, theta~ and N are given, and mu follows directly. A model of constant friction uses none of this.
 """
 
 from __future__ import annotations
@@ -13,59 +13,65 @@ from typing import Any
 
 import sympy as sp
 
-from msfp_gen.law_text import fold
+from msfp_gen.specification.formula import fold
+from msfp_gen.specification.friction_laws import NUMBERS, Law
 
 from .blocks import Blocks
-from .friction_laws import NUMBERS, Law
 from .functions import Modulus, Step
 from .program import Block, Field, Program
 
 Symbols = dict[str, Any]
-Sliding = tuple[sp.Expr, sp.Expr, sp.Expr]
-EDGE = sp.Rational(1, 10)
-"""The patch leaves the centre while (x/reach)^2 goes from 1 - EDGE to 1 + EDGE: 5 % of the way on either side."""
+SlidingVelocity = tuple[sp.Expr, sp.Expr, sp.Expr]
+COVER_TRANSITION = sp.Rational(1, 10)
+"""Half-width of the transition, in (x/reach)^2 about 1, over which the patch uncovers the centre of the surface: x is
+within 5 % of `reach`."""
 
-UNKNOWN = [
+COEFFICIENT_FIELDS = [
     Field("mu", "-", "friction coefficient, solved for with Y and Z"),
-    Field("rise", "K", "temperature above the start, less what the flux of this stage adds"),
-    Field("warming", "s^1/2", "what it adds, per unit of flux; 0 where the temperature is given"),
+    Field("rise", "K", "temperature rise since the start, without the contribution of the flux of this stage"),
+    Field("warming", "s^1/2", "contribution of that flux, per unit of flux; 0 where the temperature is given"),
 ]
-FLUX = Field("flux", "K/s^1/2", "sqrt(D/pi)/k times the heat flux mu p v where the patch covers the centre")
+FLUX_FIELD = Field("flux", "K/s^1/2", "sqrt(D/pi)/k times the heat flux mu p v where the patch covers the centre")
 
 
-def extended(block: Block, fields: list[Field], before: str | None = None) -> Block:
-    """A block with more scalars, at its end or before one of its fields."""
+def with_fields(block: Block, fields: list[Field], before: str | None = None) -> Block:
+    """The block with more scalar fields, at its end or before the field named `before`."""
     at = len(block.fields) if before is None else [f.name for f in block.fields].index(before)
     more: dict[str, tuple[str | sp.Expr, ...]] = {f.name: (f.name,) for f in fields}
     return Block(block.name, (*block.fields[:at], *fields, *block.fields[at:]), {**block.quantities, **more})
 
 
-def with_law(b: Blocks, law: Law | None) -> Blocks:
-    """The blocks of a model whose friction coefficient follows a law."""
+def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
+    """The blocks with the fields that a friction law needs; unchanged for constant friction (None)."""
     if law is None:
         return b
-    contact = extended(b.contact, [Field("mu", "-", "friction coefficient by its law")], before="N")
+    contact = with_fields(b.contact, [Field("mu", "-", "friction coefficient by its law")], before="N")
     slopes = [Field(f"law_{f.name}", "-", f"d mu/d{f.name} at constant N and slip") for f in b.friction.fields]
-    contact = extended(contact, slopes)
+    contact = with_fields(contact, slopes)
     b = replace(
         b,
-        surface_parameters=extended(b.surface_parameters, [Field(name, *NUMBERS[name]) for name in law.columns]),
-        coefficient=extended(Block("coefficient", (), {}), UNKNOWN if law.heats else UNKNOWN[:1]),
+        surface_parameters=with_fields(b.surface_parameters, [Field(name, *NUMBERS[name]) for name in law.columns]),
+        coefficient=with_fields(
+            Block("coefficient", (), {}), COEFFICIENT_FIELDS if law.depends_on_temperature else COEFFICIENT_FIELDS[:1]
+        ),
         contact=contact,
     )
-    if not law.heats:
+    if not law.depends_on_temperature:
         return b
-    heat = [FLUX, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
+    heat = [FLUX_FIELD, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
     return replace(
         b,
-        local=extended(b.local, [Field("tilt", "-", "cosine of the angle between the axes of the two bodies")]),
-        contact=extended(contact, heat),
-        report_contact=extended(b.report_contact, [FLUX]),
+        local=with_fields(b.local, [Field("tilt", "-", "cosine of the angle between the axes of the two bodies")]),
+        contact=with_fields(contact, heat),
+        report_contact=with_fields(b.report_contact, [FLUX_FIELD]),
     )
 
 
-def unknown(p: Program, b: Blocks, law: Law | None, par: Symbols) -> Symbols:
-    """The parameters of a surface with the unknown mu in the place of the given one; the unknowns under `law`."""
+def read_unknown_coefficient(p: Program, b: Blocks, law: Law | None, par: Symbols) -> Symbols:
+    """Parameters of a surface for `contact`: with a law, mu is the unknown coefficient instead of the given one.
+
+    The symbols of the block `coefficient` are added under the key "law".
+    """
     if law is None:
         return par
     assert b.coefficient is not None
@@ -73,99 +79,132 @@ def unknown(p: Program, b: Blocks, law: Law | None, par: Symbols) -> Symbols:
     return {**par, "mu": c["mu"], "law": c}
 
 
-def lawful(p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, f: Symbols,
-           slip: Symbols) -> Symbols:  # fmt: skip
-    """What the law adds to the results of `contact`: its mu, and with heat the flux, the temperature and d mu/d mu."""
+def law_results(
+    p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, f: Symbols, slip: Symbols
+) -> Symbols:
+    """Results that a law adds to `contact`; empty for constant friction.
+
+    They are mu by the law and its derivatives with respect to Y and Z at constant N and slip velocity. With heating
+    they include the flux, the temperature and the derivative of the law with respect to the unknown mu.
+
+    Args:
+        p: program of the contact.
+        law: friction law.
+        par: symbols of the surface parameters.
+        given: the result of `read_unknown_coefficient`.
+        loc: symbols of the block `local`.
+        N: normal force.
+        f: friction state Y, Z.
+        slip: slip velocity u, v.
+    """
     if law is None:
         return {}
-    c, motion = given["law"], sliding(p, f, slip)
-    feels = surroundings(p, law, par, N, motion)
-    more: Symbols = {}
-    if law.heats:
-        share = heat_share(p, par, feels, loc)
-        more["flux"] = p.let(c["mu"] * share, "flux")
-        feels["T"] = more["T"] = p.let(par["start_temperature"] + c["rise"] + c["warming"] * more["flux"], "T")
-    mu = more["mu"] = coefficient(p, law, par, feels)
-    if law.heats:
-        more["law_mu"] = p.let(by(p, mu, feels["T"]) * c["warming"] * share)
-    slope, (square, along, slides) = by(p, mu, feels["v"]), motion
-    for name, velocity in (("Y", slip["u"]), ("Z", slip["v"])):
+    c, velocity = given["law"], sliding_velocity(p, f, slip)
+    variables = law_variables(p, law, par, N, velocity)
+    results: Symbols = {}
+    if law.depends_on_temperature:
+        share = flux_per_coefficient(p, par, variables, loc)
+        results["flux"] = p.let(c["mu"] * share, "flux")
+        results["T"] = p.let(par["start_temperature"] + c["rise"] + c["warming"] * results["flux"], "T")
+        variables["T"] = results["T"]
+    mu = results["mu"] = coefficient(p, law, par, variables)
+    if law.depends_on_temperature:
+        results["law_mu"] = p.let(partial_derivative(p, mu, variables["T"]) * c["warming"] * share)
+    slope, (square, along, positive) = partial_derivative(p, mu, variables["v"]), velocity
+    for name, component in (("Y", slip["u"]), ("Z", slip["v"])):
         if f[name] != 0:
-            more[f"law_{name}"] = p.let(slope * slides * (2 * f[name] * along + square * velocity))
-    return more
+            results[f"law_{name}"] = p.let(slope * positive * (2 * f[name] * along + square * component))
+    return results
 
 
-def stated(p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, f: Symbols,
-           slip: Symbols) -> tuple[Symbols, Symbols]:  # fmt: skip
-    """The same at given N and slip: the parameters with mu by its law, and what that adds to `report_contact`."""
+def evaluate_law(
+    p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, f: Symbols, slip: Symbols
+) -> tuple[Symbols, Symbols]:
+    """The law at given N and slip velocity, for `report_contact`; arguments as of `law_results`.
+
+    Returns the surface parameters with mu by the law, and the results that the law adds.
+    """
     if law is None:
         return par, {}
     assert b.coefficient is not None
     c: Symbols = p.read(b.coefficient, "c", active=False)
-    feels = surroundings(p, law, par, N, sliding(p, f, slip))
-    if not law.heats:
-        return {**par, "mu": coefficient(p, law, par, feels)}, {}
-    mu = coefficient(p, law, par, {**feels, "T": p.let(par["start_temperature"] + c["rise"], "T")})
-    return {**par, "mu": mu}, {"flux": mu * heat_share(p, par, feels, loc)}
+    variables = law_variables(p, law, par, N, sliding_velocity(p, f, slip))
+    if not law.depends_on_temperature:
+        return {**par, "mu": coefficient(p, law, par, variables)}, {}
+    mu = coefficient(p, law, par, {**variables, "T": p.let(par["start_temperature"] + c["rise"], "T")})
+    return {**par, "mu": mu}, {"flux": mu * flux_per_coefficient(p, par, variables, loc)}
 
 
-def surroundings(p: Program, law: Law, par: Symbols, N: sp.Expr, motion: Sliding) -> Symbols:
-    """Sliding velocity, normal force and pressure that a law may depend on."""
-    speed = p.let(sp.Mul(*motion), "speed")
-    pressure = {"p": p.let(N / par["area"], "pressure")} if "patch_radius" in law.takes else {}
+def law_variables(p: Program, law: Law, par: Symbols, N: sp.Expr, velocity: SlidingVelocity) -> Symbols:
+    """Variables of a friction law other than temperature: normal force, sliding velocity and, if needed, pressure."""
+    speed = p.let(sp.Mul(*velocity), "speed")
+    pressure = {"p": p.let(N / par["area"], "pressure")} if "patch_radius" in law.parameters else {}
     return {"N": N, "v": speed, **pressure}
 
 
-def sliding(p: Program, f: Symbols, slip: Symbols) -> Sliding:
-    """Y^2 + Z^2, Y u + Z v and whether that is positive. Their product is the sliding velocity: the slip less what Y, Z
-    give back, by the isotropic law; in steady sliding |slip| itself.
+def sliding_velocity(p: Program, f: Symbols, slip: Symbols) -> SlidingVelocity:
+    """Factors of the sliding velocity: Y^2 + Z^2, Y u + Z v, and 1 where the latter is positive, else 0.
 
-    With |slip| friction would grow against its own direction where a surface unloads, and push: light sliders would run
-    away. So it would with the switches per axis, across the slip.
+    Their product is the plastic part of the slip velocity by the isotropic hysteresis law. It is zero where friction
+    unloads elastically and equals |slip velocity| in steady sliding.
+
+    The magnitude of the slip velocity is not used: a law that increases with it would increase friction during elastic
+    unloading, where friction acts along the slip and does work on the sliders, so that light sliders accelerate without
+    bound. The plastic part by the switches per axis has the same defect across the slip.
     """
     along = p.let(f["Y"] * slip["u"] + f["Z"] * slip["v"])
     return p.let(f["Y"] ** 2 + f["Z"] ** 2), along, p.let(Step(along))
 
 
-def coefficient(p: Program, law: Law, par: Symbols, feels: Symbols) -> sp.Expr:
-    """Mu by the formula of the law, every step of it named."""
-    return p.let(fold(law.tree, {**par, **feels}, operations(p)), "mu")
+def coefficient(p: Program, law: Law, par: Symbols, variables: Symbols) -> sp.Expr:
+    """Friction coefficient by the formula of the law; every operation becomes a statement."""
+    return p.let(fold(law.tree, {**par, **variables}, operations(p)), "mu")
 
 
-def heat_share(p: Program, par: Symbols, feels: Symbols, loc: Symbols) -> sp.Expr:
-    """The flux over mu: p v sqrt(D/pi)/k while the patch covers the centre of the surface, which is where the
-    temperature is. The distance of its own centre is R sin of the tilt.
+def flux_per_coefficient(p: Program, par: Symbols, variables: Symbols, loc: Symbols) -> sp.Expr:
+    """Flux over mu: p v sqrt(D/pi)/k where the contact patch covers the centre of the surface, 0 elsewhere.
+
+    The temperature of a surface is that at its centre. The patch is R sin(tilt) away from there; the transition between
+    covered and uncovered is a cubic over `COVER_TRANSITION`.
     """
-    away = p.let((par["R"] / par["reach"]) ** 2 * (1 - loc["tilt"] ** 2))
-    z = p.let((1 - away) / EDGE)
-    inside, within = p.let(Step(z + 1)), p.let(Step(z - 1))
-    cover = p.let(within + (inside - within) * (2 + z * (3 - z**2)) / 4, "cover")
-    return p.let(par["heating"] * cover * feels["p"] * feels["v"], "share")
+    distance = p.let((par["R"] / par["reach"]) ** 2 * (1 - loc["tilt"] ** 2))  # squared, over the square of the reach
+    z = p.let((1 - distance) / COVER_TRANSITION)
+    partly, fully = p.let(Step(z + 1)), p.let(Step(z - 1))
+    cover = p.let(fully + (partly - fully) * (2 + z * (3 - z**2)) / 4, "cover")
+    return p.let(par["heating"] * cover * variables["p"] * variables["v"], "share")
 
 
-def by(p: Program, value: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Derivative of a named value by one symbol, all else it is made of being constant."""
-    kept, p.rates = p.rates, {symbol: sp.Integer(1)}
-    slope = p.rate(value)
-    p.rates = kept
-    return slope
+def partial_derivative(p: Program, value: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Derivative of a named value with respect to one symbol; all other inputs are constant."""
+    saved, p.rates = p.rates, {symbol: sp.Integer(1)}
+    derivative = p.rate(value)
+    p.rates = saved
+    return derivative
 
 
 def operations(p: Program) -> dict[str, Callable[..., sp.Expr]]:
-    """What the parts of a formula mean for the generator: every result gets a name."""
+    """Operations for `fold` that write every result as a statement of the program."""
 
     def pow_(base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         return p.let(base ** (sp.Integer(exponent) if exponent == int(exponent) else exponent))
 
-    def least(a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    def minimum(a: sp.Expr, b: sp.Expr) -> sp.Expr:
         return p.let(b + (a - b) * Step(b - a))
 
     return {
-        "number": lambda value: sp.Float(value), "neg": lambda a: p.let(-a), "pow": pow_,
+        "number": lambda value: sp.Float(value),
+        "neg": lambda a: p.let(-a),
+        "pow": pow_,
         "power": lambda base, exponent: p.let(sp.exp(p.let(p.let(sp.log(base)) * exponent))),
-        "add": lambda a, b: p.let(a + b), "sub": lambda a, b: p.let(a - b),
-        "mul": lambda a, b: p.let(a * b), "div": lambda a, b: p.let(a / b),
-        "exp": lambda a: p.let(sp.exp(a)), "log": lambda a: p.let(sp.log(a)), "sqrt": lambda a: p.let(sp.sqrt(a)),
-        "tanh": lambda a: p.let(sp.tanh(a)), "Abs": lambda a: p.let(Modulus(a)),
-        "Min": least, "Max": lambda a, b: p.let(-least(-a, -b)),
-    }  # fmt: skip
+        "add": lambda a, b: p.let(a + b),
+        "sub": lambda a, b: p.let(a - b),
+        "mul": lambda a, b: p.let(a * b),
+        "div": lambda a, b: p.let(a / b),
+        "exp": lambda a: p.let(sp.exp(a)),
+        "log": lambda a: p.let(sp.log(a)),
+        "sqrt": lambda a: p.let(sp.sqrt(a)),
+        "tanh": lambda a: p.let(sp.tanh(a)),
+        "Abs": lambda a: p.let(Modulus(a)),
+        "Min": minimum,
+        "Max": lambda a, b: p.let(-minimum(-a, -b)),
+    }

@@ -1,7 +1,8 @@
-"""Lowering: each program with the local partial derivatives that its tangent needs, statement by statement."""
+"""Lowering: reduces a program to the statements that it needs and differentiates it statement by statement."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -11,7 +12,12 @@ from .program import Program, Statement
 
 @dataclass(frozen=True)
 class Tangent:
-    """d target = sum of partial * d source over the sources that carry a tangent."""
+    """Tangent of one statement: d target = sum of partial * d source.
+
+    Attributes:
+        target: symbol that the statement defines.
+        terms: (partial derivative, source symbol) for the sources with a nonzero tangent.
+    """
 
     target: sp.Symbol
     terms: tuple[tuple[sp.Expr, sp.Symbol], ...]
@@ -19,7 +25,14 @@ class Tangent:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A program ready to be emitted: its value statements, and the statements of its tangent."""
+    """A program ready to be emitted.
+
+    Attributes:
+        program: the program as derived.
+        values: statements that the results need.
+        partials: statements that name the partial derivatives in `tangents`.
+        tangents: tangents of the statements, in order of execution.
+    """
 
     program: Program
     values: tuple[Statement, ...]
@@ -28,33 +41,33 @@ class Kernel:
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations of the value form."""
+        """Number of arithmetic operations of the values."""
         return int(sum(sp.count_ops(s.expression, visual=False) for s in self.values))
 
     @property
     def tangent_operations(self) -> int:
-        """Arithmetic operations of one tangent column."""
+        """Number of arithmetic operations of one column of the tangent."""
         return sum(2 * len(t.terms) - 1 for t in self.tangents)
 
 
-def live(program: Program, wanted: set[sp.Symbol]) -> tuple[Statement, ...]:
-    """Statements that the wanted names depend on."""
-    keep: list[Statement] = []
-    needed = set(wanted)
-    for statement in reversed(program.statements):
+def needed_statements(statements: Sequence[Statement], symbols: set[sp.Symbol]) -> tuple[Statement, ...]:
+    """Statements on which the given symbols depend, in order of execution."""
+    found: list[Statement] = []
+    needed = set(symbols)
+    for statement in reversed(statements):
         if statement.target in needed:
-            keep.append(statement)
+            found.append(statement)
             needed |= statement.expression.free_symbols
-    return tuple(reversed(keep))
+    return tuple(reversed(found))
 
 
 def active_inputs(program: Program) -> set[sp.Symbol]:
-    """Input symbols that carry a tangent."""
+    """Input symbols with respect to which the program is differentiated."""
     return {sp.Symbol(f"{use.alias}_{name}", real=True) for use in program.inputs for name in use.active}
 
 
-def own_inputs(program: Program) -> list[sp.Symbol]:
-    """Input symbols that carry a tangent, in the order of the blocks."""
+def ordered_active_inputs(program: Program) -> list[sp.Symbol]:
+    """The symbols of `active_inputs` in the order in which the blocks store them."""
     return [
         sp.Symbol(f"{use.alias}_{f.name}", real=True)
         for use in program.inputs
@@ -63,15 +76,18 @@ def own_inputs(program: Program) -> list[sp.Symbol]:
     ]
 
 
-def column(kernel: Kernel, source: sp.Symbol) -> tuple[tuple[Statement, ...], dict[str, sp.Expr]]:
-    """Derivatives of the results with respect to one input: statements, and what each result takes.
+def jacobian_column(kernel: Kernel, source: sp.Symbol) -> tuple[tuple[Statement, ...], dict[str, sp.Expr]]:
+    """Derivatives of the results of a program with respect to one of its inputs.
 
-    Only what depends on that input appears: the Jacobian of a program in its own inputs is sparse.
+    Statements that do not depend on that input are left out, since the Jacobian is sparse.
+
+    Returns:
+        The statements, and result name -> its derivative as a symbol or a constant.
     """
-    rates: dict[sp.Symbol, sp.Expr] = {source: sp.Integer(1)}
+    derivatives: dict[sp.Symbol, sp.Expr] = {source: sp.Integer(1)}
     statements: list[Statement] = []
     for tangent in kernel.tangents:
-        terms = [partial * rates[s] for partial, s in tangent.terms if s in rates]
+        terms = [partial * derivatives[s] for partial, s in tangent.terms if s in derivatives]
         if not terms:
             continue
         total = sp.Add(*terms)
@@ -80,34 +96,28 @@ def column(kernel: Kernel, source: sp.Symbol) -> tuple[tuple[Statement, ...], di
             statements.append(Statement(name, total))
             total = name
         if total != 0:
-            rates[tangent.target] = total
+            derivatives[tangent.target] = total
     results: dict[str, sp.Expr] = {}
     for name in kernel.program.results:
         value = kernel.program.results[name]
         if name in kernel.program.tangents:
             sign = 1 if value.is_Symbol else -1
-            results[name] = sign * rates.get(sign * value, sp.Integer(0))
-    needed = {s for e in results.values() for s in e.free_symbols}
-    kept = []
-    for statement in reversed(statements):
-        if statement.target in needed:
-            kept.append(statement)
-            needed |= statement.expression.free_symbols
-    return tuple(reversed(kept)), results
+            results[name] = sign * derivatives.get(sign * value, sp.Integer(0))
+    return needed_statements(statements, {s for e in results.values() for s in e.free_symbols}), results
 
 
 def lower(program: Program) -> Kernel:
-    """Prune what no output needs and differentiate statement by statement."""
-    values = live(program, {s for e in program.results.values() for s in e.free_symbols})
+    """Leave out statements that no result needs, and differentiate the others one by one."""
+    values = needed_statements(program.statements, {s for e in program.results.values() for s in e.free_symbols})
     if not program.tangents:
         return Kernel(program, values, (), ())
     targets = {s for name in program.tangents for s in program.results[name].free_symbols}
-    moving = active_inputs(program)
+    active = active_inputs(program)  # symbols with a nonzero tangent
     partials: list[Statement] = []
     tangents: list[Tangent] = []
-    for statement in live(program, targets):
+    for statement in needed_statements(program.statements, targets):
         terms = []
-        for source in sorted(statement.expression.free_symbols & moving, key=str):
+        for source in sorted(statement.expression.free_symbols & active, key=str):
             partial = sp.diff(statement.expression, source)
             if partial == 0:
                 continue
@@ -117,19 +127,22 @@ def lower(program: Program) -> Kernel:
                 partial = name
             terms.append((partial, source))
         if terms:
-            moving.add(statement.target)
+            active.add(statement.target)
             tangents.append(Tangent(statement.target, tuple(terms)))
-    return Kernel(program, values, *pruned(partials, tangents, targets))
+    return Kernel(program, values, *needed_tangents(partials, tangents, targets))
 
 
-def pruned(
+def needed_tangents(
     partials: list[Statement], tangents: list[Tangent], targets: set[sp.Symbol]
 ) -> tuple[tuple[Statement, ...], tuple[Tangent, ...]]:
-    """What the wanted tangents depend on: a switch has no derivative, so what feeds it may fall away."""
-    needed, kept, used = set(targets), [], set()
+    """Partials and tangents on which the tangents of `targets` depend.
+
+    A Heaviside switch has no derivative, so the tangents of its argument may be unnecessary.
+    """
+    needed, found, used = set(targets), [], set()
     for tangent in reversed(tangents):
         if tangent.target in needed:
-            kept.append(tangent)
+            found.append(tangent)
             needed |= {source for _, source in tangent.terms}
             used |= {s for partial, _ in tangent.terms for s in partial.free_symbols}
-    return tuple(p for p in partials if p.target in used), tuple(reversed(kept))
+    return tuple(p for p in partials if p.target in used), tuple(reversed(found))

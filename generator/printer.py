@@ -7,7 +7,7 @@ from sympy.printing.c import C99CodePrinter
 
 
 class Printer(C99CodePrinter):  # type: ignore[misc]
-    """C99 with small powers as products and the switch of (3.18) as a function of the runtime."""
+    """Printer of C99 that writes small powers as products and calls functions of the runtime for the project's own."""
 
     def _print_Pow(self, expr: sp.Pow) -> str:
         base, exponent = expr.as_base_exp()
@@ -18,7 +18,7 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
         return str(super()._print_Pow(expr))
 
     def _print_Step(self, expr: sp.Function) -> str:
-        return f"msfp_step({self._print(expr.args[0])})"
+        return f"msfp_heaviside({self._print(expr.args[0])})"
 
     def _print_ArcTan2(self, expr: sp.Function) -> str:
         return f"msfp_angle({self._print(expr.args[0])}, {self._print(expr.args[1])})"

@@ -1,8 +1,8 @@
-"""Straight-line programs: the form every equation of this project takes on its way to C.
+"""Straight-line programs: the form in which all equations are written before they are emitted as C.
 
-A program is a list of statements `name = small expression`, each over inputs and earlier names.
-Every intermediate of the recursion is named the moment it is formed, so that nothing here ever
-walks an expanded tree: derivatives are taken statement by statement (`derivative.py`).
+A program is a list of statements `name = small expression`, each over inputs and earlier names. Every intermediate
+result is named when it is formed. Expressions therefore stay small, and derivatives are taken statement by statement
+(`lower.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Field:
-    """One stored number of a block: its name, unit and meaning (they end up in the emitted C)."""
+    """One stored number of a block; name, unit and meaning become a comment of the emitted C."""
 
     name: str
     unit: str
@@ -27,10 +27,13 @@ class Field:
 
 @dataclass(frozen=True)
 class Block:
-    """A record that C stores as a flat array; `shape` maps each quantity to scalars or constants.
+    """A record that C stores as a flat array.
 
-    A component that vanishes identically (the third dimension of a planar model) is a constant
-    here: it takes no place in the array, no statement and no arithmetic.
+    Attributes:
+        name: name of the record.
+        fields: the stored numbers, in the order of the array.
+        quantities: scalar or vector -> its components, each the name of a field or a constant. A component that is
+            identically constant, as the third dimension of a planar model, is not stored and needs no arithmetic.
     """
 
     name: str
@@ -38,7 +41,7 @@ class Block:
     quantities: Mapping[str, tuple[str | sp.Expr, ...]]
 
     def symbols(self, alias: str) -> dict[str, sp.Expr | Vector]:
-        """Symbols of one use of this block: scalars as they are, vectors as 3-tuples."""
+        """Quantity -> its symbol or constant, or a 3-tuple of them; names of symbols begin with `alias`."""
         out: dict[str, sp.Expr | Vector] = {}
         for quantity, parts in self.quantities.items():
             values = tuple(sp.Symbol(f"{alias}_{part}", real=True) if isinstance(part, str) else part for part in parts)
@@ -47,7 +50,7 @@ class Block:
 
 
 class BlockBuilder:
-    """Collects the fields of a block; `planar` drops what vanishes in the E1-E3 plane."""
+    """Builds a block field by field; in a `planar` model, components outside the E1-E3 plane become constants."""
 
     def __init__(self, name: str, planar: bool) -> None:
         self.name, self.planar = name, planar
@@ -55,7 +58,7 @@ class BlockBuilder:
         self.quantities: dict[str, tuple[str | sp.Expr, ...]] = {}
 
     def scalar(self, name: str, unit: str, meaning: str, constant: int | None = None) -> BlockBuilder:
-        """Add a scalar; `constant` is its value in a planar model."""
+        """Add a scalar; `constant` is its value in a planar model, None where it is stored there too."""
         if self.planar and constant is not None:
             self.quantities[name] = (sp.Integer(constant),)
         else:
@@ -66,7 +69,7 @@ class BlockBuilder:
     def vector(
         self, name: str, unit: str, meaning: str, planar: tuple[int | None, int | None, int | None]
     ) -> BlockBuilder:
-        """Add a vector; `planar` gives the constant components of a planar model (None: stored)."""
+        """Add a vector; `planar` gives its constant components in a planar model, None for a stored one."""
         parts: list[str | sp.Expr] = []
         for axis, constant in zip(AXES, planar, strict=True):
             if self.planar and constant is not None:
@@ -78,20 +81,26 @@ class BlockBuilder:
         return self
 
     def build(self) -> Block:
-        """Freeze the block."""
+        """The block with the fields added so far."""
         return Block(self.name, tuple(self.fields), self.quantities)
 
 
 @dataclass(frozen=True)
 class Use:
-    """A block as one program sees it: under an alias, read or written."""
+    """One use of a block by a program, as an input or as the output.
+
+    Attributes:
+        block: the record.
+        alias: prefix of its symbols in the program.
+        active: names of the stored fields with respect to which the program is differentiated; empty for parameters.
+        moving: whether the emitted tangent has an argument for this block. It is the same in every model, whatever
+            the effects leave out, so that C calls the function in one way.
+    """
 
     block: Block
     alias: str
     active: frozenset[str]
-    """Names of the stored fields that carry a tangent (none: parameters)."""
     moving: bool = False
-    """Whether the emitted tangent takes columns of this block: the same in every model, whatever is left out."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +113,7 @@ class Statement:
 
 @dataclass
 class Program:
-    """A straight-line program between blocks."""
+    """A straight-line program that computes one block from others."""
 
     name: str
     summary: str
@@ -112,26 +121,35 @@ class Program:
     output: Use | None = None
     statements: list[Statement] = field(default_factory=list)
     results: dict[str, sp.Expr] = field(default_factory=dict)
-    """Stored output field -> the expression (a name or a constant) it takes."""
+    """Stored field of the output -> its value, a symbol or a constant."""
     tangents: frozenset[str] = frozenset()
-    """Stored output fields whose tangent is wanted (none: a program without a tangent form)."""
+    """Stored fields of the output whose tangent is emitted; empty for a program without a tangent."""
     columns: str = ""
-    """C constant: the number of tangent columns."""
+    """C constant with the number of columns of the tangent."""
     lanes: bool = False
-    """Whether C runs it for all surfaces side by side, and takes its tangent with respect to its own inputs."""
+    """Whether C evaluates it for all surfaces at once (SIMD) and takes its Jacobian with respect to its inputs."""
     rates: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _definitions: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _count: int = 0
 
     def read(self, block: Block, alias: str, active: bool | Iterable[str] = True) -> dict[str, sp.Expr | Vector]:
-        """Declare an input block and return its symbols; `active` tells what carries a tangent."""
+        """Declare an input block and return its symbols.
+
+        Args:
+            block: the record.
+            alias: prefix of its symbols.
+            active: quantities with respect to which the program is differentiated; True: all, False: none.
+        """
         names = [f.name for f in block.fields]
         chosen = names if active is True else [] if active is False else fields_of(block, active)
         self.inputs.append(Use(block, alias, frozenset(chosen), moving=active is not False))
         return block.symbols(alias)
 
     def let(self, expression: sp.Expr, name: str = "s") -> sp.Expr:
-        """Name an intermediate; numbers, symbols and their negatives need no name."""
+        """Add the statement `name_<count> = expression` and return its symbol.
+
+        Numbers, symbols and their negatives are returned as they are.
+        """
         expression = sp.sympify(expression)
         if expression.is_Number or expression.is_Symbol or (-expression).is_Symbol:
             return expression
@@ -142,30 +160,30 @@ class Program:
         return target
 
     def let_vector(self, vector: Vector, name: str = "s") -> Vector:
-        """Name the three components of a vector."""
+        """`let` for the three components of a vector."""
         x, y, z = (self.let(component, f"{name}{axis}") for component, axis in zip(vector, AXES, strict=True))
         return (x, y, z)
 
     def rate_of(self, symbol: sp.Symbol) -> sp.Expr:
-        """Time derivative of one symbol: declared in `rates`, found from its definition, or zero (a parameter)."""
+        """Time derivative of a symbol: as declared in `rates`, else from its statement, else zero (a parameter)."""
         if symbol not in self.rates:
             definition = self._definitions.get(symbol)
             self.rates[symbol] = sp.Integer(0) if definition is None else self.rate(definition)
         return self.rates[symbol]
 
     def rate(self, expression: sp.Expr) -> sp.Expr:
-        """Total time derivative of a small expression by the chain rule; named at once."""
+        """Total time derivative of an expression by the chain rule, as a new statement."""
         expression = sp.sympify(expression)
         terms = (sp.diff(expression, s) * self.rate_of(s) for s in sorted(expression.free_symbols, key=str))
         return self.let(sp.Add(*terms), "rate")
 
     def rate_vector(self, vector: Vector) -> Vector:
-        """Total time derivative of a vector of small expressions."""
+        """`rate` for the three components of a vector."""
         x, y, z = (self.rate(component) for component in vector)
         return (x, y, z)
 
     def declare_rates(self, vector: Vector, rates: Vector) -> None:
-        """Say what the time derivative of a vector of symbols is, e.g. (2.36) for the bases."""
+        """Declare the time derivative of a vector of symbols, such as (2.36) for a basis vector."""
         for component, rate in zip(vector, rates, strict=True):
             if component.is_Symbol:
                 self.rates[component] = rate
@@ -180,7 +198,18 @@ class Program:
         columns: str = "MSFP_DOF",
         alias: str = "out",
     ) -> None:
-        """Declare the output block; a component that the block holds constant must come out so."""
+        """Declare the output block and its values.
+
+        Args:
+            block: the record.
+            values: quantity -> its value; every quantity of the block must be given.
+            tangents: quantities whose tangent is emitted; True: all, False: none.
+            columns: C constant with the number of columns of the tangent.
+            alias: prefix of the output in emitted code and LaTeX.
+
+        Raises:
+            AssertionError: a value contradicts a constant component of the block, or is not in the block.
+        """
         for quantity, parts in block.quantities.items():
             value = values[quantity]
             components = value if isinstance(value, tuple) else (value,)
@@ -201,5 +230,5 @@ class Program:
 
 
 def fields_of(block: Block, quantities: Iterable[str]) -> list[str]:
-    """Stored field names of some quantities of a block."""
+    """Names of the stored fields of the given quantities of a block."""
     return [part for quantity in quantities for part in block.quantities[quantity] if isinstance(part, str)]

@@ -1,4 +1,4 @@
-"""The boundary row above the top plate: rig, prescribed load, supported mass (F_top, M_top of 3.28, 3.29)."""
+"""Boundary condition at the top plate: rig, prescribed load and supported mass (F_top, M_top of (3.28), (3.29))."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Symbols = dict[str, Any]
 
 
 def mass_point(p: Program, par: Symbols, body: Symbols) -> tuple[Vector, Vector, Vector]:
-    """Centre of the supported mass: r_nn + h t3 with velocity and acceleration."""
+    """Position r_nn + h t3 of the centre of the supported mass [m], its velocity [m/s] and acceleration [m/s^2]."""
     p.declare_rates(body["C"], body["V"])
     p.declare_rates(body["V"], body["A"])
     p.declare_rates(body["w"], body["al"])
@@ -26,23 +26,22 @@ def mass_point(p: Program, par: Symbols, body: Symbols) -> tuple[Vector, Vector,
 
 
 def upright(b: Blocks) -> Program:
-    """What the rotational stiffness holds the top plate to where that turns: t_3 (2.1) of psi and theta."""
-    p = Program("upright", "axis and angular velocity of what holds the top plate: (2.1), (3.12) without spin")
+    """Axis t_3 (2.1) and angular velocity (3.12) of a rotating support, to which the rotational spring refers."""
+    p = Program("upright", "axis and angular velocity of the rotating support: (2.1), (3.12) without spin")
     s: Symbols = p.read(b.support, "s", active=False)
     sin_psi, cos_psi = p.let(sp.sin(s["psi"])), p.let(sp.cos(s["psi"]))
     sin_theta, cos_theta = p.let(sp.sin(s["theta"])), p.let(sp.cos(s["theta"]))
     zero = sp.Integer(0)
-    turning = add((s["psi1"], zero, zero), scale(s["theta1"], (zero, cos_psi, sin_psi)))
-    p.write(b.upright, {"e": (sin_theta, -sin_psi * cos_theta, cos_psi * cos_theta), "w": turning}, tangents=False)
+    omega = add((s["psi1"], zero, zero), scale(s["theta1"], (zero, cos_psi, sin_psi)))
+    p.write(b.upright, {"e": (sin_theta, -sin_psi * cos_theta, cos_psi * cos_theta), "w": omega}, tangents=False)
     return p
 
 
-def top_wrench(b: Blocks, turned: bool) -> Program:
-    """-F_top and -M_top about r_nn: what the bearing exerts on its support."""
+def top_wrench(b: Blocks, rotating_support: bool) -> Program:
+    """Force -F_top and moment -M_top about r_nn, exerted by the bearing on its support: (3.28), (3.29)."""
     p = Program("top_wrench", "-F_top, -M_top of (3.28), (3.29): rig springs, prescribed load, supported mass")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
-    needed = ["t3", "w", "al", "wp", "alp", "C", "V", "A"]
-    body: Symbols = p.read(b.body, "b", active=needed)
+    body: Symbols = p.read(b.body, "b", active=("t3", "w", "al", "wp", "alp", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=("phi",))
     force: Symbols = p.read(b.vector, "fe")
     moment: Symbols = p.read(b.moment, "me")
@@ -57,9 +56,9 @@ def top_wrench(b: Blocks, turned: bool) -> Program:
     f = add(p.let_vector(horizontal, "rig"), inertia, scale(sp.Integer(-1), force["F"]))
     t3 = body["t3"]
     axis, relative = (zero, zero, sp.Integer(1)), body["wp"]
-    if turned:
-        held: Symbols = p.read(b.upright, "u", active=False)
-        axis, relative = held["e"], add(relative, scale(sp.Integer(-1), held["w"]))
+    if rotating_support:
+        support: Symbols = p.read(b.upright, "u", active=False)
+        axis, relative = support["e"], add(relative, scale(sp.Integer(-1), support["w"]))
     restoring = add(
         cross(scale(par["kr"], axis), t3), scale(p.let(par["kr"] * x["phi"]), t3), scale(par["cr"], relative)
     )
@@ -75,7 +74,7 @@ def top_wrench(b: Blocks, turned: bool) -> Program:
 
 
 def top_energy(b: Blocks) -> Program:
-    """Energy of the supported mass in the frame moving with the base."""
+    """Energy of the supported mass and power of the base acceleration, in the frame that translates with the base."""
     p = Program("top_energy", "energy of the supported mass in the frame moving with the base")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)

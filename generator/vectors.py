@@ -1,4 +1,4 @@
-"""Plain 3-vectors of SymPy expressions (components along E1, E2, E3 or along a local basis)."""
+"""Algebra of 3-vectors of SymPy expressions, with components along E1, E2, E3 or along a local basis."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def combine(basis: tuple[Vector, Vector, Vector], components: Vector) -> Vector:
-    """Vector whose components along `basis` are given."""
+    """Vector with the given components along `basis`."""
     return add(*(scale(c, t) for c, t in zip(components, basis, strict=True)))
 
 

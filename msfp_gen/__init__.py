@@ -1,6 +1,6 @@
 """Full nonlinear equations of motion of multi-stage friction pendulum bearings: derived, compiled, integrated.
 
-The public names below are loaded when first used, so that `import msfp_gen` costs nothing.
+The public names below are imported at first use, so that `import msfp_gen` is fast.
 """
 
 from __future__ import annotations
@@ -11,44 +11,53 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
-    from msfp_gen import presets
-    from msfp_gen.batch import simulate_batch
-    from msfp_gen.bearing import Bearing, Body, Surface
-    from msfp_gen.build import build_model
+    from msfp_gen.analysis.characterise import characterise
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
-    from msfp_gen.layout import Auto, Effects, Layout
-    from msfp_gen.motion import Motion
-    from msfp_gen.prescribed import Load, Rotation
-    from msfp_gen.scene import Scene, Stop
-    from msfp_gen.scenefile import load_scene
-    from msfp_gen.simulation import simulate
-    from msfp_gen.solver import Solver
-    from msfp_gen.top import Top
+    from msfp_gen.model.model import build_model
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.motions.prescribed import Load, Rotation
+    from msfp_gen.result import Result
+    from msfp_gen.scene.bearing import Bearing, Body, Surface
+    from msfp_gen.scene.file import presets
+    from msfp_gen.scene.file.loader import changed_scene, load_scene
+    from msfp_gen.scene.parts import InitialState, Stop
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.solver import Solver
+    from msfp_gen.scene.top import Top
+    from msfp_gen.simulation.batch import simulate_batch
+    from msfp_gen.simulation.simulate import simulate
+    from msfp_gen.specification.layout import Auto, Effects, Layout
+    from msfp_gen.studies.bounding import bound
 
-# Name -> module that holds it; a package is its own value.
-_HOMES = {
-    "Auto": "layout",
-    "Bearing": "bearing",
-    "Body": "bearing",
+# Public name -> the module that defines it; `presets` is a module itself.
+_MODULES = {
+    "Auto": "specification.layout",
+    "Bearing": "scene.bearing",
+    "Body": "scene.bearing",
     "CompileError": "errors",
-    "Effects": "layout",
+    "Effects": "specification.layout",
+    "InitialState": "scene.parts",
     "InputError": "errors",
-    "Layout": "layout",
-    "Load": "prescribed",
-    "Motion": "motion",
+    "Layout": "specification.layout",
+    "Load": "motions.prescribed",
+    "Motion": "motions.motion",
     "MsfpError": "errors",
-    "Rotation": "prescribed",
+    "Result": "result",
+    "Rotation": "motions.prescribed",
     "RunError": "errors",
-    "Scene": "scene",
-    "Solver": "solver",
-    "Stop": "scene",
-    "Surface": "bearing",
-    "Top": "top",
-    "build_model": "build",
-    "load_scene": "scenefile",
-    "presets": "presets",
-    "simulate": "simulation",
-    "simulate_batch": "batch",
+    "Scene": "scene.scene",
+    "Solver": "scene.solver",
+    "Stop": "scene.parts",
+    "Surface": "scene.bearing",
+    "Top": "scene.top",
+    "bound": "studies.bounding",
+    "build_model": "model.model",
+    "changed_scene": "scene.file.loader",
+    "characterise": "analysis.characterise",
+    "load_scene": "scene.file.loader",
+    "presets": "scene.file.presets",
+    "simulate": "simulation.simulate",
+    "simulate_batch": "simulation.batch",
 }
 
 __all__ = [
@@ -57,11 +66,13 @@ __all__ = [
     "Body",
     "CompileError",
     "Effects",
+    "InitialState",
     "InputError",
     "Layout",
     "Load",
     "Motion",
     "MsfpError",
+    "Result",
     "Rotation",
     "RunError",
     "Scene",
@@ -70,7 +81,10 @@ __all__ = [
     "Surface",
     "Top",
     "__version__",
+    "bound",
     "build_model",
+    "changed_scene",
+    "characterise",
     "load_scene",
     "presets",
     "simulate",
@@ -79,10 +93,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'msfp_gen' has no attribute {name!r}")
-    module = import_module(f"msfp_gen.{_HOMES[name]}")
-    value = module if _HOMES[name] == name else getattr(module, name)
+    module = import_module(f"msfp_gen.{_MODULES[name]}")
+    value = module if name == "presets" else getattr(module, name)
     globals()[name] = value
     return value
 

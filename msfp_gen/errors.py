@@ -1,19 +1,19 @@
-"""Every error this package raises on purpose. The leaf of the import graph.
+"""The errors that this package raises. This module imports no other module of the package.
 
-A message is one line that names the field, the value and the remedy.
+A message is one line with the field, its value and a remedy.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-LONGEST = 500  # characters of a message; what comes from a file can be of any length
+MAX_LENGTH = 500  # characters of a message: texts quoted from a file can have any length
 
 
 class MsfpError(Exception):
-    """Base of all errors raised on purpose; `exit_code` is what the command line returns.
+    """Base class of all errors of this package; `exit_code` is that of the command line.
 
-    The message is made one line of printable text, whatever of a file it quotes.
+    The message is converted to one line of printable text, since it may quote a file.
     """
 
     exit_code = 1
@@ -23,13 +23,13 @@ class MsfpError(Exception):
 
 
 class InputError(MsfpError, ValueError):
-    """Bad input: a field, its value and the remedy. Nothing was computed or written."""
+    """Invalid input: the message gives the field, its value and a remedy. Nothing was computed or written."""
 
     exit_code = 2
 
 
 class CompileError(MsfpError, RuntimeError):
-    """The compiler is missing or refused the emitted sources; carries command, log path and last lines."""
+    """There is no compiler, or it failed: `command`, path of the `log`, and the last lines of its `output`."""
 
     exit_code = 2
 
@@ -41,9 +41,9 @@ class CompileError(MsfpError, RuntimeError):
 
 
 class RunError(MsfpError, RuntimeError):
-    """A run that could not go on: says time, surface and quantity; `result` holds what was computed until then."""
+    """A run that failed: the message gives time, surface and cause; `result` has the rows until then, or is None."""
 
-    exit_code = 1  # 130 where it was interrupted, as shells have it
+    exit_code = 1  # 130 where the run was interrupted, the convention of shells
 
     def __init__(self, message: str, *, status: str = "", result: object | None = None) -> None:
         super().__init__(message)
@@ -54,12 +54,12 @@ class RunError(MsfpError, RuntimeError):
 
 
 def printable(text: str) -> str:
-    """`text` with everything but line ends escaped that a terminal would act on: what a file says is only shown."""
+    """`text` with control characters other than line ends escaped, so that quoted files cannot control a terminal."""
     return "".join(letter if letter.isprintable() or letter == "\n" else ascii(letter)[1:-1] for letter in text)
 
 
 def _one_line(message: str) -> str:
-    """Blanks run together, control characters escaped, and a long middle left out."""
+    """A message in one line: white space collapsed, control characters escaped, the middle of a long text omitted."""
     text = printable(" ".join(message.split()))
-    half = LONGEST // 2 - 3
-    return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
+    half = MAX_LENGTH // 2 - 3
+    return text if len(text) <= MAX_LENGTH else f"{text[:half]} ... {text[-half:]}"

@@ -1,119 +1,112 @@
-"""The result of a run: its rows, its events, and the views people ask for (dataset, summary, file)."""
+"""`Result`: the result of a run, with its dataset, summary, characterisation and files."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from msfp_gen.history import Array, Counters, Event, History
+from msfp_gen.results.history import Counters, Event, History
+from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from msfp_gen.characterise import Characterisation
-    from msfp_gen.notes import Note
-    from msfp_gen.scene import Scene
+    from msfp_gen.analysis.characterise import Characterisation
 
 __all__ = ["Counters", "Event", "History", "Result"]
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """What `simulate` gives, and what a RunError carries of a run that failed.
+@dataclass(frozen=True, eq=False, init=False)
+class Result(RunData):
+    """The result of `simulate`; a RunError has one in `.result` if the run failed after its start.
 
-    status: "ok", "stopped" (the scene's stop was met) or the name of a failure; message: one line in words.
-    provenance: versions and keys that say how the numbers came about. notes: where something that a model left out
-    began to matter, and what followed (docs/effects.md).
+    status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
+    text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
+    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
     """
 
-    scene: Scene
-    history: History
-    events: tuple[Event, ...] = ()
-    counters: Counters = field(default_factory=Counters)
-    status: str = "ok"
-    message: str = ""
-    provenance: dict[str, str] = field(default_factory=dict)
-    notes: tuple[Note, ...] = ()
+    def __repr__(self) -> str:
+        """The main results in ten lines at most."""
+        from msfp_gen.analysis.brief import brief_text
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether the run reached its end or the stop it was asked for."""
-        return self.status in ("ok", "stopped")
+        return brief_text(self)
 
-    @property
-    def friction_coefficient(self) -> Array:
-        """Coefficient mu of every surface, ndarray, shape (T, n-1): by its law, or the constant one of the bearing."""
-        recorded = self.history.friction_coefficient
-        if recorded is not None:
-            return recorded
-        return np.broadcast_to(self.scene.bearing.arrays()["friction"], self.history.normal_force.shape)
+    def _repr_html_(self) -> str:
+        """The main results and the hysteresis loop, for a notebook."""
+        from msfp_gen.analysis.brief import brief_html
+
+        return brief_html(self)
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """Every row and event as an xarray.Dataset, units and meaning in the attributes; built when first asked for."""
-        from msfp_gen.dataset import to_dataset
+        """Rows and events as an xarray.Dataset, with units and meanings in attributes; built at first use."""
+        from msfp_gen.results.dataset import to_dataset
 
         return to_dataset(self)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """The run in a few numbers, plain and JSON-able, SI units; `summary.summarise` names the keys."""
-        from msfp_gen.summary import summarise
+        """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
+        from msfp_gen.analysis.summary import summarise
 
         return summarise(self)
 
     def characterise(self) -> Characterisation:
-        """Effective stiffness, damping, stages, capacity left, velocity and heat: see docs/characterise.md.
+        """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/characterise.md).
 
         Raises InputError where the bearing did not move.
         """
-        from msfp_gen.characterise import characterise
+        from msfp_gen.analysis.characterise import characterise
 
         return characterise(self)
 
     def to_netcdf(self, path: str | Path) -> Path:
-        """Write the dataset as netCDF-4, whole or not at all; a run that failed is saved with its status.
+        """Write the dataset as netCDF-4 file, completely or not at all; a failed run is written with its status.
 
         Raises InputError where the suffix is not .nc or the folder does not exist.
         """
-        from msfp_gen.dataset import write_netcdf
+        from msfp_gen.results.dataset import write_netcdf
 
         return write_netcdf(self, path)
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write a header of `name [unit]` and one row an instant, with scene and origin in comments.
+        """Write a CSV file: `name [unit]` as header, one line per row; scene, events and provenance as comments.
 
-        This and the writers below raise InputError for another suffix or a folder that does not exist.
+        Raises InputError where the suffix is not .csv or the folder does not exist.
         """
-        from msfp_gen.export import write_csv
+        from msfp_gen.results.export import write_csv
 
         return write_csv(self, path)
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Write flat columns as Parquet, units in their metadata; InputError names the remedy without pyarrow."""
-        from msfp_gen.export import write_parquet
+        """Write a Parquet file with units in its metadata.
+
+        Raises InputError as `to_csv` does, and where pyarrow is not installed.
+        """
+        from msfp_gen.results.export import write_parquet
 
         return write_parquet(self, path)
 
     def to_mat(self, path: str | Path) -> Path:
-        """Write every variable for MATLAB, with structs `units`, `meaning` and `attributes`."""
-        from msfp_gen.export import write_mat
+        """Write a MATLAB file of all variables, with structs `units`, `meaning` and `attributes`.
+
+        Raises InputError as `to_csv` does.
+        """
+        from msfp_gen.results.export import write_mat
 
         return write_mat(self, path)
 
     def save(self, path: str | Path) -> Path:
-        """Write the format that the suffix names: .nc, .parquet, .csv or .mat."""
-        from msfp_gen.export import save
+        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
+        from msfp_gen.results.export import save
 
         return save(self, path)
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Result:
-        """What `to_netcdf` wrote, its scene included. Raises InputError where `path` holds no result."""
-        from msfp_gen.dataset import read_result
+        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
+        from msfp_gen.results.dataset import read_result
 
-        return read_result(path)
+        return read_result(path, cls)

@@ -1,4 +1,4 @@
-"""The command line, `msfp-gen`. The only room that prints; everything heavy is imported when a command needs it."""
+"""The command line, `msfp-gen`. Only this package prints; large libraries are imported when a command needs them."""
 
 from __future__ import annotations
 
@@ -7,14 +7,24 @@ from typing import Annotated, Any
 
 import typer
 
-from msfp_gen.cli import batching, benching, building, drawing, judging, records, reporting, running, storing
+from msfp_gen.cli import (
+    assessment_commands,
+    batching,
+    benching,
+    building,
+    cache_command,
+    drawing,
+    records,
+    reporting,
+    running,
+)
 from msfp_gen.cli.console import fail, say
-from msfp_gen.cli.interrupts import heard
+from msfp_gen.cli.interrupts import signals_as_interrupts
 from msfp_gen.errors import MsfpError
 from msfp_gen.version import __version__
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
-# The base of usage errors (ClickException), in click or in the copy of it that newer typers carry.
+# Base class of usage errors: ClickException, of click or of the copy of click inside newer versions of typer.
 USAGE_ERROR: Any = typer.BadParameter.__mro__[2]
 
 app = typer.Typer(
@@ -24,14 +34,17 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-# In the order in which help lists the commands.
-for group in (running, batching, drawing, judging, benching, reporting, records, building, storing):
+# This order is the order of the commands in the help text.
+for group in (running, batching, drawing, assessment_commands, benching, reporting, records, building, cache_command):
     app.add_typer(group.app)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns its exit code: 0 done, 1 the run failed, 2 bad input, 128 + signal interrupted."""
-    with heard() as signals:
+    """Run the command line with `argv` (None: of the process).
+
+    Returns the exit code: 0 success, 1 the run failed, 2 bad input, 128 + number of the signal if interrupted.
+    """
+    with signals_as_interrupts() as signals:
         code = _main(argv)
         return 128 + signals[0] if code == INTERRUPTED and signals else code
 
@@ -42,18 +55,18 @@ def _main(argv: list[str] | None) -> int:
         code = app(args=arguments or ["--help"], prog_name="msfp-gen", standalone_mode=False) or 0
     except MsfpError as error:
         return fail(str(error), error.exit_code)
-    except OSError as error:  # such as a full disk, or a reader of our output that left
+    except OSError as error:  # such as a full disk, or a closed pipe on standard output
         return fail(str(error), FAILED)
     except typer.Abort:
         code = INTERRUPTED
     except USAGE_ERROR as error:
         return fail(f"{error.format_message().rstrip('.')} (see msfp-gen --help)", BAD_INPUT)
-    # Typer turns Ctrl-C into this code without a word.
+    # Typer turns Ctrl-C into this code without a message.
     return fail("interrupted", code) if code == INTERRUPTED else int(code)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         say(f"msfp-gen {__version__}")
         raise typer.Exit
 

@@ -1,4 +1,4 @@
-"""The command for many scenes at once: batch."""
+"""Command for many scenes: batch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, say, scenes, show, whole
+from msfp_gen.cli.console import Progress, note, say, scenes, show, whole_number
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
@@ -30,36 +30,32 @@ def batch(
     ],
     vary: Annotated[
         list[str] | None,
-        typer.Option(metavar="FIELD=VALUES", help="Values a field of the scene takes, a scene each; may be repeated."),
+        typer.Option(metavar="FIELD=VALUES", help="Run the scene once for each value of a field; may be repeated."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write every run here, as netCDF-4.")
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write every run to this folder, as netCDF-4.")
     ] = None,
-    workers: Annotated[int, typer.Option(parser=whole, metavar="NUMBER", help="Cores to use.")] = 1,
-    lanes: Annotated[
+    workers: Annotated[
         int | None,
-        typer.Option(
-            parser=whole, metavar="8|4|2|0",
-            help="Runs side by side on a core, 0: one at a time; not given: what a vector of the processor holds.",
-        ),
+        typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summaries as JSON, and nothing else.")] = False,
 ) -> None:
-    """Simulate many scenes, or one with fields varied, side by side in the vectors of the processor."""
-    from msfp_gen.batch import simulate_batch
-    from msfp_gen.output import make_folder
-    from msfp_gen.varied import varied_field, varied_scenes
+    """Simulate many scenes, or one with fields varied, on all cores."""
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.parameter_sweep import varied_field, varied_scenes
+    from msfp_gen.simulation.batch import simulate_batch
 
     fields = [varied_field(text) for text in vary or ()]
     chosen = [scene for source in sources for scene in varied_scenes(source, fields)]
     if output is not None:
         make_folder(output, "--output")
     with Progress(f"{len(chosen)} scenes") as progress:
-        results = simulate_batch(chosen, workers=workers, lanes=lanes, progress=progress)
+        results = simulate_batch(chosen, workers=workers, progress=progress)
     if as_json:
         say(json.dumps([result.summary for result in results], indent=2, allow_nan=False))
     else:
-        from msfp_gen.tables import batch_table
+        from msfp_gen.analysis.tables import batch_table
 
         show([batch_table(results)])
     for path in _save(results, output):
@@ -70,11 +66,13 @@ def batch(
 
 
 def _save(results: list[Result], folder: Path | None) -> list[Path]:
-    """A file for every run, in the order of the scenes: its number and its name."""
+    """Write one file per run, named by the number and the name of its scene; returns the paths."""
     if folder is None:
         return []
     digits = len(str(len(results)))
     names = ((result.scene.name or "scene").replace(" = ", "=") for result in results)
     stems = (re.sub(r"[^A-Za-z0-9.=_-]+", "-", name).strip("-.")[:80] for name in names)
-    return [result.save(folder / f"{index:0{digits}d}-{stem}.nc")
-            for index, (result, stem) in enumerate(zip(results, stems, strict=True), start=1)]  # fmt: skip
+    return [
+        result.save(folder / f"{index:0{digits}d}-{stem}.nc")
+        for index, (result, stem) in enumerate(zip(results, stems, strict=True), start=1)
+    ]

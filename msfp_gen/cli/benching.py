@@ -1,4 +1,4 @@
-"""Commands that measure: what accuracy costs on a scene."""
+"""Commands that measure error against cost on a scene: bench work-precision, bench model-error."""
 
 from __future__ import annotations
 
@@ -10,36 +10,37 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, note, number, read_as, say, show
+from msfp_gen.cli.console import SceneName, note, number, parser_of, say, show
 
 if TYPE_CHECKING:
-    from msfp_gen.accuracy.study import Study
-    from msfp_gen.scene import Scene
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.studies.accuracy.study import Study
 
 app = typer.Typer()
 bench = typer.Typer(
-    help="Measure what accuracy costs on a scene: by method, and by what is modelled.",
+    help="Measure error against cost on a scene: of methods and tolerances, and of simplified models.",
     epilog="Examples:\n\n\b\n  msfp-gen bench work-precision fenz-monotonic -o study\n"
     "  msfp-gen bench model-error fenz-test2 -o study",
 )
 app.add_typer(bench, name="bench")
 
 
-def _numbers(text: str | None, otherwise: Sequence[float]) -> Sequence[float]:
-    """A list of numbers, or what holds without one."""
-    parse = read_as(lambda given: [float(part) for part in given.split(",")], "list of numbers")
-    return otherwise if text is None else parse(text)
+def _numbers(text: str | None, default: Sequence[float]) -> Sequence[float]:
+    """Numbers of a list separated by commas; `default` if there is no text."""
+    parse = parser_of(lambda given: [float(part) for part in given.split(",")], "list of numbers")
+    return default if text is None else parse(text)
 
 
-Tolerances = Annotated[str | None, typer.Option(metavar="LIST", help="Such as 1e-2,1e-4 instead of 1e-2 to 1e-9.")]
-Limit = Annotated[
-    float, typer.Option(parser=number, metavar="SECONDS", help="Cut off a run that takes longer than this.")
+Tolerances = Annotated[
+    str | None, typer.Option(metavar="LIST", help="Tolerances, such as 1e-2,1e-4, instead of the default list.")
 ]
+Limit = Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Cut off a run after this wall time.")]
 Duration = Annotated[
-    float | None, typer.Option(parser=number, metavar="SECONDS", help="End the scene after this time.")
+    float | None, typer.Option(parser=number, metavar="SECONDS", help="End the scene after this simulated time.")
 ]
 Folder = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write CSV, JSON, Markdown, SVG and PNG here.")
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Write CSV, JSON, Markdown, SVG and PNG to this folder."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
 
@@ -51,22 +52,32 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing el
 )
 def work_precision(
     scene: SceneName,
-    methods: Annotated[str | None, typer.Option(metavar="LIST", help="Such as implicit,dopri5 instead of all.")] = None,
+    methods: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Methods, such as implicit,dopri5, instead of all.")
+    ] = None,
     tolerances: Tolerances = None,
     limit: Limit = 10.0,
     duration: Duration = None,
     output: Folder = None,
     as_json: AsJson = False,
 ) -> None:
-    """Error against cost for every method and tolerance, against a reference that a second method confirms."""
-    from msfp_gen.accuracy.study import TOLERANCES
-    from msfp_gen.accuracy.study import work_precision as study
+    """Error against cost of every method and tolerance; a second method confirms the reference."""
+    from msfp_gen.studies.accuracy.study import TOLERANCES
+    from msfp_gen.studies.accuracy.study import work_precision as study
 
     _report(
-        scene, duration, output, as_json,
-        lambda chosen: study(chosen, methods=methods.split(",") if methods else None,
-                             tolerances=_numbers(tolerances, TOLERANCES), limit=limit, say=note),
-    )  # fmt: skip
+        scene,
+        duration,
+        output,
+        as_json,
+        lambda chosen: study(
+            chosen,
+            methods=methods.split(",") if methods else None,
+            tolerances=_numbers(tolerances, TOLERANCES),
+            limit=limit,
+            say=note,
+        ),
+    )
 
 
 @bench.command(
@@ -82,22 +93,25 @@ def model_error(
     output: Folder = None,
     as_json: AsJson = False,
 ) -> None:
-    """Error against cost of models that leave something out: planar, massless, no rims, linearised, OpenSees."""
-    from msfp_gen.accuracy.models import TOLERANCES, model_errors
+    """Error against cost of simplified models: planar, massless, without rims, linearised, OpenSees."""
+    from msfp_gen.studies.accuracy.models import TOLERANCES, model_errors
 
     _report(
-        scene, duration, output, as_json,
+        scene,
+        duration,
+        output,
+        as_json,
         lambda chosen: model_errors(chosen, tolerances=_numbers(tolerances, TOLERANCES), limit=limit, say=note),
-    )  # fmt: skip
+    )
 
 
 def _report(
     name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
 ) -> None:
-    """Load, measure, print and write."""
-    from msfp_gen.accuracy.output import as_dict, tables, write
-    from msfp_gen.output import make_folder
-    from msfp_gen.scenefile import load_scene
+    """Load the scene, run the study, print it and write its files."""
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.studies.accuracy.output import as_dict, tables, write
 
     scene = load_scene(name)
     if duration is not None:

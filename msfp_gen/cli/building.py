@@ -1,4 +1,4 @@
-"""Commands about models and the installation: generate, explain, presets, doctor."""
+"""Commands for models and the installation: generate, explain, presets, doctor."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, building, show, whole, with_effects
-from msfp_gen.layout import Effects, Layout, ModelSpec
+from msfp_gen.cli.console import SceneName, building, show, whole_number, with_effects
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 app = typer.Typer()
 
@@ -16,19 +16,25 @@ app = typer.Typer()
 @app.command(epilog="Example:\n\n\b\n  msfp-gen generate 5 2 2 -o models   # then: import msfp_5_2_2")
 @with_effects
 def generate(
-    n: Annotated[int, typer.Argument(parser=whole, metavar="N", help="Bodies, base and top plate included.")],
-    m: Annotated[int, typer.Argument(parser=whole, metavar="M", help="Surfaces that are concave up; they lie below.")],
-    p: Annotated[int, typer.Argument(parser=whole, metavar="P", help="Surfaces that are concave down; n = m + p + 1.")],
+    n: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="N", help="Number of bodies, with base and top plate.")
+    ],
+    m: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="M", help="Number of concave-up surfaces, the lower ones.")
+    ],
+    p: Annotated[
+        int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
+    ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Put sources and module here.")
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write sources and module to this folder.")
     ] = None,
     *,
     effects: Effects,
 ) -> None:
-    """Derive, emit and compile the equations of a layout."""
+    """Derive and compile the equations of a stack layout."""
     spec = ModelSpec(Layout(n, m, p), effects)
-    from msfp_gen.build import generate_to, prepare
-    from msfp_gen.tables import build_table
+    from msfp_gen.jit.build import generate_to, prepare
+    from msfp_gen.jit.tables import build_table
 
     with building() as progress:
         info = prepare(spec, progress) if output is None else generate_to(spec, output, progress)
@@ -37,9 +43,9 @@ def generate(
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
 def explain(scene: SceneName) -> None:
-    """Say in plain words what a scene computes."""
-    from msfp_gen.explain import explain as describe
-    from msfp_gen.scenefile import load_scene
+    """Describe a scene: bearing, motion, top, what is modelled and how it is solved."""
+    from msfp_gen.scene.explain import explain as describe
+    from msfp_gen.scene.file.loader import load_scene
 
     show(describe(load_scene(scene)))
 
@@ -47,8 +53,8 @@ def explain(scene: SceneName) -> None:
 @app.command(epilog="Example:\n\n\b\n  msfp-gen presets")
 def presets() -> None:
     """List the scenes and bearings that come with msfp-gen."""
-    from msfp_gen import presets as catalogue
-    from msfp_gen.tables import Table
+    from msfp_gen.common.tables import Table
+    from msfp_gen.scene.file import presets as catalogue
 
     show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "bearing"))
 
@@ -56,8 +62,8 @@ def presets() -> None:
 @app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")
 def doctor() -> None:
     """Check Python, libraries, compiler and cache."""
-    from msfp_gen.doctor import diagnose
-    from msfp_gen.tables import check_table
+    from msfp_gen.jit.doctor import diagnose
+    from msfp_gen.jit.tables import check_table
 
     checks = diagnose()
     show([check_table(checks)])

@@ -1,4 +1,4 @@
-"""What every command shares: options, parsers, and the only functions of the package that print."""
+"""Shared by all commands: options, parsers, and the functions that print."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 
+from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.errors import printable
-from msfp_gen.fields import Choice, Rule, ruled_fields
-from msfp_gen.layout import Effects
+from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.tables import Table
+    from msfp_gen.common.tables import Table
 
 
-def read_as(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
-    """A parser whose error names the value, as those of typer do not."""
+def parser_of(kind: Callable[[str], Any], noun: str) -> Callable[[str], Any]:
+    """A parser of option values whose error message names the value, which typer's own parsers do not."""
 
     def parse(text: str) -> Any:
         try:
             return kind(text)
         except ValueError:
-            raise typer.BadParameter(f"{text!r} is no {noun}; give one") from None
+            raise typer.BadParameter(f"{text!r} is not a {noun}; give one") from None
 
     return parse
 
 
-def words(owner: type, field: str) -> str:
-    """The choices of a field, as help shows them."""
+def choices_of(owner: type, field: str) -> str:
+    """The choices of a field of a dataclass, as the help text shows them."""
     return "|".join(get_args(get_type_hints(owner)[field]))
 
 
 def with_effects(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command an option for every effect; it is called with those that were given, as `effects`."""
+    """Add an option for every effect to a command, which receives them as `effects`."""
     options = {name: _option(name, rule) for name, rule, _ in ruled_fields(Effects)}
 
     @wraps(command)
@@ -49,28 +49,30 @@ def with_effects(command: Callable[..., None]) -> Callable[..., None]:
         command(**given, effects=Effects(**chosen))
 
     signature = inspect.signature(command, eval_str=True)
-    kept = [parameter for name, parameter in signature.parameters.items() if name != "effects"]
-    added = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
-             for name, option in options.items()]  # fmt: skip
-    called.__annotations__ = {parameter.name: parameter.annotation for parameter in (*kept, *added)}
-    setattr(called, "__signature__", signature.replace(parameters=[*kept, *added]))  # noqa: B010
+    others = [parameter for name, parameter in signature.parameters.items() if name != "effects"]
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+        for name, option in options.items()
+    ]
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in (*others, *added)}
+    setattr(called, "__signature__", signature.replace(parameters=[*others, *added]))  # noqa: B010
     return called
 
 
 def _option(name: str, rule: Rule) -> Any:
-    """A switch for an effect that is on or off, else an option of a word or a text; the help says what they mean."""
+    """The option of one effect: a switch for an effect that is on or off, else a word or a formula."""
     flag = name.replace("_", "-")
     if not isinstance(rule, Choice):
-        text = "Of custom friction: mu * (1 - c1 * exp(-c2 * v))."
+        text = "Formula of the friction coefficient with --friction custom, such as mu * (1 - c1 * exp(-c2 * v))."
         return Annotated[str | None, typer.Option(f"--{flag}", metavar="FORMULA", help=text)]
-    said = "; ".join(f"{word}: {meaning}" for word, meaning in rule.meanings.items())
+    text = "; ".join(f"{word}: {meaning}" for word, meaning in rule.meanings.items())
     if True in rule.words:
-        said = f"{rule.meanings[True]}. Off: {rule.meanings[False]}."
-        return Annotated[bool | None, typer.Option(f"--{flag}/--no-{flag}", help=said[0].upper() + said[1:])]
-    return Annotated[str | None, typer.Option(f"--{flag}", metavar="|".join(rule.words), help=f"{said}.")]
+        text = f"{rule.meanings[True]}. Off: {rule.meanings[False]}."
+        return Annotated[bool | None, typer.Option(f"--{flag}/--no-{flag}", help=text[0].upper() + text[1:])]
+    return Annotated[str | None, typer.Option(f"--{flag}", metavar="|".join(rule.words), help=f"{text}.")]
 
 
-whole, number = read_as(int, "whole number"), read_as(float, "number")
+whole_number, number = parser_of(int, "whole number"), parser_of(float, "number")
 Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write every row: .nc (netCDF-4), .csv, .parquet or .mat."),
@@ -78,8 +80,8 @@ Output = Annotated[
 
 
 def scenes(incomplete: str) -> list[tuple[str, str]]:
-    """What a shell may complete a scene to: presets with what they are, scene files and the folders on the way."""
-    from msfp_gen.catalogue import descriptions
+    """Completions of a scene for the shell, with descriptions: presets, scene files and folders."""
+    from msfp_gen.scene.file.catalogue import descriptions
 
     presets = [(name, line) for name, line in descriptions("scene").items() if name.startswith(incomplete)]
     folder, _, start = incomplete.rpartition("/")
@@ -95,23 +97,23 @@ SceneName = Annotated[
 
 
 def say(text: str) -> None:
-    """A result, on stdout."""
+    """Print a result on standard output."""
     typer.echo(printable(text))
 
 
 def note(text: str) -> None:
-    """A line about long work, beside the results, on stderr."""
+    """Print a line that is not part of the results on standard error."""
     typer.echo(printable(text), err=True)
 
 
 def fail(message: str, code: int) -> int:
-    """One line on stderr, whatever the message holds."""
+    """Print an error message as one line on standard error; returns `code`."""
     typer.echo(printable(f"error: {' '.join(message.split())}"), err=True)
     return code
 
 
 def show(tables: Iterable[Table]) -> None:
-    """Rich tables on a terminal, aligned text in a pipe."""
+    """Print tables: with rich on a terminal, as aligned text otherwise."""
     if not sys.stdout.isatty():
         say("\n\n".join(table.text for table in tables))
         return
@@ -123,7 +125,7 @@ def show(tables: Iterable[Table]) -> None:
 
 
 class Progress:
-    """How far long work is, and after a second how long it still takes, on one line of a terminal; silent elsewhere."""
+    """Progress on one line of a terminal: per cent done, and after a second the time left; silent elsewhere."""
 
     def __init__(self, name: str) -> None:
         self.name = printable(name)
@@ -148,19 +150,19 @@ class Progress:
 
 @contextmanager
 def building() -> Iterator[Callable[[str, float], None]]:
-    """Progress of a build: what is being done, and how far it is; a line as each stage begins without a terminal."""
-    stage, line, begin = "", Progress(""), monotonic()
+    """Progress of a build: the current task and per cent done; without a terminal one line per task."""
+    task, line, begin = "", Progress(""), monotonic()
 
-    def tell(doing: str, share: float) -> None:
-        nonlocal stage
+    def report(doing: str, share: float) -> None:
+        nonlocal task
         if update is not None:
             line.name = printable(doing)
             update(share, 1.0)
-        elif doing.partition(" ")[0] != stage:
+        elif doing.partition(" ")[0] != task:
             note(doing)
-        stage = doing.partition(" ")[0]
+        task = doing.partition(" ")[0]
 
     with line as update:
-        yield tell
-    if stage == "compiling":
-        note(f"built in {monotonic() - begin:.1f} s; from now on it comes from the cache")
+        yield report
+    if task == "compiling":
+        note(f"built in {monotonic() - begin:.1f} s; later runs load it from the cache")

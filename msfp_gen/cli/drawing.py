@@ -9,23 +9,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, number, whole
-from msfp_gen.cli.opening import looked_at, opened
+from msfp_gen.cli.console import Progress, note, number, whole_number
+from msfp_gen.cli.inputs import load_source, result_of
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
 from msfp_gen.errors import InputError
-from msfp_gen.output import FIGURE_SUFFIXES, check_output, make_folder
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
-    from msfp_gen.scene import Scene
+    from msfp_gen.scene.scene import Scene
 
-ROWS = 4000  # of a run that is made to be drawn: the solver's own steps may lie far apart
+ROWS = 4000  # rows of a run made for figures: the steps of the solver may be too long for smooth curves
 EVERY = "all"
 
 app = typer.Typer()
 Source = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")]
 Azimuth = Annotated[
     float | None,
-    typer.Option(parser=number, metavar="DEGREES", help="Plane of the section, from E1; default: of the displacement."),
+    typer.Option(
+        parser=number, metavar="DEGREES", help="Azimuth of the section from E1; default: of the displacement."
+    ),
 ]
 
 
@@ -45,11 +47,11 @@ def plot(
     ] = Path(),
     time: Annotated[
         float | None,
-        typer.Option(parser=number, metavar="SECONDS", help="Instant of section and force-path; default: the peak."),
+        typer.Option(parser=number, metavar="SECONDS", help="Time of section and force-path; default: at the peak."),
     ] = None,
     azimuth: Azimuth = None,
     friction_circles: Annotated[
-        bool, typer.Option("--friction-circles", help="Sphere centres and friction circles in the section.")
+        bool, typer.Option("--friction-circles", help="Add sphere centres and friction circles to the section.")
     ] = False,
 ) -> None:
     """Draw a run: one figure, or all of them."""
@@ -57,14 +59,14 @@ def plot(
     angle = None if azimuth is None else math.radians(azimuth)
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
-    given = _opened(source)
+    loaded = _load_for_figures(source)
     make_folder(next(iter(targets.values())).parent, "--output")
-    result, failure = looked_at(given)
+    result, failure = result_of(loaded)
     from msfp_gen.figures import FIGURES, plot_force_path, plot_section
-    from msfp_gen.resample import at_times
+    from msfp_gen.results.resample import at_times
 
     if time is not None:
-        at_times(result, time)  # refused before anything is written
+        at_times(result, time)  # refuses a time outside the run before anything is written
     for name, path in targets.items():
         if name == "section":
             plot_section(result, path, time=time, azimuth=angle, friction_circles=friction_circles)
@@ -85,7 +87,7 @@ def animate(
     source: Source,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="A .gif, or an .mp4 by ffmpeg.")],
     seconds: Annotated[float, typer.Option(parser=number, metavar="SECONDS", help="Length of the movie.")] = 8.0,
-    rate: Annotated[int, typer.Option(parser=whole, metavar="NUMBER", help="Frames a second.")] = 12,
+    rate: Annotated[int, typer.Option(parser=whole_number, metavar="NUMBER", help="Frames a second.")] = 12,
     start: Annotated[
         float | None, typer.Option(parser=number, metavar="SECONDS", help="First instant of the run that is shown.")
     ] = None,
@@ -94,23 +96,31 @@ def animate(
     ] = None,
     azimuth: Azimuth = None,
 ) -> None:
-    """Film the stack as it moves, beside its loop and the bars of sliding."""
-    from msfp_gen.figures import animate as film
+    """Write a movie of the stack in motion, with its loop and the bars of sliding surfaces."""
+    from msfp_gen.figures import animate as write_movie
     from msfp_gen.figures import check_movie
 
     check_movie(output, "--output")
-    result, failure = looked_at(_opened(source))
+    result, failure = result_of(_load_for_figures(source))
     angle = None if azimuth is None else math.radians(azimuth)
     with Progress("frames") as progress:
-        film(result, output, seconds=seconds, frames_per_second=rate, start=start, end=end, azimuth=angle,
-             progress=progress)  # fmt: skip
+        write_movie(
+            result,
+            output,
+            seconds=seconds,
+            frames_per_second=rate,
+            start=start,
+            end=end,
+            azimuth=angle,
+            progress=progress,
+        )
     note(f"wrote {output}")
     if failure is not None:
         raise failure
 
 
 def _targets(figure: str, output: Path) -> dict[str, Path]:
-    """Where each figure goes; judged before anything is run."""
+    """Name -> file of each figure. Raises InputError for an unknown name or a path that cannot be written."""
     from msfp_gen.figures import FIGURES
 
     if figure not in (*FIGURES, EVERY):
@@ -123,22 +133,22 @@ def _targets(figure: str, output: Path) -> dict[str, Path]:
 
 
 def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], users: tuple[str, ...]) -> None:
-    """InputError for an option that no figure asked for would take."""
+    """Raise InputError for an option that none of the requested figures has."""
     for option, value in options.items():
         if value is not None and not set(users) & set(targets):
-            raise InputError(f"{option}: only {' and '.join(users)} take it; give --figure {users[0]} with it")
+            raise InputError(f"{option}: only {' and '.join(users)} have it; give --figure {users[0]} with it")
 
 
-def _opened(source: str) -> Result | Scene:
-    """A saved result, or a scene to run for its figures."""
+def _load_for_figures(source: str) -> Result | Scene:
+    """A saved result, or a scene with an output step for smooth figures."""
     from msfp_gen.result import Result
 
-    given = opened(source)
-    return given if isinstance(given, Result) else _drawable(given)
+    loaded = load_source(source)
+    return loaded if isinstance(loaded, Result) else _with_output_step(loaded)
 
 
-def _drawable(scene: Scene) -> Scene:
-    """With rows close enough for smooth curves, and no wider than a record's samples, unless the scene has its own."""
+def _with_output_step(scene: Scene) -> Scene:
+    """The scene with ROWS rows, no further apart than the samples of a record, unless it has its own output step."""
     if scene.output_step is not None:
         return scene
     return replace(scene, output_step=min(scene.end / ROWS, scene.motion.max_step or scene.end))

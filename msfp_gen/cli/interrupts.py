@@ -1,4 +1,4 @@
-"""A polite end: SIGTERM and a terminal that closes are heard as Ctrl-C is, so that nothing is lost to them."""
+"""Handle SIGTERM and SIGHUP like Ctrl-C, so that an interrupted run still writes its output."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# SIGHUP is not known everywhere; SIGINT is Python's own business.
-_HEARD = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None]
+# SIGHUP does not exist on all platforms. Python itself handles SIGINT.
+_SIGNALS = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None]
 
 
 @contextmanager
-def heard() -> Iterator[list[int]]:
-    """Within the block these signals raise KeyboardInterrupt; the list holds the numbers of those that came."""
-    came: list[int] = []
+def signals_as_interrupts() -> Iterator[list[int]]:
+    """Within the block these signals raise KeyboardInterrupt; the list contains the numbers received."""
+    received: list[int] = []
 
     def interrupt(number: int, _: FrameType | None) -> None:
-        came.append(number)
+        received.append(number)
         raise KeyboardInterrupt
 
-    # What somebody chose before us (nohup ignores SIGHUP) stands.
-    mine = [number for number in _HEARD if signal.getsignal(number) is signal.SIG_DFL]
+    # A handler that was set before stays: nohup, for example, ignores SIGHUP.
+    handled = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
     try:
-        for number in mine:
+        for number in handled:
             signal.signal(number, interrupt)
-    except ValueError:  # signals are the main thread's alone
-        mine = []
+    except ValueError:  # only the main thread may set handlers
+        handled = []
     try:
-        yield came
+        yield received
     finally:
-        for number in mine:
+        for number in handled:
             signal.signal(number, signal.SIG_DFL)

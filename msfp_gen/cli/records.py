@@ -1,4 +1,4 @@
-"""Commands about ground motions: record."""
+"""Command for ground motions: record."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, note, number, show
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import InputError
-from msfp_gen.output import FIGURE_SUFFIXES, check_output
 
 if TYPE_CHECKING:
-    from msfp_gen.records import Corrected, Record, ScaleTo
+    from msfp_gen.motions.records import Corrected, Record, ScaleTo
 
 app = typer.Typer()
 
@@ -26,23 +26,34 @@ app = typer.Typer()
 )
 def record(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE...", help="A record, one file for each component, or a bundled name.")
+        list[str],
+        typer.Argument(metavar="FILE...", help="A record, one file per component, or the name of a bundled one."),
     ],
     correct: Annotated[
-        bool, typer.Option("--correct", help="Correct the baseline; any option below asks for it too.")
+        bool, typer.Option("--correct", help="Correct the baseline; implied by any option below.")
     ] = False,
     as_is: Annotated[
-        bool, typer.Option("--as-is", help="Integrate what is in the file: for records corrected by their agency.")
+        bool, typer.Option("--as-is", help="Integrate without correction: for records corrected by their agency.")
     ] = False,
     start: Annotated[
-        float | None, typer.Option(parser=number, metavar="SECONDS", help="First time kept.", show_default="strongest")
+        float | None,
+        typer.Option(
+            parser=number, metavar="SECONDS", help="Start of the time window.", show_default="strongest window"
+        ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(parser=number, metavar="SECONDS", help="Length kept.", show_default="all")
+        float | None,
+        typer.Option(parser=number, metavar="SECONDS", help="Length of the time window.", show_default="all"),
     ] = None,
-    corner: Annotated[float | None, typer.Option(parser=number, metavar="HZ", help="Of the high-pass; 0.05.")] = None,
-    scale_to: Annotated[str | None, typer.Option(metavar="TARGET", help="A peak, an ordinate, or a spectrum.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw what the correction did.")] = None,
+    corner: Annotated[
+        float | None, typer.Option(parser=number, metavar="HZ", help="Corner of the high-pass filter; default 0.05.")
+    ] = None,
+    scale_to: Annotated[
+        str | None, typer.Option(metavar="TARGET", help="Scale to a peak, a spectral ordinate, or a spectrum.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the record before and after correction.")
+    ] = None,
     spectrum: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the response spectrum: .csv, or a figure.")
     ] = None,
@@ -59,15 +70,15 @@ def record(
         if path is not None:
             check_output(path, suffixes, name)
     if as_is and (correct or corner is not None):
-        raise InputError("--as-is: nothing is corrected with it; leave out --correct and --corner")
-    from msfp_gen.records import Corrected, ScaleTo
-    from msfp_gen.records.tables import record_tables
+        raise InputError("--as-is: excludes correction; leave out --correct and --corner")
+    from msfp_gen.motions.records import Corrected, ScaleTo
+    from msfp_gen.motions.records.tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
     raw = _read(files)
-    wanted = correct or as_is or plot is not None or any(v is not None for v in (start, duration, corner, target))
-    ready, factor = _prepared(raw, target, start, duration, not as_is, corner) if wanted else (None, 1.0)
-    motion = raw if ready is None else ready if target is None else ready.scaled(factor)
+    process = correct or as_is or plot is not None or any(v is not None for v in (start, duration, corner, target))
+    corrected, factor = _prepared(raw, target, start, duration, not as_is, corner) if process else (None, 1.0)
+    motion = raw if corrected is None else corrected if target is None else corrected.scaled(factor)
     show(record_tables(raw, motion))
     if plot is not None and isinstance(motion, Corrected):
         from msfp_gen.figures import plot_correction
@@ -82,31 +93,35 @@ def record(
 
 
 def _read(files: list[str]) -> Record:
-    from msfp_gen.records import BUNDLED, bundled, read_record
+    from msfp_gen.motions.records import BUNDLED, bundled, read_record
 
     return bundled(files[0]) if len(files) == 1 and files[0] in BUNDLED else read_record(*files)
 
 
 def _prepared(
-    raw: Record, target: ScaleTo | None, start: float | None, duration: float | None, correct: bool,
+    raw: Record,
+    target: ScaleTo | None,
+    start: float | None,
+    duration: float | None,
+    correct: bool,
     corner: float | None,
-) -> tuple[Corrected, float]:  # fmt: skip
-    """The record corrected, and its scale."""
-    from msfp_gen.records import prepared
+) -> tuple[Corrected, float]:
+    """The corrected record and its scale factor."""
+    from msfp_gen.motions.records import prepared
 
     with Progress("scale") as progress:
         return prepared(raw, 1.0, target, start, duration, correct, 0.05 if corner is None else corner, 1.0, progress)
 
 
 def _write_record(raw: Record, motion: Record | Corrected, path: Path) -> None:
-    from msfp_gen.records import Corrected, write_csv
+    from msfp_gen.motions.records import Corrected, write_csv
 
     write_csv(motion.as_record(raw) if isinstance(motion, Corrected) else motion, path)
 
 
 def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | None, path: Path) -> None:
-    from msfp_gen.records import response_spectrum
-    from msfp_gen.records.spectrum import MEASURES
+    from msfp_gen.motions.records import response_spectrum
+    from msfp_gen.motions.records.spectrum import MEASURES
 
     with Progress("spectrum") as progress:
         found = response_spectrum(motion, progress=progress)

@@ -1,4 +1,4 @@
-"""The command about a run on paper: report."""
+"""Command for the HTML report of a run: report."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, whole
-from msfp_gen.cli.opening import looked_at, opened
+from msfp_gen.cli.console import Progress, note, whole_number
+from msfp_gen.cli.inputs import load_source, result_of
 from msfp_gen.errors import InputError, RunError
 
 app = typer.Typer()
-MOST = 5000  # instants; more would make a page of tens of megabytes
+MOST = 5000  # instants in the interactive view; more would give a file of tens of megabytes
 
 
 @app.command(
@@ -24,21 +24,25 @@ def report(
         str, typer.Argument(metavar="RUN", help="A result (.nc); or a scene file or preset, which is run first.")
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="Where to; default: the name of RUN.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE.html", help="The file to write; default: the name of RUN with .html."
+        ),
     ] = None,
     frames: Annotated[
-        int | None, typer.Option(parser=whole, metavar="N", help="About so many instants in the view; default 1500.")
+        int | None,
+        typer.Option(parser=whole_number, metavar="N", help="Number of instants in the view, about; default 1500."),
     ] = None,
 ) -> None:
-    """Write a run as one HTML file: numbers, settings, figures and the bearing in motion; it needs no network."""
-    from msfp_gen.output import check_output
+    """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion."""
+    from msfp_gen.common.output import check_output
     from msfp_gen.report import FRAMES, REPORT_SUFFIXES, write_report
 
     count = FRAMES if frames is None else frames
     if not 2 <= count <= MOST:
         raise InputError(f"--frames = {count}: give 2 to {MOST}")
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
-    result, failure = looked_at(opened(source))
+    result, failure = result_of(load_source(source))
     with Progress("report") as progress:
         write_report(result, path, count, progress)
     note(f"wrote {path}")

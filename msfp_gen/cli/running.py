@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msfp_gen.cli.console import Output, SceneName, note, number, say, show, words
-from msfp_gen.cli.keeping import NOT_KEPT, CheckpointFile, Every, Keep, ResumeFile
-from msfp_gen.cli.opening import simulated
-from msfp_gen.cli.wanted import Budget, Explain, Wanted, WantedError
+from msfp_gen.cli.checkpoint_options import NO_CHECKPOINT, CheckpointFile, CheckpointOptions, Every, ResumeFile
+from msfp_gen.cli.console import Output, SceneName, choices_of, note, number, say, show
+from msfp_gen.cli.error_options import Budget, ErrorTarget, Explain, TargetError
+from msfp_gen.cli.inputs import run_scene
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import RunError
-from msfp_gen.output import FIGURE_SUFFIXES, check_output
-from msfp_gen.solver import Solver
+from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
-    from msfp_gen.scene import Scene
+    from msfp_gen.scene.scene import Scene
 
 DEMO = ("ridgecrest-clc", "fenz-test5")
 
@@ -28,7 +28,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
-    "  msfp-gen run scene.toml --error 0.5%   # say what this run is off by, and what less would cost\n"
+    "  msfp-gen run scene.toml --error 0.5%   # estimate the error of the run, and the cost of a smaller one\n"
     "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
     "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
@@ -39,7 +39,9 @@ def run(
         Path | None, typer.Option(metavar="FILE", help="Draw loops and sliding: .png, .svg or .pdf.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")] = False,
-    method: Annotated[str | None, typer.Option(metavar=words(Solver, "method"), help="Instead of the scene's.")] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar=choices_of(Solver, "method"), help="Method, instead of the scene's.")
+    ] = None,
     rtol: Annotated[
         float | None, typer.Option(parser=number, metavar="NUMBER", help="Relative tolerance, instead of the scene's.")
     ] = None,
@@ -47,12 +49,12 @@ def run(
         float | None, typer.Option(parser=number, metavar="SECONDS", help="Longest step, instead of the scene's.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this time.")
+        float | None, typer.Option(parser=number, metavar="SECONDS", help="End after this simulated time.")
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Stop where what the model leaves out would matter.")
+        bool, typer.Option("--strict", help="Stop where an effect that the model leaves out becomes significant.")
     ] = False,
-    error: WantedError = None,
+    error: TargetError = None,
     explain: Explain = False,
     budget: Budget = None,
     checkpoint: CheckpointFile = None,
@@ -60,31 +62,31 @@ def run(
     resume: ResumeFile = None,
 ) -> None:
     """Simulate a scene."""
-    keep = Keep.of(checkpoint, every, resume)
+    checkpoints = CheckpointOptions.of(checkpoint, every, resume)
     others = {"--rtol": rtol, "--method": method, "--checkpoint": checkpoint, "--resume": resume}
-    wanted = Wanted.of(error, explain, budget, others)
+    target = ErrorTarget.of(error, explain, budget, others)
     if output is not None:
-        from msfp_gen.export import check_result_path
+        from msfp_gen.results.export import check_result_path
 
         check_result_path(output, "--output")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.scenefile import load_scene
+    from msfp_gen.scene.file.loader import load_scene
 
-    chosen = _changed(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json, keep, wanted, strict):
+    chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
+    for path in _run(chosen, output, plot, as_json, checkpoints, target, strict):
         note(f"wrote {path}")
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where figures and data go.")] = Path(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for figures and data.")] = Path(
         "out"
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
-    from msfp_gen.output import make_folder
-    from msfp_gen.scenefile import load_scene
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.loader import load_scene
 
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
@@ -93,39 +95,48 @@ def demo(
         say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
 
 
-def _changed(scene: Scene, duration: float | None, **solver: Any) -> Scene:
-    """`scene` with what the options gave."""
+def _with_options(scene: Scene, duration: float | None, **solver: Any) -> Scene:
+    """`scene` with the duration and solver options of the command line."""
     given = {name: value for name, value in solver.items() if value is not None}
     scene = replace(scene, solver=replace(scene.solver, **given)) if given else scene
     return scene if duration is None else replace(scene, duration=duration)
 
 
 def _run(
-    scene: Scene, output: Path | None, plot: Path | None, as_json: bool = False, keep: Keep = NOT_KEPT,
-    wanted: Wanted | None = None, strict: bool = False,
-) -> list[Path]:  # fmt: skip
-    """Simulate, report and save; the paths written. A run that failed is reported and saved too, then raised."""
-    found = None if wanted is None else wanted.simulate(scene)
-    result, failure = simulated(scene, strict=strict, **keep.arguments) if found is None else (found.result, None)
+    scene: Scene,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool = False,
+    checkpoints: CheckpointOptions = NO_CHECKPOINT,
+    target: ErrorTarget | None = None,
+    strict: bool = False,
+) -> list[Path]:
+    """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
+    found = None if target is None else target.simulate(scene)
+    result, failure = (
+        run_scene(scene, strict=strict, **checkpoints.arguments) if found is None else (found.result, None)
+    )
     saved: list[Path] = []
     if result is not None:
         _report(result, as_json, {} if found is None else {"accuracy": found.as_dict()})
         if found is not None and not as_json:
             show(found.tables)
-        with keep.while_saving():
+        with checkpoints.hint_on_write_error():
             saved = _save(result, output, plot)
     if failure is not None:
-        kept = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
-        raise RunError(f"{failure}{kept}{keep.hint(failure)}", status=failure.status, result=result) from failure
-    keep.done()
+        files = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
+        message = f"{failure}{files}{checkpoints.hint(failure)}"
+        raise RunError(message, status=failure.status, result=result) from failure
+    checkpoints.remove_files()
     return saved
 
 
 def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -> None:
+    """Print the summary of a run, as JSON with the keys `more` added, or as tables and notes."""
     if as_json:
         say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
-    from msfp_gen.tables import summary_tables
+    from msfp_gen.analysis.tables import summary_tables
 
     show(summary_tables(result))
     for line in (entry.line for entry in result.notes):
@@ -133,7 +144,7 @@ def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -
 
 
 def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:
-    """Write what was asked for; the paths written."""
+    """Write the result and the figure to the given paths; returns them."""
     if output is not None:
         result.save(output)
     if plot is not None:

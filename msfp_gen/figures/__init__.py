@@ -1,6 +1,6 @@
-"""Pictures of runs and records in one style (docs/figures.md): each is a function that also writes its file.
+"""Figures of runs and records in one style (docs/figures.md). Each function returns a figure and can write its file.
 
-matplotlib is loaded when the first picture is drawn.
+matplotlib is imported when the first figure is drawn.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from msfp_gen.figures.work_precision import plot_work_precision
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
 __all__ = [
     "COLOURS",
@@ -52,8 +52,8 @@ __all__ = [
     "plot_work_precision",
 ]
 
-# Pictures of one run, by the name that the command line gives them.
-FIGURES: dict[str, Callable[[Result, str | Path | None], Figure]] = {
+# Figures of one run, by their names on the command line.
+FIGURES: dict[str, Callable[[RunData, str | Path | None], Figure]] = {
     "overview": plot_result,
     "loops": plot_loops,
     "orbit": plot_orbit,

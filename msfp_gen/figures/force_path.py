@@ -1,4 +1,4 @@
-"""The way of the force through the stack: its line at one instant, and where it crosses every face over time."""
+"""Path of the force through the stack: its lines at one instant, and the eccentricity of every contact over time."""
 
 from __future__ import annotations
 
@@ -7,28 +7,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.figures.section import draw_circles, draw_section, peak_time
 from msfp_gen.figures.style import INK, MILLI, THIN, colour, headline, label_of, page, strips, subscript
-from msfp_gen.history import Array
-from msfp_gen.outline import slider_radius
-from msfp_gen.resample import at_times
-from msfp_gen.section import sections
-from msfp_gen.shape import friction_circles, poses
-from msfp_gen.stages import parted
+from msfp_gen.results.geometry.outline import slider_radius
+from msfp_gen.results.geometry.section import sections
+from msfp_gen.results.geometry.shape import friction_circles, poses
+from msfp_gen.results.resample import at_times
+from msfp_gen.results.sliding import separated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
 
-def plot_force_path(result: Result, path: str | Path | None = None, *, time: float | None = None) -> Figure:
-    """The line of force with the friction circles at `time` [s] (None: at the largest displacement), and beside it how
-    far from the axis of its slider every contact lies [mm].
+def plot_force_path(result: RunData, path: str | Path | None = None, *, time: float | None = None) -> Figure:
+    """Lines of force with the friction circles at one instant, and the eccentricity of every contact over time [mm].
 
-    Beyond the edge of the face a slider would tip, which the model follows with `effects.uplift` alone (docs/model.md,
-    choice 11; docs/uplift.md); nothing is drawn while a surface is open. Raises InputError for a time outside the run
-    or a path that cannot be written.
+    A slider would tip where its contact lies beyond the edge of its face, which only models with `effects.uplift`
+    describe (docs/model.md, choice 11; docs/uplift.md). Nothing is drawn while a surface is separated.
+
+    Args:
+        result: the run.
+        path: file to write, .png, .svg or .pdf; None: none.
+        time: instant of the lines of force [s]; None: at the largest displacement.
+
+    Raises:
+        InputError: a time outside the run, or a path that cannot be written.
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then)
@@ -42,18 +48,18 @@ def plot_force_path(result: Result, path: str | Path | None = None, *, time: flo
     return figure
 
 
-def eccentricity(result: Result) -> Array:
-    """Distance of every contact from the axis of its slider, ndarray, shape (T, n-1), [m]; NaN while it is open."""
+def eccentricity(result: RunData) -> Array:
+    """Distance of every contact from the axis of its slider [m], shape (T, n-1); NaN while the surface is separated."""
     where, bearing = poses(result), result.scene.bearing
     sliders = [bearing.slider(surface) for surface in range(bearing.layout.surfaces)]
     axes = where.basis[:, sliders, 2]
     arm = where.contact - where.centre
     off: Array = np.linalg.norm(arm - np.sum(arm * axes, axis=-1, keepdims=True) * axes, axis=-1)
-    return np.where(parted(result.history), np.nan, off)
+    return np.where(separated(result.history), np.nan, off)
 
 
-def _draw_offsets(figure: SubFigure, result: Result) -> None:
-    """A strip a surface, top surface uppermost, with the edge of the face above it."""
+def _draw_offsets(figure: SubFigure, result: RunData) -> None:
+    """One panel per surface, top surface uppermost, with the radius of the slider's face."""
     bearing, off = result.scene.bearing, eccentricity(result) * MILLI
     column = strips(figure, bearing.layout.surfaces)
     for index, axes in enumerate(column[::-1]):
@@ -65,8 +71,16 @@ def _draw_offsets(figure: SubFigure, result: Result) -> None:
         axes.locator_params(axis="y", nbins=3)
         if known:
             axes.axhline(edge, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
-            axes.annotate(f"edge of the slider {edge:.3g} mm", (1, edge), xycoords=("axes fraction", "data"),
-                          xytext=(0, 3), textcoords="offset points", ha="right", va="bottom", fontsize=7.5,
-                          color=INK)  # fmt: skip
-    column[0].set_title("Distance of the contact from the axis of its slider")
+            axes.annotate(
+                f"edge of the slider {edge:.3g} mm",
+                (1, edge),
+                xycoords=("axes fraction", "data"),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="right",
+                va="bottom",
+                fontsize=7.5,
+                color=INK,
+            )
+    column[0].set_title("Eccentricity e of the contacts")
     figure.align_ylabels(column)

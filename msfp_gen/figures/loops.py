@@ -1,4 +1,4 @@
-"""Hysteresis loops of the bearing, and its orbit in plan."""
+"""Hysteresis loops of the bearing, and its orbit in the horizontal plane."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.analysis.summary import axial_load
+from msfp_gen.analysis.transitions import SYMBOLS, is_monotonic, transitions
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,
@@ -23,23 +25,22 @@ from msfp_gen.figures.style import (
     mark,
     page,
     subscript,
-)  # fmt: skip
-from msfp_gen.summary import axial_load
-from msfp_gen.transitions import SYMBOLS
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
-SIDE = 0.02  # a horizontal axis whose displacement stays below this share of the largest is not drawn
+SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over the largest
 
 
-def plot_loops(result: Result, path: str | Path | None = None) -> Figure:
+def plot_loops(result: RunData, path: str | Path | None = None) -> Figure:
     """Loops of the top force [kN] over the displacement across the bearing [mm], along each horizontal axis that moves.
 
-    Force over axial load stands to the right; the first contact of every rim is marked. Raises InputError for `path`.
+    The right axis gives force over axial load; the first contact of every rim is marked. Raises InputError for a path
+    that cannot be written.
     """
     axes = moving_axes(result)
     with page(6.2 * len(axes), 4.8, path) as figure:
@@ -49,8 +50,8 @@ def plot_loops(result: Result, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def plot_orbit(result: Result, path: str | Path | None = None) -> Figure:
-    """Orbits in plan: of the displacement across the bearing [mm], and of the force on the top support [kN].
+def plot_orbit(result: RunData, path: str | Path | None = None) -> Figure:
+    """Orbits in the horizontal plane: displacement across the bearing [mm], and force on the top support [kN].
 
     Raises InputError for a path that cannot be written.
     """
@@ -69,19 +70,19 @@ def plot_orbit(result: Result, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def moving_axes(result: Result) -> tuple[int, ...]:
-    """Horizontal axes (0 for E1, 1 for E2) along which the bearing moves; E1 where it does not move at all."""
+def moving_axes(result: RunData) -> tuple[int, ...]:
+    """Horizontal axes (0: E1, 1: E2) along which the bearing moves; E1 if it does not move."""
     peaks = np.abs(result.history.displacement[:, :2]).max(axis=0)
     return tuple(np.flatnonzero(peaks > SIDE * peaks.max()).tolist()) or (0,)
 
 
-def draw_loop(axes: Axes, result: Result, axis: int) -> None:
-    """Top force against displacement along `axis`; rims met are marked; force over load to the right."""
+def draw_loop(axes: Axes, result: RunData, axis: int) -> None:
+    """Top force over displacement along `axis`, with the first rim contacts and force over axial load on the right."""
     history, name = result.history, subscript(axis + 1)
     scale = engineering(history.top_force[:, :2], "N")
     axes.plot(history.displacement[:, axis] * MILLI, history.top_force[:, axis] * scale.factor, color=COLOURS[0])
     for event in first_contacts(result):
-        label = f"rim {event.surface} first met"
+        label = f"first contact of rim {event.surface}"
         axes.plot(event.displacement[axis] * MILLI, event.top_force[axis] * scale.factor, **mark(event), label=label)
     axes.set(
         title=f"Force and displacement along E{name}",
@@ -89,7 +90,7 @@ def draw_loop(axes: Axes, result: Result, axis: int) -> None:
         ylabel=f"force on the top support F{name} [{scale.unit}]",
     )
     axes.margins(0.06)
-    if len(moving_axes(result)) == 1 and "transitions" in result.summary:
+    if len(moving_axes(result)) == 1 and is_monotonic(result):
         _draw_transitions(axes, result, axis)
     elif first_contacts(result):
         axes.legend(loc="upper left", handletextpad=0.1)
@@ -101,32 +102,42 @@ def draw_loop(axes: Axes, result: Result, axis: int) -> None:
         ratio.spines["right"].set_visible(True)
 
 
-def draw_orbit(axes: Axes, result: Result, title: str = "Orbit") -> None:
-    """Displacement across the bearing in plan, with its start and the first contact of every rim."""
+def draw_orbit(axes: Axes, result: RunData, title: str = "Orbit") -> None:
+    """Displacement across the bearing in the horizontal plane, with its start and the first contact of every rim."""
     u = result.history.displacement * MILLI
     axes.plot(u[:, 0], u[:, 1], color=COLOURS[0])
     for event in first_contacts(result):
-        axes.plot(event.displacement[0] * MILLI, event.displacement[1] * MILLI, **mark(event),
-                  label=f"rim {event.surface} first met")  # fmt: skip
+        axes.plot(
+            event.displacement[0] * MILLI,
+            event.displacement[1] * MILLI,
+            **mark(event),
+            label=f"first contact of rim {event.surface}",
+        )
     axes.plot(*u[0, :2], marker="o", markersize=5, color=INK, linestyle="none", label="start")
     axes.set(title=title, xlabel="u₁ [mm]", ylabel="u₂ [mm]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
 
 
-def _draw_transitions(axes: Axes, result: Result, axis: int) -> None:
-    """Dotted lines where the stages of a monotonic run change, each with its symbol and value."""
+def _draw_transitions(axes: Axes, result: RunData, axis: int) -> None:
+    """Dotted lines at the transitions of a monotonic run, each with its symbol and value."""
     history = result.history
     sign = np.sign(history.displacement[history.peak_row, axis])
-    for key, value in result.summary["transitions"].items():
+    for key, value in transitions(result, axial_load(result)).items():
         if not key.startswith("u_") or value is None:
             continue
         x = sign * value * MILLI
         axes.axvline(x, color=FAINT, linewidth=THIN, linestyle=":")
-        # The curve rises: above it there is room on its first half, below it on its second.
+        # The curve rises, so labels lie above it in its first half and below it in the second.
         above = value < history.horizontal.max() / 2
         axes.annotate(
-            f"{SYMBOLS.get(key, key)} = {value * MILLI:.1f} mm", (x, float(above)),
-            xycoords=("data", "axes fraction"), xytext=(2, -4 if above else 4), textcoords="offset points",
-            va="top" if above else "bottom", rotation=90, fontsize=SMALL, color=INK,
-        )  # fmt: skip
+            f"{SYMBOLS.get(key, key)} = {value * MILLI:.1f} mm",
+            (x, float(above)),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, -4 if above else 4),
+            textcoords="offset points",
+            va="top" if above else "bottom",
+            rotation=90,
+            fontsize=SMALL,
+            color=INK,
+        )

@@ -1,4 +1,4 @@
-"""The stack moving, beside its loop and the bars of sliding: .gif by Pillow, .mp4 by ffmpeg."""
+"""Movie of the stack in motion, with its loop and the bars of sliding surfaces: .gif by Pillow, .mp4 by ffmpeg."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
 from msfp_gen.figures.loops import draw_orbit, moving_axes
 from msfp_gen.figures.section import draw_section, limits
 from msfp_gen.figures.sliding import draw_bars
 from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, THIN, engineering, headline, label_of, page, subscript
-from msfp_gen.motion_checks import positive
-from msfp_gen.output import check_output, replacing
-from msfp_gen.resample import at_times
-from msfp_gen.section import sections
+from msfp_gen.motions.checks import positive
+from msfp_gen.results.geometry.section import sections
+from msfp_gen.results.resample import at_times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
 MOVIE_SUFFIXES = (".gif", ".mp4")
-DOTS = 80  # per inch: 800 x 400 pixels, even numbers as video wants them
+DOTS = 80  # per inch: 800 x 400 pixels; video needs even numbers
 
 
 def animate(
-    result: Result,
+    result: RunData,
     path: str | Path,
     *,
     seconds: float = 8.0,
@@ -39,11 +39,23 @@ def animate(
     azimuth: float | None = None,
     progress: Callable[[float, float], None] | None = None,
 ) -> Path:
-    """Write a movie of `seconds` of the run from `start` to `end` [s] (None: its own) to `path`, .gif or .mp4.
+    """Write a movie of a run: the section, the loop (or the orbit where both axes move), and the sliding surfaces.
 
-    The section in the plane along `azimuth` [rad] (None: of the largest displacement) moves beside the loop, the orbit
-    where both axes move, and the bars of sliding. `progress` takes frames done and frames in all. Raises InputError: a
-    time outside the run, a path that cannot be written, or .mp4 without ffmpeg; nothing is written then.
+    Args:
+        result: the run.
+        path: file to write, .gif or .mp4.
+        seconds: length of the movie [s].
+        frames_per_second: frame rate [1/s].
+        start: first instant of the run that is shown [s]; None: its start.
+        end: last instant of the run that is shown [s]; None: its end.
+        azimuth: plane of the section [rad]; None: that of the largest displacement.
+        progress: called with the number of finished frames and of all frames.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: a time outside the run, a path that cannot be written, or .mp4 without ffmpeg. No file is written.
     """
     target = check_movie(path)
     writer = _writer(target, frames_per_second)
@@ -52,10 +64,10 @@ def animate(
     first, last = (float(rows[0]) if start is None else start), (float(rows[-1]) if end is None else end)
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
-    at_times(result, (first, last))  # refused here, in the words that were given
+    at_times(result, (first, last))  # raises InputError for a time outside the run
     frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
     with page(10.0, 5.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
-        update = _stage(figure, result, frames, azimuth)
+        update = _layout(figure, result, frames, azimuth)
         for row in range(len(frames.history.time)):
             update(row)
             writer.grab_frame()
@@ -65,7 +77,7 @@ def animate(
 
 
 def check_movie(path: str | Path, name: str = "movie") -> Path:
-    """`path` if a movie can be put there; InputError that begins with `name` otherwise, also for want of ffmpeg."""
+    """`path` if a movie can be written to it; else raises InputError that begins with `name`, also without ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     target = check_output(path, MOVIE_SUFFIXES, name)
@@ -77,7 +89,7 @@ def check_movie(path: str | Path, name: str = "movie") -> Path:
 
 
 def _writer(target: Path, frames_per_second: int) -> Any:
-    """What makes the file."""
+    """The writer of matplotlib for this kind of file."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     if frames_per_second < 1:
@@ -87,8 +99,8 @@ def _writer(target: Path, frames_per_second: int) -> Any:
     return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
 
 
-def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None) -> Callable[[int], None]:
-    """Lay out the page; what moves it to a row of `frames`."""
+def _layout(figure: Figure, result: RunData, frames: RunData, azimuth: float | None) -> Callable[[int], None]:
+    """Draw the parts that do not move; returns a function that draws one row of `frames`."""
     found = sections(frames, azimuth)
     headline(figure, label_of(result))
     ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))
@@ -111,12 +123,12 @@ def _stage(figure: Figure, result: Result, frames: Result, azimuth: float | None
 
     update(0)
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # the page keeps still
+    figure.set_layout_engine("none")  # the axes keep their places in all frames
     return update
 
 
-def _loop(axes: Axes, result: Result, frames: Result) -> tuple[Any, Any, Any]:
-    """The loop, or the orbit where both axes move, with a dot and the places it takes."""
+def _loop(axes: Axes, result: RunData, frames: RunData) -> tuple[Any, Any, Any]:
+    """Draw the loop, or the orbit where both axes move; returns a marker and its coordinates in every frame."""
     moving = moving_axes(result)
     if len(moving) > 1:
         draw_orbit(axes, result)
@@ -126,7 +138,11 @@ def _loop(axes: Axes, result: Result, frames: Result) -> tuple[Any, Any, Any]:
         scale = engineering(result.history.top_force[:, :2], "N")
         u, force = result.history.displacement[:, axis] * MILLI, result.history.top_force[:, axis] * scale.factor
         axes.plot(u, force, color=FAINT, linewidth=THIN)
-        axes.set(title="Loop", xlabel=f"u{subscript(axis + 1)} [mm]", ylabel=f"F{subscript(axis + 1)} [{scale.unit}]")
+        axes.set(
+            title="Hysteresis loop",
+            xlabel=f"u{subscript(axis + 1)} [mm]",
+            ylabel=f"F{subscript(axis + 1)} [{scale.unit}]",
+        )
         x, y = frames.history.displacement[:, axis] * MILLI, frames.history.top_force[:, axis] * scale.factor
     (dot,) = axes.plot([x[0]], [y[0]], marker="o", markersize=7, color=COLOURS[1], linestyle="none", zorder=6)
     return dot, x, y

@@ -1,4 +1,4 @@
-"""The picture that `msfp-gen run --plot` draws: loops, orbit and sliding on one page."""
+"""The figure of `msfp-gen run --plot`: loops, orbit and sliding on one page."""
 
 from __future__ import annotations
 
@@ -7,23 +7,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.analysis.summary import axial_load
 from msfp_gen.figures.loops import draw_loop, draw_orbit, moving_axes
 from msfp_gen.figures.sliding import draw_sliding
 from msfp_gen.figures.style import MILLI, engineering, headline, label_of, page
-from msfp_gen.summary import axial_load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
 
-def plot_result(result: Result, path: str | Path | None = None) -> Figure:
-    """Draw `result`, and write it to `path` if given (.png, .svg or .pdf), whole or not at all.
+def plot_result(result: RunData, path: str | Path | None = None) -> Figure:
+    """Overview of a run: loops along each axis that moves, orbit where both move, sliding of every surface over time.
 
-    Loops of the top force against the displacement across the bearing, along each horizontal axis that moves, with
-    force over axial load to the right; the orbit where both axes move; sliding of every surface over time with its
-    capacity and where it met its rim. Raises InputError for a path that cannot be written.
+    The right axis of the loops gives force over axial load; sliding is drawn with its capacity and the rim contacts.
+
+    Args:
+        result: the run.
+        path: file to write, .png, .svg or .pdf; it appears only when complete. None: none.
+
+    Raises:
+        InputError: a path that cannot be written.
     """
     axes = moving_axes(result)
     size = (10.5, max(4.8, 0.95 * result.history.surfaces + 1)) if len(axes) == 1 else (11.5, 8.6)
@@ -42,8 +47,8 @@ def plot_result(result: Result, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def _title(result: Result) -> str:
-    """Name and peaks; of a run that failed, how far it came."""
+def _title(result: RunData) -> str:
+    """Name and peaks; of a failed run also the time it reached."""
     history, load = result.history, axial_load(result)
     force = np.hypot(*history.top_force[:, :2].T).max()
     scale = engineering(force, "N")

@@ -1,4 +1,4 @@
-"""Pictures of ground motions: what baseline correction did, and response spectra."""
+"""Figures of ground motions: baseline correction and response spectra."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.figures.style import (
     COLOURS,
@@ -25,35 +26,36 @@ from msfp_gen.figures.style import (
     page,
     plain,
     subscript,
-)  # fmt: skip
-from msfp_gen.history import Array
-from msfp_gen.records.record import G
+)
+from msfp_gen.motions.records.record import G
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.records import Corrected, Record
+    from msfp_gen.motions.records import Corrected, Record
 
-ROOM = 1.25  # height of a panel over the corrected motion; what the raw one does beyond is written, not drawn
+ROOM = 1.25  # height of a panel over the peak of the corrected motion; the raw motion may leave the panel
 BLANK = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}  # behind a note
-# Attribute, symbol, unit, and whether it takes a prefix: accelerations are compared in m/s^2.
+# Attribute, symbol, unit, and whether the unit takes a prefix: accelerations stay in m/s^2 for comparison.
 ROWS = (("acceleration", "a", "m/s²", False), ("velocity", "v", "m/s", True), ("displacement", "d", "m", True))
 
 
 def plot_correction(record_before: Record, record_after: Corrected, path: str | Path | None = None) -> Figure:
-    """What baseline correction did: acceleration, velocity and displacement before (grey) and after, per component.
+    """Acceleration, velocity and displacement of each component before (grey) and after baseline correction.
 
-    Before means the raw acceleration, mean and all, integrated from rest over the window that was kept; where the
-    motion was scaled, both are, and the title names the factor. Panels fit the corrected motion; where the raw one ends
-    is written in, since it may leave them. Raises InputError for `path`.
+    "Before" is the raw acceleration with its mean, integrated from rest over the time window of the corrected motion.
+    If the motion was scaled, both are, and the title gives the factor. Panels fit the corrected motion; the final value
+    of the raw motion is written in. Raises InputError for a path that cannot be written.
     """
     about = record_after.metadata
     start, factor = float(about.get("window_start", 0.0)), float(about.get("scale", 1.0))
     raw = _integrated(record_before, start, len(record_after.time), factor)
     moving = np.flatnonzero(np.any(record_before.acceleration, axis=0)).tolist()
     with page(3.7 * len(moving) + 0.6, 6.8, path) as figure:
-        headline(figure, f"{record_before.name or 'record'}: as recorded (grey) and {_became(record_after, factor)}")
+        headline(
+            figure, f"{record_before.name or 'record'}: as recorded (grey) and {_processing(record_after, factor)}"
+        )
         grid = figure.subplots(3, len(moving), squeeze=False, sharex=True)
         for column, axis in zip(grid.T, moving, strict=True):
             for axes, (name, symbol, unit, prefixed) in zip(column, ROWS, strict=True):
@@ -82,14 +84,14 @@ def plot_response_spectrum(
 
     Args:
         periods: ndarray, shape (k,), [s], above zero.
-        spectra: by label, each ndarray, shape (k,), [m/s^2].
-        path: where to write it: .png, .svg or .pdf.
-        target: periods [s] and accelerations [m/s^2] of a spectrum to hold against them.
-        damping: share of critical, for the label.
+        spectra: label -> ndarray, shape (k,), [m/s^2].
+        path: file to write: .png, .svg or .pdf; None: none.
+        target: periods [s] and accelerations [m/s^2] of a target spectrum, drawn for comparison.
+        damping: ratio to critical damping, for the title.
         title: of the figure.
 
     Raises:
-        InputError: a period that is not above zero, a spectrum of another length, or a path.
+        InputError: a period that is not above zero, a spectrum of another length, or a path that cannot be written.
     """
     x = np.asarray(periods, dtype=float)
     if x.ndim != 1 or not len(x) or not np.all(x > 0):
@@ -97,7 +99,7 @@ def plot_response_spectrum(
     curves = {label: np.asarray(values, dtype=float) for label, values in spectra.items()}
     for label, values in curves.items():
         if values.shape != x.shape:
-            raise InputError(f"spectra[{label!r}] has shape {values.shape}: give one value a period, {x.shape}")
+            raise InputError(f"spectra[{label!r}] has shape {values.shape}: give one value per period, {x.shape}")
     with page(7.6, 4.8, path) as figure:
         headline(figure, title)
         axes = figure.subplots()
@@ -105,8 +107,12 @@ def plot_response_spectrum(
             axes.plot(x, values, color=COLOURS[index % len(COLOURS)], label=label)
         if target is not None:
             axes.plot(*(np.asarray(v, dtype=float) for v in target), color=INK, linestyle=(0, (5, 3)), label="target")
-        axes.set(xscale="log", xlabel="period T [s]", ylabel="pseudo-acceleration Sₐ [m/s²]",
-                 title=f"{100 * damping:.3g} % of critical damping")  # fmt: skip
+        axes.set(
+            xscale="log",
+            xlabel="period T [s]",
+            ylabel="pseudo-acceleration Sₐ [m/s²]",
+            title=f"{100 * damping:.3g} % of critical damping",
+        )
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set_ylim(bottom=0)
         right = axes.secondary_yaxis("right", functions=(partial(mul, 1 / G), partial(mul, G)))
@@ -116,14 +122,14 @@ def plot_response_spectrum(
     return figure
 
 
-def _became(motion: Corrected, factor: float) -> str:
-    """What was made of a record, for the title."""
+def _processing(motion: Corrected, factor: float) -> str:
+    """The processing of a record, for the title."""
     untouched = str(motion.metadata.get("correction", "")).startswith("none")
-    return ("taken as it is" if untouched else "corrected") + ("" if factor == 1 else f", both times {factor:.4g}")
+    return ("not corrected" if untouched else "corrected") + ("" if factor == 1 else f", both scaled by {factor:.4g}")
 
 
 def _integrated(record: Record, start: float, points: int, factor: float) -> dict[str, Array]:
-    """A window of the raw record, scaled, and its integrals from rest by the trapezoidal rule, each (points, 3)."""
+    """A window of the raw record, scaled, and its integrals from rest by the trapezoidal rule, shape (points, 3)."""
     first = round(start / record.time_step)
     acceleration = factor * record.acceleration[first : first + points]
     velocity = _integral(acceleration, record.time_step)
@@ -143,7 +149,15 @@ def _compare(axes: Axes, time: Array, raw: Array, values: Array) -> None:
 
 
 def _note_end(axes: Axes, raw: Array, unit: str) -> None:
-    """Where the raw velocity or displacement ends: what is not zero there is drift."""
+    """Write the final value of the raw velocity or displacement: the drift that correction removes."""
     end = engineering(raw[-1:], unit)
-    axes.annotate(f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}", (0.98, 0.97), ha="right", va="top",
-                  xycoords="axes fraction", fontsize=SMALL, color=INK, bbox=BLANK)  # fmt: skip
+    axes.annotate(
+        f"as recorded: ends at {raw[-1] * end.factor:.3g} {end.unit}",
+        (0.98, 0.97),
+        ha="right",
+        va="top",
+        xycoords="axes fraction",
+        fontsize=SMALL,
+        color=INK,
+        bbox=BLANK,
+    )

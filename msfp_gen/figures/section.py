@@ -1,4 +1,4 @@
-"""The stack in its true deformed shape, cut by a vertical plane, with the line of the force that passes through it."""
+"""Vertical section of the deformed stack, to scale, with the line of force."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.figures.style import (
     BOLD,
     FAINT,
@@ -21,40 +22,52 @@ from msfp_gen.figures.style import (
     label_of,
     page,
     subscript,
-)  # fmt: skip
-from msfp_gen.history import Array
-from msfp_gen.resample import at_times
-from msfp_gen.section import Section, sections
-from msfp_gen.shape import friction_circles as circle_radii
-from msfp_gen.stages import parted, rims_touched, sliding_now
+)
+from msfp_gen.results.geometry.section import Section, sections
+from msfp_gen.results.geometry.shape import friction_circles as circle_radii
+from msfp_gen.results.resample import at_times
+from msfp_gen.results.sliding import rims_in_contact, separated, sliding_surfaces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
-STEEL = ("#AEB6C0", "#DCE1E7")  # plates, and what slides between them
-WIDTH = 7.4  # of a section on the page [inch]
-OVERHANG = 0.12  # length of the force line beyond the stack, over the height of the stack
-WORDS = {(False, False): "sticks", (True, False): "slides", (False, True): "sticks, on its rim",
-         (True, True): "slides, on its rim"}  # fmt: skip
+STEEL = ("#AEB6C0", "#DCE1E7")  # colours of the plates and of the sliders
+WIDTH = 7.4  # of the section in the figure [inch]
+OVERHANG = 0.12  # length of the line of force beyond the stack, over the height of the stack
+STATES = {  # (slides, rim contact) -> text
+    (False, False): "sticks",
+    (True, False): "slides",
+    (False, True): "sticks, rim contact",
+    (True, True): "slides, rim contact",
+}
 
 
 def plot_section(
-    result: Result,
+    result: RunData,
     path: str | Path | None = None,
     *,
     time: float | None = None,
     azimuth: float | None = None,
     friction_circles: bool = False,
 ) -> Figure:
-    """The stack at `time` [s] (None: at its largest displacement), cut along `azimuth` [rad] from E1.
+    """Vertical section of the stack at one instant, to scale.
 
-    Without an azimuth the plane runs along the displacement of that instant. Drawn to scale: bodies with their
-    spherical faces, in colour where they slide (thick while they do), contact points, and the line of force; on request
-    the sphere centres with their friction circles, which that line touches wherever a surface slides (docs/model.md).
-    Raises InputError for a time outside the run or a path that cannot be written.
+    It shows the bodies, their sliding faces in colour (thick while the surface slides), contact points and the line of
+    force; on request the sphere centres with their friction circles, to which the line of force is tangent where a
+    surface slides (docs/model.md).
+
+    Args:
+        result: the run.
+        path: file to write, .png, .svg or .pdf; None: none.
+        time: instant [s]; None: of the largest displacement.
+        azimuth: direction of the plane from E1 [rad]; None: along the displacement at that instant.
+        friction_circles: whether to draw sphere centres and friction circles.
+
+    Raises:
+        InputError: a time outside the run, or a path that cannot be written.
     """
     then = at_times(result, peak_time(result) if time is None else time)
     (section,) = sections(then, azimuth)
@@ -69,39 +82,55 @@ def plot_section(
     return figure
 
 
-def peak_time(result: Result) -> float:
+def peak_time(result: RunData) -> float:
     """Time of the largest horizontal displacement [s]."""
     return float(result.history.time[result.history.peak_row])
 
 
-def draw_section(axes: Axes, then: Result, section: Section, row: int = 0) -> None:
-    """Bodies, sliding faces, contact points and line of force of one row of `then`, [mm]."""
+def draw_section(axes: Axes, then: RunData, section: Section, row: int = 0) -> None:
+    """Draw bodies, sliding faces, contact points and line of force of one row of `then` [mm]."""
     history, last = then.history, len(section.bodies) - 1
     for body, polygon in enumerate(section.bodies):
         axes.fill(*(polygon * MILLI).T, facecolor=STEEL[0 < body < last], edgecolor=INK, linewidth=HAIR)
-    slides, pushes, open_ = sliding_now(history)[row], rims_touched(history)[row], parted(history)[row]
+    slides, on_rim = sliding_surfaces(history)[row], rims_in_contact(history)[row]
+    apart = separated(history)[row]
     for index in reversed(range(history.surfaces)):
-        state = bool(slides[index]), bool(pushes[index])
-        words = f"open by {history.lift[row, index] * MILLI:.2f} mm" if open_[index] else WORDS[state]
-        axes.plot(*(section.faces[index] * MILLI).T, color=colour(index + 1), linewidth=BOLD if state[0] else LINE,
-                  label=f"surface {index + 1} {words}", solid_capstyle="butt", zorder=3)  # fmt: skip
+        state = bool(slides[index]), bool(on_rim[index])
+        text = f"separated by {history.lift[row, index] * MILLI:.2f} mm" if apart[index] else STATES[state]
+        axes.plot(
+            *(section.faces[index] * MILLI).T,
+            color=colour(index + 1),
+            linewidth=BOLD if state[0] else LINE,
+            label=f"surface {index + 1} {text}",
+            solid_capstyle="butt",
+            zorder=3,
+        )
     draw_force_line(axes, section)
     for index, point in enumerate(section.contacts * MILLI):
-        if open_[index]:
+        if apart[index]:
             continue
-        axes.plot(*point, marker="o", markersize=5, color="white", markeredgecolor=colour(index + 1),
-                  markeredgewidth=LINE, linestyle="none", zorder=5)  # fmt: skip
+        axes.plot(
+            *point,
+            marker="o",
+            markersize=5,
+            color="white",
+            markeredgecolor=colour(index + 1),
+            markeredgewidth=LINE,
+            linestyle="none",
+            zorder=5,
+        )
     u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
     axes.set(
         title=f"t = {history.time[row]:.3f} s, u = {u * MILLI:.1f} mm",
-        xlabel=f"{_direction(section.azimuth)}, from the middle of the base [mm]", ylabel="height [mm]",
-    )  # fmt: skip
+        xlabel=f"{_direction(section.azimuth)}, from the centre of the base [mm]",
+        ylabel="height above the base [mm]",
+    )
     axes.set_aspect("equal", adjustable="box")
     axes.grid(visible=False)
 
 
 def draw_force_line(axes: Axes, section: Section) -> None:
-    """The line of force: each surface draws it between its neighbours, and it runs on beyond base and top."""
+    """Draw the line of force of every surface up to halfway to its neighbours, and beyond base and top."""
     heights = np.concatenate([polygon[:, 1] for polygon in section.bodies])
     low, high = float(heights.min()), float(heights.max())
     beyond = OVERHANG * (high - low)
@@ -112,28 +141,42 @@ def draw_force_line(axes: Axes, section: Section) -> None:
         if up > 0:
             ends += [(x + (level - z) * along / up, level) for level in (below, above)]
     if ends:
-        axes.plot(*(np.array(ends) * MILLI).T, color=INK, linewidth=LINE, linestyle=(0, (6, 2)), zorder=4,
-                  label="line of force")  # fmt: skip
+        axes.plot(
+            *(np.array(ends) * MILLI).T,
+            color=INK,
+            linewidth=LINE,
+            linestyle=(0, (6, 2)),
+            zorder=4,
+            label="line of force",
+        )
 
 
 def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
-    """Sphere centres with their friction circles, and the line of force on its way to them."""
+    """Draw sphere centres and friction circles, and the lines of force extended up to them."""
     from matplotlib.patches import Circle
 
     for index, (centre, radius) in enumerate(zip(section.centres, radii, strict=True)):
         (x, z), (along, up) = section.points[index], section.forces[index]
-        axes.add_patch(Circle(tuple(centre * MILLI), radius * MILLI, fill=False, edgecolor=colour(index + 1),
-                              linewidth=LINE))  # fmt: skip
+        axes.add_patch(
+            Circle(tuple(centre * MILLI), radius * MILLI, fill=False, edgecolor=colour(index + 1), linewidth=LINE)
+        )
         axes.plot(*(centre * MILLI), marker="+", color=colour(index + 1), markersize=6, linestyle="none")
         if up > 0:
             ends = np.array([(x + (level - z) * along / up, level) for level in (0.0, 1.15 * (centre[1] or z))])
             axes.plot(*(ends * MILLI).T, color=FAINT, linewidth=THIN, linestyle=(0, (6, 2)), zorder=1)
-        axes.annotate(f"c{subscript(index + 1)}", np.add(centre, (radius, 0.0)) * MILLI, xytext=(6, 0), va="center",
-                      textcoords="offset points", fontsize=SMALL, color=colour(index + 1))  # fmt: skip
+        axes.annotate(
+            f"c{subscript(index + 1)}",
+            np.add(centre, (radius, 0.0)) * MILLI,
+            xytext=(6, 0),
+            va="center",
+            textcoords="offset points",
+            fontsize=SMALL,
+            color=colour(index + 1),
+        )
 
 
 def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Horizontal and vertical limits [mm] that hold the stack, and its line of force, in all of these sections."""
+    """Horizontal and vertical limits [mm] that contain the stack and its line of force in all sections."""
     points = np.concatenate([polygon for section in found for polygon in section.bodies]) * MILLI
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
     room = OVERHANG * (high - low)
@@ -141,13 +184,13 @@ def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, floa
 
 
 def _aspect(section: Section) -> float:
-    """Height over width of what a section shows."""
+    """Height over width of the drawn part of a section."""
     (left, right), (low, high) = limits([section])
     return (high - low) / (right - left)
 
 
 def _direction(azimuth: float) -> str:
-    """What a horizontal axis along `azimuth` is called."""
+    """Name of the horizontal direction at `azimuth` [rad]."""
     named = {0.0: "along E₁", 90.0: "along E₂"}
     degrees = round(float(np.degrees(azimuth)), 1)
     return named.get(degrees, f"along {degrees:g}° from E₁")

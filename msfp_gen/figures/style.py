@@ -1,4 +1,4 @@
-"""One style for every picture: colours, line widths, units, the page; and the file, whole or not at all."""
+"""The common style of all figures: colours, line widths, units, layout, and writing of the file."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.history import Event
-from msfp_gen.output import FIGURE_SUFFIXES, check_output, replacing
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, replacing
+from msfp_gen.results.history import Event
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.result import Result
+    from msfp_gen.results.run_data import RunData
 
-# Okabe and Ito's colours: told apart in print and by colour-blind readers.
+# The palette of Okabe and Ito, which can be distinguished in print and by colour-blind readers.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 INK, FAINT, PALE = "#222222", "#999999", "#E4E4E4"
-LINE, THIN, HAIR, BOLD = 1.3, 0.9, 0.7, 2.6  # widths [pt]: curves, references, grids, what the eye shall find first
-SMALL = 8.0  # size of notes in a picture [pt]
+LINE, THIN, HAIR, BOLD = 1.3, 0.9, 0.7, 2.6  # widths [pt]: curves, reference lines, grids, highlights
+SMALL = 8.0  # font size of notes in a figure [pt]
 FAMILY = "DejaVu Sans"  # comes with matplotlib
 STYLE: dict[Any, Any] = {
     "font.family": FAMILY,
@@ -44,9 +44,9 @@ STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.5,
     "figure.dpi": 130,
     "savefig.dpi": 160,
-    "svg.hashsalt": "msfp-gen",  # the same run gives the same file
+    "svg.hashsalt": "msfp-gen",  # makes SVG files reproducible
 }
-MILLI = 1e3  # lengths are drawn in mm, as on every drawing of a bearing
+MILLI = 1e3  # lengths are drawn in mm, as on drawings of bearings
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -69,9 +69,10 @@ def engineering(values: ArrayLike, unit: str) -> Scale:
 
 @contextmanager
 def page(width: float, height: float, path: str | Path | None = None, name: str = "plot") -> Iterator[Figure]:
-    """A figure in the project's style, [inch]; written to `path`, if given, when the block ends without error.
+    """A figure of `width` and `height` [inch] in the common style; written to `path`, if given, when the block ends.
 
-    Raises InputError, which begins with `name`, for a path that cannot be written; before anything is drawn.
+    After an error in the block nothing is written. Raises InputError that begins with `name` for a path that cannot be
+    written, before anything is drawn.
     """
     import matplotlib
     from matplotlib.figure import Figure
@@ -86,7 +87,7 @@ def page(width: float, height: float, path: str | Path | None = None, name: str 
 
 
 def plain(text: str) -> str:
-    """A name out of a file, such that matplotlib takes no TeX from it; ? for what the font does not have."""
+    """A name from a file as text for matplotlib: $ is escaped, letters that the font does not have become ?."""
     from matplotlib.font_manager import findfont, get_font
 
     font = get_font(findfont(FAMILY))
@@ -94,12 +95,12 @@ def plain(text: str) -> str:
 
 
 def headline(figure: Figure, text: str) -> None:
-    """The title of a whole figure, as it is."""
+    """Set the title of a whole figure."""
     figure.suptitle(plain(text), fontsize=12, fontweight="bold", color=INK, x=0.01, ha="left")
 
 
 def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
-    """One row of axes with titles."""
+    """One row of axes with these titles."""
     row: list[Axes] = list(figure.subplots(1, len(titles), squeeze=False, **options)[0])
     for axes, title in zip(row, titles, strict=True):
         axes.set_title(title)
@@ -107,7 +108,7 @@ def panels(figure: Figure, *titles: str, **options: Any) -> list[Axes]:
 
 
 def strips(figure: Any, count: int, **options: Any) -> list[Axes]:
-    """Axes under each other on one time axis, the last with its label."""
+    """`count` axes below each other with a common time axis, labelled at the last."""
     column: list[Axes] = list(figure.subplots(count, 1, sharex=True, squeeze=False, **options)[:, 0])
     column[-1].set_xlabel("time t [s]")
     column[-1].margins(x=0.01)
@@ -115,34 +116,41 @@ def strips(figure: Any, count: int, **options: Any) -> list[Axes]:
 
 
 def subscript(number: int) -> str:
-    """`number` in small figures below the line."""
+    """`number` in subscript digits."""
     return str(number).translate(SUBSCRIPTS)
 
 
 def colour(surface: int) -> str:
-    """The colour of a surface (1..n-1) in every picture."""
+    """The colour of a surface (1..n-1) in all figures."""
     return COLOURS[(surface - 1) % len(COLOURS)]
 
 
-def label_of(result: Result) -> str:
-    """The name of a run for a headline; of one that failed, how far it came."""
+def label_of(result: RunData) -> str:
+    """The name of a run for a title; of a failed run with its status and the time it reached."""
     name = result.scene.name or "unnamed scene"
     if result.succeeded:
         return name
     return f"{name}, run failed ({result.status}) at t = {result.history.time[-1]:.4g} s"
 
 
-def contacts(result: Result) -> list[Event]:
-    """Every meeting of a slider with its rim."""
+def contacts(result: RunData) -> list[Event]:
+    """All events of rim contact."""
     return [event for event in result.events if event.kind == "rim_contact"]
 
 
-def first_contacts(result: Result) -> list[Event]:
-    """The first contact of every rim that was met; a rim met every cycle would bury the loop in marks."""
+def first_contacts(result: RunData) -> list[Event]:
+    """The first contact of every rim; markers of all contacts would cover the loop."""
     return list({event.surface: event for event in reversed(contacts(result))}.values())[::-1]
 
 
 def mark(event: Event) -> dict[str, Any]:
-    """How a rim met is drawn."""
-    return {"marker": "v", "markersize": 5.5, "linestyle": "none", "zorder": 4, "markeredgecolor": "white",
-            "markeredgewidth": 0.6, "color": colour(event.surface)}  # fmt: skip
+    """Style of the marker of a rim contact, in the colour of its surface."""
+    return {
+        "marker": "v",
+        "markersize": 5.5,
+        "linestyle": "none",
+        "zorder": 4,
+        "markeredgecolor": "white",
+        "markeredgewidth": 0.6,
+        "color": colour(event.surface),
+    }

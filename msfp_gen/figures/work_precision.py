@@ -1,4 +1,4 @@
-"""What accuracy costs: error against seconds and against Newton iterations."""
+"""Work-precision diagrams: error over wall time and over Newton iterations."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.figures.style import COLOURS, FAINT, INK, LINE, SMALL, THIN, headline, page
-from msfp_gen.history import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ Table = Mapping[str, Mapping[str, ArrayLike]]
 COSTS = {"seconds": "seconds of wall time", "newton": "Newton iterations"}
 FLAGS = ("failed", "wrong", "cut")
 MARKERS = "osD^vP*X<>"
-ROOF = 0.965  # height at which runs without an error stand, as a share of the axes
+TOP = 0.965  # height of the markers of runs without a known error, over the height of the axes
 
 
 def plot_work_precision(
@@ -32,22 +32,22 @@ def plot_work_precision(
     floors: Mapping[str, Mapping[str, float]] | None = None,
     title: str = "Work and precision",
 ) -> Figure:
-    """Error against cost for several methods, on logarithmic axes: a row of panels for every kind of error.
+    """Error over cost of several methods, on logarithmic axes, with one row of panels for each kind of error.
 
     Args:
-        table: for every method columns of one length k, a point each: `seconds` [s]; `newton`, left out where a method
-            counts none; errors, relative, by name; and the flags `failed` (the run ended in an error: marked by a cross
-            at the top), `cut` (it was cut off, and its costs are what the whole was expected to take: marked by an
-            arrow at the top) and `wrong` (the run claimed success, and its error says otherwise: ringed), left out
-            where no point has them.
-        path: where to write it: .png, .svg or .pdf.
-        errors: the columns that are errors, and what to call them; None: every column that is no cost and no flag.
-        floors: lines below which an error means nothing, such as the disagreement of two references: for each line the
-            value by name of the error.
+        table: method -> column -> values, shape (k,), one per run. Columns are `seconds`, wall time [s]; `newton`,
+            Newton iterations (may be missing); relative errors [-] under any name; and flags (may be missing):
+            `failed`, drawn as a cross at the top; `cut`, a run that was cut off with its expected cost, drawn as an
+            arrow at the top; `wrong`, a run that reported success with a wrong result, drawn with a ring.
+        path: file to write: .png, .svg or .pdf; None: none.
+        errors: column -> label of the errors; None: every column that is neither cost nor flag.
+        floors: label -> column -> error, drawn as a line below which errors are not known, such as the difference of
+            two references.
         title: of the figure.
 
     Raises:
-        InputError: a table without a method, an error or a cost; columns of different length; a path.
+        InputError: a table without a method, an error or a cost, columns of different length, or a path that cannot be
+            written.
     """
     columns = _checked(table)
     named = errors or {name: name.replace("_", " ") for name in _error_names(columns)}
@@ -73,7 +73,7 @@ def plot_work_precision(
 
 
 def _checked(table: Table) -> dict[str, dict[str, Array]]:
-    """The table as arrays. InputError names the method and the column that does not fit."""
+    """The table as arrays. Raises InputError that names a method whose columns differ in length."""
     if not table:
         raise InputError("table is empty: give at least one method with its columns")
     out = {}
@@ -93,33 +93,45 @@ def _error_names(columns: Mapping[str, Mapping[str, Array]]) -> list[str]:
 
 
 def _draw_panel(
-    axes: Axes, columns: Mapping[str, Mapping[str, Array]], error: str, cost: str,
+    axes: Axes,
+    columns: Mapping[str, Mapping[str, Array]],
+    error: str,
+    cost: str,
     floors: Mapping[str, Mapping[str, float]],
-) -> None:  # fmt: skip
+) -> None:
     axes.set(xscale="log", yscale="log")
     for index, (method, given) in enumerate(columns.items()):
         if cost not in given or error not in given:
             continue
-        look = _look(index)
+        style = _line_style(index)
         x, y = given[cost], given[error]
         failed, wrong, cut = (given.get(flag, np.zeros(len(x))) > 0 for flag in FLAGS)
         good = ~failed & ~cut & np.isfinite(y) & (y > 0)
-        axes.plot(x[good], y[good], **look, label=method)
+        axes.plot(x[good], y[good], **style, label=method)
         axes.plot(x[good & wrong], y[good & wrong], **RING)
-        for lost, mark in ((failed, CROSS), (cut, ARROW)):
-            at = x[lost & (x > 0)]
-            axes.plot(at, np.full(len(at), ROOF), **mark | {"color": look["color"]},
-                      transform=axes.get_xaxis_transform())  # fmt: skip
+        for unknown, mark in ((failed, CROSS), (cut, ARROW)):
+            at = x[unknown & (x > 0)]
+            axes.plot(
+                at, np.full(len(at), TOP), **mark | {"color": style["color"]}, transform=axes.get_xaxis_transform()
+            )
     for name, values in floors.items():
         if error in values:
             axes.axhline(values[error], color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
-            axes.annotate(name, (0.01, values[error]), xycoords=("axes fraction", "data"), xytext=(0, 2),
-                          textcoords="offset points", fontsize=SMALL, color=INK, in_layout=False)  # fmt: skip
+            axes.annotate(
+                name,
+                (0.01, values[error]),
+                xycoords=("axes fraction", "data"),
+                xytext=(0, 2),
+                textcoords="offset points",
+                fontsize=SMALL,
+                color=INK,
+                in_layout=False,
+            )
     axes.grid(which="minor", visible=False)
 
 
 def _whole_decades(axes: Axes, costs: list[Array]) -> None:
-    """Limits at powers of ten: each is a tick with a label, however narrow the data."""
+    """Set the limits to powers of ten, so that narrow data have labelled ticks too."""
     from matplotlib.ticker import NullFormatter
 
     values = np.concatenate(costs)
@@ -129,27 +141,41 @@ def _whole_decades(axes: Axes, costs: list[Array]) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 13, "markerfacecolor": "none",
-                        "markeredgecolor": INK, "markeredgewidth": LINE, "zorder": 5}  # fmt: skip
+RING: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 13,
+    "markerfacecolor": "none",
+    "markeredgecolor": INK,
+    "markeredgewidth": LINE,
+    "zorder": 5,
+}
 ARROW: dict[str, Any] = {"linestyle": "none", "marker": 9, "markersize": 7, "fillstyle": "none"}
 CROSS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 7, "markeredgewidth": LINE}
 
-MARKS = (("failed", CROSS | {"color": FAINT}, "failed"), ("wrong", RING, "wrong success"),
-         ("cut", ARROW | {"color": FAINT}, "cut off, cost expected"))  # fmt: skip
+MARKS = (
+    ("failed", CROSS | {"color": FAINT}, "failed"),
+    ("wrong", RING, "wrong success"),
+    ("cut", ARROW | {"color": FAINT}, "cut off, cost expected"),
+)
 
 
-def _look(index: int) -> dict[str, Any]:
-    """Colour and marker of a method; past the colours the lines are dashed, so that no two look the same."""
-    return {"color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)], "markersize": 5,
-            "linestyle": ("-", "--", ":")[index // len(COLOURS) % 3]}  # fmt: skip
+def _line_style(index: int) -> dict[str, Any]:
+    """Colour, marker and line style of a method; lines are dashed when the colours repeat."""
+    return {
+        "color": COLOURS[index % len(COLOURS)],
+        "marker": MARKERS[index % len(MARKERS)],
+        "markersize": 5,
+        "linestyle": ("-", "--", ":")[index // len(COLOURS) % 3],
+    }
 
 
 def _legend(figure: Figure, axes: Axes, columns: Mapping[str, Mapping[str, Array]]) -> None:
-    """Every method, also one that a panel lacks, and the marks that occur."""
+    """One legend for the figure: all methods, and the flags that occur."""
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], **_look(index), label=method) for index, method in enumerate(columns)]
-    for flag, look, text in MARKS:
+    handles = [Line2D([], [], **_line_style(index), label=method) for index, method in enumerate(columns)]
+    for flag, style, text in MARKS:
         if any(np.any(given.get(flag, np.zeros(1)) > 0) for given in columns.values()):
-            handles.append(Line2D([], [], **look, label=text))
+            handles.append(Line2D([], [], **style, label=text))
     figure.legend(handles=handles, loc="outside right upper")

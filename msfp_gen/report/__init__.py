@@ -1,4 +1,4 @@
-"""A run as one HTML file that needs no network: numbers, settings, figures and an interactive view (docs/report.md)."""
+"""HTML report of a run: one file with tables, figures and an interactive view, without network (docs/report.md)."""
 
 from msfp_gen.report.frames import FRAMES
 from msfp_gen.report.page import REPORT_SUFFIXES, report_html, write_report

@@ -1,4 +1,4 @@
-"""What the page says in numbers and words: every number is one of the result's, and none depends on the machine."""
+"""Tables and texts of the HTML report. All numbers are those of the result; none depends on the machine."""
 
 from __future__ import annotations
 
@@ -6,27 +6,33 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.analysis.tables import transition_table
+from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
-from msfp_gen.explain import explain
-from msfp_gen.tables import Table, transition_table, yes
+from msfp_gen.scene.explain import explain
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
 
 MILLI, KILO = 1e3, 1e-3
-PLACE = ("build_seconds",)  # of the provenance: how long this machine took
-EVENTS = 40  # listed; an earthquake may meet a rim at every cycle
+MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine
+EVENTS = 40  # most events listed; in an earthquake there may be a rim contact in every cycle
 
 
-class Figure(str):
-    """A number as text that remembers which number of `Result.summary` it is, by a dotted path, and its value in SI."""
+class SummaryNumber(str):
+    """A number of `Result.summary` as formatted text.
+
+    Attributes:
+        key: dotted path of the number in the summary.
+        value: its value in SI units.
+    """
 
     key: str
     value: float
 
 
 def summary_page(result: Result) -> list[Table]:
-    """Peaks, surfaces, stages and events: the summary as `msfp-gen run` prints it, less what the machine did."""
+    """Tables of peaks, surfaces, transitions and events, as in `msfp-gen run`, without times of the machine."""
     tables = [_run_table(result), _surface_table(result)]
     if "transitions" in result.summary:
         tables.append(transition_table(result.summary["transitions"]))
@@ -36,8 +42,8 @@ def summary_page(result: Result) -> list[Table]:
 
 
 def characterisation_page(result: Result) -> list[Table]:
-    """What engineers sign off; nothing where the bearing did not move."""
-    from msfp_gen.characterise.tables import characterisation_tables
+    """Tables of the characterisation; none if the bearing did not move."""
+    from msfp_gen.analysis.characterise.tables import characterisation_tables
 
     try:
         return characterisation_tables(result.characterise())
@@ -46,27 +52,27 @@ def characterisation_page(result: Result) -> list[Table]:
 
 
 def settings_page(result: Result) -> list[Table]:
-    """Bearing, motion, top, effects and solver in plain words."""
+    """Tables of bearing, motion, top, effects and solver."""
     return explain(result.scene)
 
 
 def provenance_table(result: Result) -> Table:
-    """How the numbers came about: versions, model, method, and the work of the solver."""
-    words = {name.replace("_", " "): value for name, value in result.provenance.items() if name not in PLACE}
-    work = {name.replace("_", " "): str(count) for name, count in asdict(result.counters).items()}
-    work.pop("wall time")
-    return Table("how these numbers came about", (), [*words.items(), *work.items()])
+    """Table of versions, model and method of the run, and the counters of the solver."""
+    provenance = {name.replace("_", " "): text for name, text in result.provenance.items() if name not in MACHINE_KEYS}
+    counters = {name.replace("_", " "): str(count) for name, count in asdict(result.counters).items()}
+    counters.pop("wall time")
+    return Table("versions, model and counters of the solver", (), [*provenance.items(), *counters.items()])
 
 
-def verdict(result: Result) -> str:
-    """How the run ended, in words."""
-    ends = {"ok": "The run reached its end.", "stopped": "The run ended at the stop it was asked for."}
+def outcome(result: Result) -> str:
+    """How the run ended, in one sentence."""
+    ends = {"ok": "The run reached its end.", "stopped": "The run ended at its stop condition."}
     return ends.get(result.status, f"The run failed ({result.status}): {result.message}")
 
 
 def _run_table(result: Result) -> Table:
     rows: list[tuple[str, str]] = [("status", result.status)]
-    wanted = {
+    entries = {
         "duration": ("time simulated", 1.0, "s"),
         "peak_displacement.radial": ("peak horizontal displacement", MILLI, "mm"),
         "peak_displacement.E1": ("peak displacement along E1", MILLI, "mm"),
@@ -76,14 +82,14 @@ def _run_table(result: Result) -> Table:
         "peak_top_force.E2": ("peak force along E2", KILO, "kN"),
         "axial_load": ("axial load", KILO, "kN"),
         "peak_force_ratio": ("peak horizontal force over axial load", 1.0, ""),
-        "energy.peak_input": ("peak work put in", KILO, "kJ"),
-        "energy.dissipated_share": ("share of it dissipated", 100.0, "%"),
-        "energy.closure_error": ("share of it that the energy balance misses", 100.0, "%"),
+        "energy.peak_input": ("peak input energy", KILO, "kJ"),
+        "energy.dissipated_share": ("dissipated energy over peak input", 100.0, "%"),
+        "energy.closure_error": ("error of the energy balance over peak input", 100.0, "%"),
     }
-    for key, (name, scale, unit) in wanted.items():
-        figure = _figure(result, key, scale, unit)
-        if figure is not None:
-            rows.append((name, figure))
+    for key, (name, scale, unit) in entries.items():
+        number = _summary_number(result, key, scale, unit)
+        if number is not None:
+            rows.append((name, number))
     return Table("the run", (), rows)
 
 
@@ -92,18 +98,22 @@ def _surface_table(result: Result) -> Table:
     columns = {
         "peak sliding [mm]": ("peak_sliding", MILLI),
         "least gap [mm]": ("minimum_gap", MILLI),
-        "N least [kN]": ("minimum_normal_force", KILO),
-        "N most [kN]": ("maximum_normal_force", KILO),
-        "mu least": ("least_friction", 1.0),
-        "mu most": ("most_friction", 1.0),
+        "least N [kN]": ("minimum_normal_force", KILO),
+        "peak N [kN]": ("maximum_normal_force", KILO),
+        "least mu": ("least_friction", 1.0),
+        "peak mu": ("most_friction", 1.0),
         "peak T [degC]": ("peak_temperature", 1.0),
     }
     columns = {name: column for name, column in columns.items() if column[0] in result.summary}
     rows = [
-        (str(index + 1), f"{surface.capacity * MILLI:.5g}", yes(index + 1 in met),
-         *(_figure(result, f"{key}.{index}", scale) or "-" for key, scale in columns.values()))
+        (
+            str(index + 1),
+            f"{surface.capacity * MILLI:.5g}",
+            yes(index + 1 in met),
+            *(_summary_number(result, f"{key}.{index}", scale) or "-" for key, scale in columns.values()),
+        )
         for index, surface in enumerate(surfaces)
-    ]  # fmt: skip
+    ]
     return Table("surfaces, bottom first", ("surface", "capacity [mm]", "rim met", *columns), rows)
 
 
@@ -111,27 +121,31 @@ def _event_table(result: Result) -> Table:
     shown = result.events[:EVENTS]
     more = f", the first {EVENTS} of {len(result.events)}" if len(result.events) > EVENTS else ""
     rows = [
-        (f"{event.time:.4f}", event.kind.replace("_", " "), str(event.surface or "-"),
-         *(f"{value * MILLI:.2f}" for value in event.displacement[:2]),
-         *(f"{value * KILO:.3f}" for value in event.top_force[:2]))
+        (
+            f"{event.time:.4f}",
+            event.kind.replace("_", " "),
+            str(event.surface or "-"),
+            *(f"{value * MILLI:.2f}" for value in event.displacement[:2]),
+            *(f"{value * KILO:.3f}" for value in event.top_force[:2]),
+        )
         for event in shown
-    ]  # fmt: skip
+    ]
     columns = ("time [s]", "event", "surface", "u1 [mm]", "u2 [mm]", "F1 [kN]", "F2 [kN]")
     return Table(f"events{more}", columns, rows)
 
 
-def _figure(result: Result, key: str, scale: float, unit: str = "") -> Figure | None:
-    """One number of the summary for a person; None where the summary has none."""
+def _summary_number(result: Result, key: str, scale: float, unit: str = "") -> SummaryNumber | None:
+    """The number of the summary at a dotted path, formatted; None if it is not defined."""
     value: Any = result.summary
     for part in key.split("."):
         value = value[int(part) if isinstance(value, list) else part]
     if value is None:
         return None
-    figure = Figure(f"{value * scale:.5g} {unit}".rstrip())
-    figure.key, figure.value = key, float(value)
-    return figure
+    number = SummaryNumber(f"{value * scale:.5g} {unit}".rstrip())
+    number.key, number.value = key, float(value)
+    return number
 
 
-def numbers(tables: list[Table]) -> Iterator[Figure]:
-    """Every number of the summary that the tables show."""
-    return (cell for table in tables for row in table.rows for cell in row if isinstance(cell, Figure))
+def summary_numbers(tables: list[Table]) -> Iterator[SummaryNumber]:
+    """All numbers of the summary in these tables."""
+    return (cell for table in tables for row in table.rows for cell in row if isinstance(cell, SummaryNumber))

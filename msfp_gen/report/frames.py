@@ -1,4 +1,4 @@
-"""What the interactive view shows: some rows of a run, thinned with care, as arrays that a browser reads at once."""
+"""Data of the interactive view: selected rows of a run, as arrays in JSON."""
 
 from __future__ import annotations
 
@@ -9,28 +9,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.figures import COLOURS
-from msfp_gen.history import Array, History
-from msfp_gen.outline import POINTS, outline
-from msfp_gen.resample import at_times
-from msfp_gen.shape import Poses, friction_circles, poses
-from msfp_gen.stages import parted, sliding_now
+from msfp_gen.results.geometry.outline import POINTS, outline
+from msfp_gen.results.geometry.shape import Poses, friction_circles, poses
+from msfp_gen.results.history import History
+from msfp_gen.results.resample import at_times
+from msfp_gen.results.sliding import separated, sliding_surfaces
 
 if TYPE_CHECKING:
-    from msfp_gen.bearing import Bearing
     from msfp_gen.result import Result
+    from msfp_gen.scene.bearing import Bearing
 
-FRAMES = 1500  # 0.5 kB each for a triple pendulum, and more than a screen has columns
-FEWEST = 600  # a bearing that moves in jumps is hard to follow
-ARC = 20  # points on a face that is turned about its axis
-STATES = ("sticks", "slides", "at its rim", "apart")
+FRAMES = 1500  # instants; 0.5 kB each for a triple pendulum, and more than a screen has pixel columns
+FEWEST = 600  # least number of instants, so that the motion looks continuous
+ARC = 20  # points on the profile of a spherical face
+STATES = ("sticks", "slides", "rim contact", "separated")
 Rows = NDArray[np.intp]
 
 
 def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
-    """Everything that the scripts of the page draw, JSON-able: lengths [m], forces [N], angles [rad], in E1, E2, E3.
+    """Data for the scripts of the HTML report, ready for JSON: lengths [m], forces [N], angles [rad], axes E1, E2, E3.
 
-    Bodies are turned about their axis; positions are those of `shape.Poses`, which hold the base still.
+    Bodies are solids of revolution; positions are relative to the base, as in `shape.Poses`. `count` is the number of
+    instants, about.
     """
     shown = at_times(result, instants(result, count))
     history, bearing, where = shown.history, shown.scene.bearing, poses(shown)
@@ -65,55 +67,63 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
 
 
 def instants(result: Result, count: int = FRAMES) -> Array:
-    """Times to show, rising, ndarray, shape (K,), [s]: rows of the run, and some between them where they are few."""
-    time = result.history.time[chosen(result, count)]
+    """Increasing times of the view [s], shape (K,): rows of the run, and times between them if they are too few."""
+    time = result.history.time[selected_rows(result, count)]
     return np.union1d(time, np.linspace(time[0], time[-1], FEWEST)) if len(time) < FEWEST else time
 
 
-def chosen(result: Result, count: int = FRAMES) -> Rows:
-    """Rows to show, rising: evenly in time, with the ends, every peak of the summary and every rim first met."""
+def selected_rows(result: Result, count: int = FRAMES) -> Rows:
+    """Increasing row numbers of the view: evenly in time, with the ends, all peaks, and first events of each kind."""
     history = result.history
     time = history.time
     if len(time) <= count:
         return np.arange(len(time))
-    wanted = np.linspace(time[0], time[-1], count)
-    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    nearest = np.where(wanted - time[after - 1] < time[after] - wanted, after - 1, after)
+    even = np.linspace(time[0], time[-1], count)
+    after = np.clip(np.searchsorted(time, even), 1, len(time) - 1)
+    nearest = np.where(even - time[after - 1] < time[after] - even, after - 1, after)
     forces = np.abs(history.top_force)
     radial = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
-    peaks = [np.abs(history.displacement).argmax(axis=0), history.horizontal.argmax(), forces.argmax(axis=0),
-             radial.argmax(), history.sliding.argmax(axis=0)]  # fmt: skip
+    peaks = [
+        np.abs(history.displacement).argmax(axis=0),
+        history.horizontal.argmax(),
+        forces.argmax(axis=0),
+        radial.argmax(),
+        history.sliding.argmax(axis=0),
+    ]
     first = {(event.surface, event.kind): event.time for event in reversed(result.events)}
     events = np.searchsorted(time, list(first.values())).clip(max=len(time) - 1)
     return np.unique(np.concatenate([nearest, *map(np.atleast_1d, peaks), events]).astype(np.intp))
 
 
 def main_direction(path: Array) -> float:
-    """Azimuth of the direction along which a horizontal path, shape (T, 2), is longest [rad], in (-pi/2, pi/2]."""
+    """Azimuth of the principal direction of a horizontal path, shape (T, 2) [rad], in (-pi/2, pi/2]."""
     (xx, xy), (_, yy) = np.cov((path - path[0]).T, ddof=0) if len(path) > 1 else np.zeros((2, 2))
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)
     return 0.0 if abs(angle) < 1e-6 else float(angle)
 
 
 def quaternions(where: Poses) -> Array:
-    """Turn of every body, ndarray, shape (T, n, 4): x, y, z, w; the spin is about the body's own axis (2.27)."""
+    """Rotation of every body as quaternions x, y, z, w, shape (T, n, 4), with the spin about its own axis (2.27)."""
     from scipy.spatial.transform import Rotation
 
     axes = np.swapaxes(where.basis, -1, -2).reshape(-1, 3, 3)  # t_1, t_2, t_3 as columns
-    turns = Rotation.from_matrix(axes) * Rotation.from_euler("z", where.spin.reshape(-1, 1))
-    return np.asarray(turns.as_quat()).reshape(*where.spin.shape, 4)
+    rotations = Rotation.from_matrix(axes) * Rotation.from_euler("z", where.spin.reshape(-1, 1))
+    return np.asarray(rotations.as_quat()).reshape(*where.spin.shape, 4)
 
 
 def states(history: History) -> Array:
-    """Index into `STATES` of every surface, ndarray, shape (T, n-1)."""
-    found = np.where(sliding_now(history), 1.0, 0.0)
+    """State of every surface as index into `STATES`, shape (T, n-1)."""
+    found = np.where(sliding_surfaces(history), 1.0, 0.0)
     found[history.gap <= 0] = 2.0
-    found[parted(history) | (history.normal_force <= 0)] = 3.0
+    found[separated(history) | (history.normal_force <= 0)] = 3.0
     return found
 
 
 def pieces(bearing: Bearing, body: int) -> list[dict[str, Any]]:
-    """The outline of a body (index from 0) from crease to crease; the faces that slide name their surface."""
+    """Half profile of a body (index from 0), split at its edges: points (radius, height) [m] and number of the surface.
+
+    The surface is 0 for parts that are not sliding faces.
+    """
     points, last = outline(bearing, body), bearing.layout.surfaces
     ends = [POINTS if 0 <= surface < last else 1 for surface in (body - 1, body)]
     arc = np.linspace(0, POINTS - 1, ARC).round().astype(int)
@@ -135,7 +145,7 @@ def packed(values: Array) -> dict[str, Any]:
 
 
 def _surfaces(bearing: Bearing, radii: Array) -> list[dict[str, Any]]:
-    """circle: the largest radius of the friction circle."""
+    """Capacity [m], largest radius of the friction circle [m] and colour of every surface."""
     return [
         {"capacity": surface.capacity, "circle": float(circle), "colour": COLOURS[index % len(COLOURS)]}
         for index, (surface, circle) in enumerate(zip(bearing.surfaces, radii.max(axis=0), strict=True))

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stacks import (
+from support import failure_of, model_of
+from support.stacks import (
     LOAD,
     PLANAR,
     a_pendulum,
@@ -18,11 +19,10 @@ from stacks import (
     pushed,
     swing,
 )
-from support import failure_of, model_of
 
 from msfp_gen import Bearing, Effects, Motion, Scene, Solver, Top, simulate
 from msfp_gen.result import Result
-from msfp_gen.scene import InitialState
+from msfp_gen.scene.parts import InitialState
 
 TINY = [1e-3, 1e-6, 1e-8, 1e-9, 1e-12]
 TFP = (5, 2, 2)
@@ -103,8 +103,13 @@ def hemisphere() -> Bearing:
 
 @pytest.mark.parametrize("radius", [0.05, 0.5, 5.0])
 def test_radii_of_real_bearings_follow_the_reference(radius: float) -> None:
-    bearing = a_stack(TFP, [radius, 0.3 * radius, 0.3 * radius, radius], friction=[0.03, 0.015, 0.015, 0.1],
-                      capacity=0.06 * radius, body={"height": min(0.02, 0.1 * radius)})  # fmt: skip
+    bearing = a_stack(
+        TFP,
+        [radius, 0.3 * radius, 0.3 * radius, radius],
+        friction=[0.03, 0.015, 0.015, 0.1],
+        capacity=0.06 * radius,
+        body={"height": min(0.02, 0.1 * radius)},
+    )
     reach = min(0.1, 0.1 * radius)
     assert off_the_reference(pushed(bearing, [reach, -reach / 2, reach / 4], rtol=1e-5), rows=25) < 1e-3
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stacks import PLANAR, a_pendulum, a_rig, a_stack, pendulum_angle, slow_path, swing
 from support import Array
+from support.stacks import PLANAR, a_pendulum, a_rig, a_stack, pendulum_angle, slow_path, swing
 
 import msfp_gen
 from msfp_gen import Motion, Scene, Solver, simulate
-from msfp_gen.scene import Stop
+from msfp_gen.scene.parts import Stop
 
-RUNTIME = Path(msfp_gen.__file__).parent / "runtime"
+RUNTIME = Path(msfp_gen.__file__).parent / "runtime" / "steppers"
 START = 0.6
 # Steps [s] small enough for the order to show and large enough to stay clear of rounding.
 STEPS = {"implicit": [0.02, 0.01, 0.005, 0.0025], "dopri5": [0.025, 0.0125, 0.00625]}
@@ -92,9 +92,18 @@ def residuals(a: Array, c: Array, b: Array) -> dict[int, list[object]]:
         2: [(c, 2)],
         3: [(c**2, 3), (ac, 6)],
         4: [(c**3, 4), (c * ac, 8), (a @ c**2, 12), (a @ ac, 24)],
-        5: [(c**4, 5), (c**2 * ac, 10), (ac**2, 20), (c * (a @ c**2), 15), (c * (a @ ac), 30), (a @ c**3, 20),
-            (a @ (c * ac), 40), (a @ (a @ c**2), 60), (a @ (a @ ac), 120)],
-    }  # fmt: skip
+        5: [
+            (c**4, 5),
+            (c**2 * ac, 10),
+            (ac**2, 20),
+            (c * (a @ c**2), 15),
+            (c * (a @ ac), 30),
+            (a @ c**3, 20),
+            (a @ (c * ac), 40),
+            (a @ (a @ c**2), 60),
+            (a @ (a @ ac), 120),
+        ],
+    }
     return {order: [b @ tree - Fraction(1, n) for tree, n in group] for order, group in trees.items()}
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reference.friction_circle import Push, first_slip, force_at
-from stacks import (
+from support import failure_of, preset_run
+from support.stacks import (
     LOAD,
     PLANAR,
     TILT_STIFFNESS,
@@ -20,7 +21,6 @@ from stacks import (
     slow_path,
     swing,
 )
-from support import failure_of, preset_run
 
 from msfp_gen import Motion, Scene, Solver, presets, simulate
 from msfp_gen.result import Result

@@ -10,20 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import fuzz
+import fuzz_scenes
+import fuzz_second
 import numpy as np
 import pytest
-from stacks import a_stack
-from support import failure_of
+from support import ROOT, failure_of
+from support.stacks import a_stack
 
 from msfp_gen import Effects, Motion, Scene, Solver, Top, simulate
 from msfp_gen.result import Result
-
-ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "benchmarks"))
-
-import fuzz  # noqa: E402
-import fuzz_scenes  # noqa: E402
-import fuzz_second  # noqa: E402
 
 
 @pytest.fixture(scope="module")

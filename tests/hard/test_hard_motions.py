@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from stacks import PLANAR, a_pendulum, a_rig, a_stack, off_the_reference, pendulum_angle, pushed, swing
 from support import Array
+from support.stacks import PLANAR, a_pendulum, a_rig, a_stack, off_the_reference, pendulum_angle, pushed, swing
 
 from msfp_gen import Bearing, Effects, InputError, Motion, Scene, Solver, Top, load_scene, simulate
 from msfp_gen.result import Result
 
 
 def triple(**values: float) -> Bearing:
-    return a_stack((5, 2, 2), [1.0, 0.3, 0.3, 1.0], friction=[0.03, 0.015, 0.015, 0.1],
-                   capacity=[0.2, 0.06, 0.06, 0.2], **values)  # fmt: skip
+    return a_stack(
+        (5, 2, 2), [1.0, 0.3, 0.3, 1.0], friction=[0.03, 0.015, 0.015, 0.1], capacity=[0.2, 0.06, 0.06, 0.2], **values
+    )
 
 
 def shaken(bearing: Bearing, motion: Motion, output_step: float, **solver: object) -> Result:
@@ -120,8 +121,14 @@ def test_one_spike_after_a_long_rest_is_not_missed() -> None:
     acceleration = np.zeros((len(t), 3))
     acceleration[6000, 0] = 2.0
     bearing = a_pendulum(radius=10.0, capacity=1.0)
-    scene = Scene(bearing, Motion.from_acceleration(t, acceleration), Top.prescribed((0.0, 0.0, 0.0)), PLANAR,
-                  Solver(rtol=1e-6, atol_angle=1e-9), output_step=0.01)  # fmt: skip
+    scene = Scene(
+        bearing,
+        Motion.from_acceleration(t, acceleration),
+        Top.prescribed((0.0, 0.0, 0.0)),
+        PLANAR,
+        Solver(rtol=1e-6, atol_angle=1e-9),
+        output_step=0.01,
+    )
     run = simulate(scene).history
 
     def rates(at: float, y: Array) -> list[float]:

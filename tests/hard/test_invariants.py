@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from random_scenes import LAYOUTS, bearings, between, capacity, scenes
-from stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, nested_radii, pendulum_angle, swing
 from support import Array
+from support.random_scenes import LAYOUTS, bearings, between, capacity, scenes
+from support.stacks import LOAD, PLANAR, a_pendulum, a_rig, a_stack, holds, nested_radii, pendulum_angle, swing
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, simulate
-from msfp_gen.history import History
 from msfp_gen.result import Result
-from msfp_gen.top import MassTop
+from msfp_gen.results.history import History
+from msfp_gen.scene.top import MassTop
 
 MASSLESS = Effects(dimension="planar", sliders="massless")
 
@@ -100,8 +100,10 @@ def test_half_the_tolerance_never_errs_ten_times_more(layout: tuple[int, int, in
     wanted = force(scene, 1e-7)
     floor = 1e-5 * np.abs(wanted).max()
     tolerances = [1e-2 / 2**i for i in range(0, 11, 2)]
-    errors = [(float(np.abs(force(scene, t) - wanted).max()), float(np.abs(force(scene, t / 2) - wanted).max()))
-              for t in tolerances]  # fmt: skip
+    errors = [
+        (float(np.abs(force(scene, t) - wanted).max()), float(np.abs(force(scene, t / 2) - wanted).max()))
+        for t in tolerances
+    ]
     for tolerance, (coarse, fine) in zip(tolerances, errors, strict=True):
         assert fine < 10 * coarse + floor, tolerance
         assert fine < 1e-2 * np.abs(wanted).max() or tolerance > 2e-4, tolerance

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stacks import LOAD, PLANAR, a_body, a_stack, nested_radii
 from support import failure_of, scene_of
+from support.stacks import LOAD, PLANAR, a_body, a_stack, nested_radii
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, presets, simulate
-from msfp_gen.history import Counters
 from msfp_gen.result import Result
+from msfp_gen.results.history import Counters
 
 TFP = (5, 2, 2)
 
@@ -58,10 +58,14 @@ def test_a_stack_that_falls_says_so_whatever_solves_it(solver: dict[str, float])
 def jamming() -> Scene:
     """A mass on an orbit of 17 cm, thrown back by the rim of the lowest surface at 2.593 s."""
     bearing = a_stack(
-        TFP, [1.0, 0.601, 0.601, 1.0], capacity=[0.17875, 0.10276, 0.10906, 0.14849],
-        friction=[0.0279, 0.1442, 0.01427, 0.0279], yield_displacement=[1.66e-4, 9.34e-4, 1.1e-4, 4.49e-4],
-        rim_stiffness=[6.531e7, 7.5685e7, 6.566e7, 1e6], rim_damping=[5.0, 1e3, 0.0, 1e3],
-    )  # fmt: skip
+        TFP,
+        [1.0, 0.601, 0.601, 1.0],
+        capacity=[0.17875, 0.10276, 0.10906, 0.14849],
+        friction=[0.0279, 0.1442, 0.01427, 0.0279],
+        yield_displacement=[1.66e-4, 9.34e-4, 1.1e-4, 4.49e-4],
+        rim_stiffness=[6.531e7, 7.5685e7, 6.566e7, 1e6],
+        rim_damping=[5.0, 1e3, 0.0, 1e3],
+    )
     bodies = [
         a_body(mass, height) for mass, height in ((0.343, 0.01884), (0.05, 0.01625), (0.066, 0.02026), (1.0, 0.01428))
     ]
@@ -124,8 +128,14 @@ def test_the_last_word_has_time_surface_state_and_remedy(scene: Scene, status: s
 
 def thrown(method: str = "implicit") -> Scene:
     """Ten tonnes on a triple pendulum, led beyond its reach: the rims are struck and the mass lifts."""
-    bearing = a_stack(TFP, [1.0, 0.5, 0.5, 1.0], capacity=[0.1, 0.04, 0.04, 0.1], rim_stiffness=1e7,
-                      yield_displacement=1e-3, body={"mass": 2.0})  # fmt: skip
+    bearing = a_stack(
+        TFP,
+        [1.0, 0.5, 0.5, 1.0],
+        capacity=[0.1, 0.04, 0.04, 0.1],
+        rim_stiffness=1e7,
+        yield_displacement=1e-3,
+        body={"mass": 2.0},
+    )
     top = Top.mass(1e4, 500.0, 0.5, 1e7, 1e5)
     return Scene(bearing, Motion.harmonic(0.5, 0.45, cycles=1.0), top, PLANAR, Solver(method=method, rtol=1e-5))  # type: ignore[arg-type]
 
@@ -164,13 +174,20 @@ def test_a_first_step_that_is_too_long_does_not_decide_what_is_regular() -> None
 @pytest.mark.parametrize("method", ["implicit", "dopri5"])
 def test_a_violent_start_is_regular(method: str) -> None:
     """Let go far from where it would rest; a first step of 0.1 ms would be past the fall of the free plate."""
-    from msfp_gen.scene import InitialState
+    from msfp_gen.scene.parts import InitialState
 
     bearing = a_stack((3, 1, 1), [0.8, 0.8], friction=[0.03, 0.09], body={"mass": 1.0}, yield_displacement=1e-3)
     start = InitialState([(0.0, -0.02, 0.0), (0.0, -0.05, 0.0)], np.zeros((2, 3)), [(-0.1, 0.0), (-0.4, 0.0)])
     still = Motion(knots=[0.0, 1.0], coefficients=np.zeros((1, 6, 6)))
-    scene = Scene(bearing, still, Top.prescribed((0.0, 0.0, -5e5)), PLANAR, Solver(method=method, rtol=1e-6),  # type: ignore[arg-type]
-                  duration=1e-3, initial_state=start)  # fmt: skip
+    scene = Scene(
+        bearing,
+        still,
+        Top.prescribed((0.0, 0.0, -5e5)),
+        PLANAR,
+        Solver(method=method, rtol=1e-6),  # type: ignore[arg-type]
+        duration=1e-3,
+        initial_state=start,
+    )
     run = simulate(scene)
     assert run.succeeded and np.abs(run.history.tilt_rates[-1]).max() > 1.0
 
@@ -184,8 +201,10 @@ def test_a_heavy_mass_on_massless_sliders_is_not_called_irregular() -> None:
     shake = Motion.from_arrays(t, np.outer(0.1 * np.sin(np.pi * t / 3) ** 3 * np.sin(6 * t), [1.0, 0.0, 0.0]))
     top = Top.mass(2e3, 300.0, 0.1, 7e5, 7e3)
     scene = Scene(bearing, shake, top, PLANAR, Solver(rtol=1e-6), output_step=0.02)
-    heavy, light = (simulate(replace(scene, effects=Effects(dimension="planar", sliders=s)))  # type: ignore[arg-type]
-                    for s in ("inertial", "massless"))  # fmt: skip
+    heavy, light = (
+        simulate(replace(scene, effects=Effects(dimension="planar", sliders=s)))  # type: ignore[arg-type]
+        for s in ("inertial", "massless")
+    )
     force = heavy.history.top_force[:, 0]
     assert np.abs(light.history.top_force[:, 0] - force).max() < 0.05 * np.abs(force).max()
 
@@ -195,7 +214,7 @@ def test_loose_sliders_hop_until_one_has_left_its_place(rtol: float) -> None:
     """Nearly without friction nothing brings the sliders back between hops. That used to end as newton at 0.89 s, where
     residuals of rounding were asked to be smaller, and later with steps of nanoseconds towards the moment at which
     a slider is beside its cup: when that is depends on chaos, what it is does not."""
-    from test_uplift import shaken
+    from support.flights import shaken
 
     scene = shaken(1.4, sideways=0.02, duration=2.0, rtol=rtol)
     error = failure_of(replace(scene, bearing=scene.bearing.replace(friction=1e-3)))

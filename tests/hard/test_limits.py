@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from stacks import (
+from support import Array, failure_of, model_of
+from support.stacks import (
     PLANAR,
     a_rig,
     a_stack,
@@ -17,11 +18,10 @@ from stacks import (
     pushed,
     slow_path,
 )
-from support import Array, failure_of, model_of
 
 from msfp_gen import Bearing, Effects, Motion, RunError, Scene, Solver, Top, load_scene, simulate
 from msfp_gen.result import Result
-from msfp_gen.scene import InitialState
+from msfp_gen.scene.parts import InitialState
 
 TFP, RADII = (5, 2, 2), [1.0, 0.3, 0.3, 1.0]
 USUAL = {"friction": [0.03, 0.015, 0.015, 0.1], "capacity": [0.2, 0.06, 0.06, 0.2]}
@@ -36,8 +36,14 @@ def spun(seed: float, rtol: float = 1e-5, method: str = "implicit", duration: fl
     rates = np.zeros((4, 3))
     rates[:, 2] = seed
     start = InitialState(np.zeros((4, 3)), rates, np.zeros((4, 2)))
-    scene = replace(load_scene("becker-circle-50"), effects=Effects(spin="free"), initial_state=start,
-                    duration=duration, output_step=0.5, solver=Solver(rtol=rtol, method=method))  # type: ignore[arg-type]  # fmt: skip
+    scene = replace(
+        load_scene("becker-circle-50"),
+        effects=Effects(spin="free"),
+        initial_state=start,
+        duration=duration,
+        output_step=0.5,
+        solver=Solver(rtol=rtol, method=method),
+    )  # type: ignore[arg-type]
     return np.abs(simulate(scene).history.tilt_rates[:, 1:3, 2]).max(axis=1)
 
 
@@ -148,8 +154,14 @@ def test_no_load_at_all_is_the_weight_of_the_top_plate() -> None:
 def test_force_goes_with_the_load(load: float) -> None:
     """Without weights and with springs in proportion nothing but the unit changes."""
     bearing = a_stack(TFP, RADII, gravity=0.0, body={"mass": 1e-6 * load}, **USUAL)
-    scene = Scene(bearing, slow_path([0.1, -0.05], 5e-3), Top.rig(load, 1e3 * load, 0.0, 10 * load), effects=PLANAR,
-                  output_step=0.5, solver=Solver(rtol=1e-6))  # fmt: skip
+    scene = Scene(
+        bearing,
+        slow_path([0.1, -0.05], 5e-3),
+        Top.rig(load, 1e3 * load, 0.0, 10 * load),
+        effects=PLANAR,
+        output_step=0.5,
+        solver=Solver(rtol=1e-6),
+    )
     one = replace(
         scene, bearing=a_stack(TFP, RADII, gravity=0.0, body={"mass": 1e-2}, **USUAL), top=Top.rig(1e4, 1e7, 0.0, 1e5)
     )

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from random_scenes import LAYOUTS, bearings, between, capacity, motions
-from stacks import LOAD, PLANAR, a_rig, a_stack, holds
 from support import Array
+from support.random_scenes import LAYOUTS, bearings, between, capacity, motions
+from support.stacks import LOAD, PLANAR, a_rig, a_stack, holds
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Top, simulate
-from msfp_gen.history import History
+from msfp_gen.results.history import History
 
 MIRRORS = {"E1-E3": np.diag([1.0, -1.0]), "E2-E3": np.diag([-1.0, 1.0])}
 

@@ -46,8 +46,9 @@ def friction_power(bearing: Any, h: Array, normal: Array, slip: Array, law: str 
     return FrictionPower(total, total - dissipated, dissipated)
 
 
-def powers(bearing: Any, state: State, h: Array, found: Solution, load: Load, spin: str = "free",
-           rims: bool = True) -> dict[str, float]:  # fmt: skip
+def powers(
+    bearing: Any, state: State, h: Array, found: Solution, load: Load, spin: str = "free", rims: bool = True
+) -> dict[str, float]:
     """Power into bodies 2..n from each source at a solved state [W]; their sum is d(T + V)/dt.
 
     "base" is the work of the moving base, "lock" that of the moments which keep phi'' = 0 under spin="locked".

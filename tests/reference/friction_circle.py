@@ -193,8 +193,15 @@ def _next_event(push: Push, stage: Equilibrium, end: float) -> tuple[Equilibrium
         after = _margins(push, high)
         crossed = np.argwhere((after > 0) & (before <= 0))
         if len(crossed):
-            roots = [brentq(lambda d, at=tuple(c), low=low: _margins(push, advance(push, low, d))[at],
-                            low.displacement, high.displacement, xtol=1e-15) for c in crossed]  # fmt: skip
+            roots = [
+                brentq(
+                    lambda d, at=tuple(c), low=low: _margins(push, advance(push, low, d))[at],
+                    low.displacement,
+                    high.displacement,
+                    xtol=1e-15,
+                )
+                for c in crossed
+            ]
             first = int(np.argmin(roots))
             row, surface = (int(i) for i in crossed[first])
             return advance(push, low, roots[first] + row * TOUCH), row, surface

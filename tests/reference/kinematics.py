@@ -102,8 +102,9 @@ def rotation(state: State) -> Rotation:
         before, (_, t2, t3) = t[k - 1][0], t[k]
         w.append(theta1 * t2 + psi1 * before + w[k - 1])  # (3.12)
         w_total.append(phi1 * t3 + w[k])  # (3.12), t_3 also for the base: the printed t_2^1 contradicts (2.27)
-        dw.append(theta2 * t2 + cross(w[k], theta1 * t2) + psi2 * before + cross(w[k - 1], psi1 * before)
-                  + dw[k - 1])  # (2.56), (2.58), ...  # fmt: skip
+        dw.append(
+            theta2 * t2 + cross(w[k], theta1 * t2) + psi2 * before + cross(w[k - 1], psi1 * before) + dw[k - 1]
+        )  # (2.56), (2.58), ...
         dw_total.append(phi2 * t3 + cross(w[k], phi1 * t3) + dw[k])  # (2.57), (2.59), ...
     return Rotation(t, w, w_total, dw, dw_total)
 
@@ -143,9 +144,14 @@ def points(bearing: Any, state: State, turn: Rotation | None = None) -> Points:
 def along(state: State, t: Any) -> State:
     """The state a time t [s] later on the path of constant second rates: q + v t + a t^2/2, and the base likewise."""
     b = state.base
-    base = Base(b.displacement + b.velocity * t + b.acceleration * t * t / 2, b.velocity + b.acceleration * t,
-                b.acceleration, b.angles + b.rates * t + b.rate_rates * t * t / 2, b.rates + b.rate_rates * t,
-                b.rate_rates)  # fmt: skip
+    base = Base(
+        b.displacement + b.velocity * t + b.acceleration * t * t / 2,
+        b.velocity + b.acceleration * t,
+        b.acceleration,
+        b.angles + b.rates * t + b.rate_rates * t * t / 2,
+        b.rates + b.rate_rates * t,
+        b.rate_rates,
+    )
     return State(state.q + state.v * t + state.a * t * t / 2, state.v + state.a * t, state.a, base)
 
 

@@ -1,4 +1,4 @@
-"""Stacks for the reference: records with the field names of `msfp_gen.bearing`, so either kind can be passed."""
+"""Stacks for the reference: records with the field names of `msfp_gen.scene.bearing`, so either kind can be passed."""
 
 from __future__ import annotations
 
@@ -78,14 +78,34 @@ def random_stack(rng: np.random.Generator, n: int, m: int, p: int) -> Stack:
         return float(rng.uniform(low, high))
 
     surfaces = tuple(
-        Surface(between(0.2, 0.6), between(0.02, 0.05), between(0.02, 0.15), between(1e-4, 1e-3),
-                between(1e5, 1e6), between(5.0, 500.0))
+        Surface(
+            between(0.2, 0.6),
+            between(0.02, 0.05),
+            between(0.02, 0.15),
+            between(1e-4, 1e-3),
+            between(1e5, 1e6),
+            between(5.0, 500.0),
+        )
         for _ in range(n - 1)
-    )  # fmt: skip
+    )
     bodies = tuple(
-        Body(between(0.01, 0.05), between(0.003, 0.008), between(0.3, 8.0), (between(4e-3, 1e-2), between(1e-3, 8e-3)),
-             between(0.02, 0.06), between(0.001, 0.005))
+        Body(
+            between(0.01, 0.05),
+            between(0.003, 0.008),
+            between(0.3, 8.0),
+            (between(4e-3, 1e-2), between(1e-3, 8e-3)),
+            between(0.02, 0.06),
+            between(0.001, 0.005),
+        )
         for _ in range(n - 1)
-    )  # fmt: skip
-    return Stack(Counts(n, m, p), surfaces, bodies, between(0.01, 0.05), 9.8, between(0.02, 0.06),
-                 between(0.001, 0.005), between(0.003, 0.008))  # fmt: skip
+    )
+    return Stack(
+        Counts(n, m, p),
+        surfaces,
+        bodies,
+        between(0.01, 0.05),
+        9.8,
+        between(0.02, 0.06),
+        between(0.001, 0.005),
+        between(0.003, 0.008),
+    )

@@ -43,8 +43,9 @@ def friction_share(Y: Array, slip: Array) -> Array:
 def follow(push: Push, displacements: Sequence[float], stride: float = 1e-4) -> list[Point]:
     """The stack at each displacement [m] in turn, from rest at zero, by steps of at most stride [m]."""
     n = push.bearing.layout.n
-    radius, d_y = (np.array([getattr(s, key) for s in push.bearing.surfaces])
-                   for key in ("radius", "yield_displacement"))  # fmt: skip
+    radius, d_y = (
+        np.array([getattr(s, key) for s in push.bearing.surfaces]) for key in ("radius", "yield_displacement")
+    )
     here = Point(0.0, 0.0, 0.0, np.zeros(n - 1), np.zeros(n - 1))
     path = []
     for target in displacements:

@@ -49,8 +49,9 @@ class Solution(NamedTuple):
     iterations: int
 
 
-def interfaces(bearing: Any, turn: Rotation, at: Points, h: Array, angles: Array, normal: Array, spin: str,
-               rims: bool = True) -> Interfaces:  # fmt: skip
+def interfaces(
+    bearing: Any, turn: Rotation, at: Points, h: Array, angles: Array, normal: Array, spin: str, rims: bool = True
+) -> Interfaces:
     """Contact, friction, rim and drilling action at every surface; spin is "free", "locked" or "patch"."""
     touch, rim = forces.contact(bearing, turn, at.r, angles), forces.rim(bearing, turn, at.r)
     drilling = forces.drilling_moments(bearing, normal, turn, touch)
@@ -71,8 +72,16 @@ def inertia(bearing: Any, turn: Rotation, k: int) -> Array:
     return J
 
 
-def balances(bearing: Any, state: State, h: Array, angles: Array, normal: Array, load: Load, spin: str = "free",
-             rims: bool = True) -> Balances:  # fmt: skip
+def balances(
+    bearing: Any,
+    state: State,
+    h: Array,
+    angles: Array,
+    normal: Array,
+    load: Load,
+    spin: str = "free",
+    rims: bool = True,
+) -> Balances:
     """(3.26)-(3.29) at given unknowns: state.a, contact angles (n-1, 2) [rad], normal (n-1,) [N]."""
     turn = rotation(state)
     at = points(bearing, state, turn)
@@ -115,8 +124,11 @@ def solve(bearing: Any, state: State, h: Array, load: Load, spin: str = "free", 
     size = max(float(np.linalg.norm(load.force)), 1.0)
 
     def parts(x: Array) -> tuple[State, Array, Array]:
-        return (replace(state, a=x[: 3 * count].reshape(count, 3)),
-                x[3 * count : 5 * count].reshape(count, 2), x[5 * count :] * size)  # fmt: skip
+        return (
+            replace(state, a=x[: 3 * count].reshape(count, 3)),
+            x[3 * count : 5 * count].reshape(count, 2),
+            x[5 * count :] * size,
+        )
 
     def residual(x: Array) -> Array:
         trial, angles, normal = parts(x)

@@ -1,4 +1,4 @@
-// A plain chart in SVG: lines, dashed levels, and a cursor that follows the frame. It prints, and scales with the text.
+// A chart in SVG: lines, dashed levels, and a cursor at the current frame.
 "use strict";
 
 const CHART = { width: 460, height: 270, left: 58, right: 12, top: 12, bottom: 42 };
@@ -19,14 +19,14 @@ function padded(values, share = 0.06) {
   return [low - share * (high - low), high + share * (high - low)];
 }
 
-// Widens one of two ranges until both have the same scale on a box of these sides.
-function equalised(x, y, width, height) {
+// Widens one of two ranges so that both have the same scale in a box of this width and height.
+function withEqualScale(x, y, width, height) {
   const scale = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
-  const about = ([low, high], size) => [(low + high - scale * size) / 2, (low + high + scale * size) / 2];
-  return [about(x, width), about(y, height)];
+  const widened = ([low, high], size) => [(low + high - scale * size) / 2, (low + high + scale * size) / 2];
+  return [widened(x, width), widened(y, height)];
 }
 
-// The frame of a chart: axes, grid, labels; gives the maps from values to the picture.
+// Draws axes, grid and labels of a chart; returns the functions px, py from values to positions in the drawing.
 function axes(svg, box, x, y, xlabel, ylabel) {
   const px = (value) => box.left + ((value - x[0]) / (x[1] - x[0])) * (box.width - box.left - box.right);
   const py = (value) => box.height - box.bottom - ((value - y[0]) / (y[1] - y[0])) * (box.height - box.top - box.bottom);
@@ -56,15 +56,16 @@ function drawing(parent, title, width, height) {
   return { figure, svg };
 }
 
-// chart: { title, xlabel, ylabel, lines: [{ x, y, colour, name }], levels: [{ y, name }], equal }. With `goTo`, a click
-// moves the cursor: to the time where x is time, else to the nearest point of the first line.
+// chart: { title, xlabel, ylabel, lines: [{ x, y, colour, name }], levels: [{ y, name }], timed, equal }. A click calls
+// `goTo` with a frame: that of the time clicked if x is time (`timed`), else that of the nearest point of the first line.
+// Returns a function that moves the cursor to a frame.
 function addChart(parent, chart, goTo) {
   const { figure, svg } = drawing(parent, chart.title, CHART.width, CHART.height);
   const levels = chart.levels ?? [];
   let x = padded(chart.lines.flatMap((line) => line.x), chart.timed ? 0 : 0.06);
   let y = padded([...chart.lines.flatMap((line) => line.y), ...levels.map((level) => level.y)]);
   const inner = [CHART.width - CHART.left - CHART.right, CHART.height - CHART.top - CHART.bottom];
-  if (chart.equal) [x, y] = equalised(x, y, ...inner);
+  if (chart.equal) [x, y] = withEqualScale(x, y, ...inner);
   const { px, py } = axes(svg, CHART, x, y, chart.xlabel, chart.ylabel);
   for (const level of levels) {
     element(svg, "line", { class: "level", x1: px(x[0]), x2: px(x[1]), y1: py(level.y), y2: py(level.y) });
@@ -79,8 +80,8 @@ function addChart(parent, chart, goTo) {
   const dots = chart.lines.map((line) => element(svg, "circle", { class: "dot", r: 4.5, style: `fill: ${line.colour}` }));
   svg.addEventListener("pointerdown", (event) => {
     const [line] = chart.lines;
-    const seen = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-    const distance = (i) => Math.hypot(px(line.x[i]) - seen.x, chart.timed ? 0 : py(line.y[i]) - seen.y);
+    const clicked = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    const distance = (i) => Math.hypot(px(line.x[i]) - clicked.x, chart.timed ? 0 : py(line.y[i]) - clicked.y);
     goTo(line.x.reduce((best, _, i) => (distance(i) < distance(best) ? i : best), 0));
   });
   return (frame) => {

@@ -1,4 +1,4 @@
-// The data of the run. Arrays come as base64 of little-endian float32; at(name, frame, ...indices) reads one number or row.
+// The data of the run. Arrays are stored as base64 of little-endian float32; `at` reads one number or vector.
 "use strict";
 
 const report = JSON.parse(document.getElementById("report-data").textContent);
@@ -11,7 +11,7 @@ function unpack({ shape, data }) {
 const frames = Object.fromEntries(Object.entries(report.frames).map(([name, packed]) => [name, unpack(packed)]));
 const frameCount = frames.time.shape[0];
 
-// at("centre", 7, 2) is the vector of surface 3 in frame 7; at("sliding", 7, 2) a number.
+// For example, at("centre", 7, 2) is the sphere centre of surface 3 in frame 7, and at("sliding", 7, 2) its sliding.
 function at(name, ...indices) {
   const { shape, values } = frames[name];
   let offset = 0;

@@ -1,4 +1,4 @@
-// One cursor for everything: the slider chooses a frame, and every view shows it.
+// Connects the slider to the views: all of them show the frame that the slider selects.
 "use strict";
 
 const find = (id) => document.getElementById(id);
@@ -19,8 +19,8 @@ function addCharts(parent) {
   const time = column((frame) => at("time", frame));
   const u = [0, 1].map((axis) => column((frame) => at("displacement", frame)[axis] * MILLI));
   const force = [0, 1].map((axis) => column((frame) => at("top_force", frame)[axis] * kilo));
-  const size = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-  const moving = [0, 1].filter((axis) => size(u[axis]) > 0.02 * Math.max(size(u[0]), size(u[1])));
+  const peak = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+  const moving = [0, 1].filter((axis) => peak(u[axis]) > 0.02 * Math.max(peak(u[0]), peak(u[1])));
   const [names, colours] = [["u₁", "u₂"], ["#0072B2", "#D55E00"]];
   const add = (chart) => views.push(addChart(parent, chart, show));
   for (const axis of moving.length ? moving : [0]) {
@@ -75,7 +75,7 @@ function addReadout() {
   });
 }
 
-// Plays in real time or a multiple of it.
+// Plays the run in real time or a multiple of it.
 function addPlayer() {
   let playing = false;
   let begun = 0;
@@ -123,7 +123,7 @@ function addSettings(scene) {
   for (const button of document.querySelectorAll("[data-view]")) {
     button.addEventListener("click", () => {
       scene.settings.view = button.dataset.view;
-      scene.look();
+      scene.setView();
     });
   }
 }

@@ -1,4 +1,4 @@
-// The stack in three dimensions, by three.js: bodies of revolution, cut open along the plane of the section. Metres.
+// The stack in three dimensions by three.js: bodies of revolution, cut along the plane of the section. Lengths in metres.
 "use strict";
 
 const SEGMENTS = 48;
@@ -6,7 +6,7 @@ const TONES = [0xa9b4be, 0xd3dae0];
 const FORCE = 0xc62828;
 const VIEWS = { oblique: [-0.35, -1, 0.42], side: [0, -1, 0.02], above: [0, -0.02, 1] };
 
-// Half meridians are turned about y in three.js; here the axis of a body is z, and the cut faces the viewer.
+// LatheGeometry turns a profile about y; the axis of a body is z here, and the cut faces the viewer.
 function revolved(points, open) {
   const profile = points.map(([r, h]) => new THREE.Vector2(r, h));
   const [start, length] = open ? [Math.PI / 2, Math.PI] : [0, 2 * Math.PI];
@@ -62,13 +62,13 @@ function label(text, colour, at, size) {
   return sprite;
 }
 
-// A grid along E1 and E2, and the three axes where they are seen.
+// A grid along E1 and E2, and the three axes at its corner.
 function floor(size) {
   const group = new THREE.Group();
   const grid = new THREE.GridHelper(size, 10, 0x888888, 0x888888).rotateX(Math.PI / 2);
   Object.assign(grid.material, { transparent: true, opacity: 0.35 });
   group.add(grid);
-  const [c, s] = horizontal; // behind the stack and to the left of the cut, whatever way that faces
+  const [c, s] = horizontal; // the corner behind the stack, to the left of a viewer of the cut
   const corner = new THREE.Vector3(-c - s, c - s, 0).multiplyScalar(size / 2);
   [["E₁", "#D55E00", [1, 0, 0]], ["E₂", "#009E73", [0, 1, 0]], ["E₃", "#0072B2", [0, 0, 1]]].forEach(([name, colour, way]) => {
     const tip = corner.clone().addScaledVector(new THREE.Vector3(...way), size / 6);
@@ -83,18 +83,18 @@ function floor(size) {
 function lights(scene) {
   scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b4bc, 2.6));
   const sun = new THREE.DirectionalLight(0xffffff, 1.9);
-  const [c, s] = horizontal; // from the viewer's left shoulder, who faces the cut
+  const [c, s] = horizontal; // light from the upper left of a viewer of the cut
   sun.position.set(-0.6 * c + s, -0.6 * s - c, 1.2);
   scene.add(sun);
 }
 
-// Gives { show, settings } of the view in `parent`, or null where the browser has no WebGL.
+// Adds the view to `parent`. Returns { show, setView, settings }, or null if the browser has no WebGL.
 function addScene(parent) {
   const canvas = element(parent, "canvas", { role: "img", "aria-label": "The bearing in three dimensions; drag to turn, wheel to zoom" });
   const context = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
   if (!context) {
     canvas.remove();
-    element(parent, "p", { class: "note" }, "This browser shows no WebGL: the bearing is drawn from the side only.");
+    element(parent, "p", { class: "note" }, "This browser has no WebGL: the bearing is drawn from the side only.");
     return null;
   }
   const renderer = new THREE.WebGLRenderer({ canvas, context, alpha: true });
@@ -127,7 +127,7 @@ function addScene(parent) {
     renderer.render(scene, camera);
   };
   controls.addEventListener("change", draw);
-  const look = () => {
+  const setView = () => {
     const [x, y, z] = VIEWS[settings.view];
     const [c, s] = horizontal;
     const away = new THREE.Vector3(c * x - s * y, s * x + c * y, z).normalize();
@@ -136,7 +136,7 @@ function addScene(parent) {
     controls.update();
     draw();
   };
-  const place = (frame) => {
+  const show = (frame) => {
     const [x, y, z] = settings.still ? [0, 0, 0] : at("base", frame);
     stack.position.set(x, y, z);
     forces.visible = settings.forces;
@@ -148,7 +148,7 @@ function addScene(parent) {
     marks.forEach(({ circle, line }, surface) => {
       circle.position.set(...at("centre", frame, surface));
       circle.scale.setScalar(at("circle", frame)[surface]);
-      stretch(line, at("line", frame, surface), at("force", frame, surface));
+      setForceLine(line, at("line", frame, surface), at("force", frame, surface));
     });
     draw();
   };
@@ -160,15 +160,16 @@ function addScene(parent) {
     camera.updateProjectionMatrix();
     draw();
   }).observe(parent);
-  look();
-  return { show: place, look, settings };
+  setView();
+  return { show, setView, settings };
 }
 
-// The line of force from the lowest to the highest friction circle; nothing where there is no force.
+// Heights between which lines of force are drawn: from the lowest to the highest friction circle.
 const heights = surfaceNumbers.flatMap((j) => [-1, 1].map((side) => at("centre", 0, j)[2] + side * 1.3 * report.surfaces[j].circle));
 const [lowest, highest] = [Math.min(0, ...heights), Math.max(...heights)];
 
-function stretch(line, point, force) {
+// Sets the ends of a line of force through `point` along `force`; hides it if there is no vertical force.
+function setForceLine(line, point, force) {
   line.visible = Math.abs(force[2]) > 0;
   if (!line.visible) return;
   const { position } = line.geometry.attributes;

@@ -1,5 +1,5 @@
-// The stack from the side, true to scale, with the line of force and the friction circles. What lies across the plane is
-// projected into it: exact for motion in one vertical plane, a view from the side for any other.
+// The stack from the side, to scale, with the line of force and the friction circles. All points are projected into the
+// plane of the section, which is exact for motion in that plane.
 "use strict";
 
 const MARGINS = { left: 58, right: 12, top: 12, bottom: 42 };
@@ -7,14 +7,14 @@ const WHOLE = { width: 420, height: 640, ...MARGINS };
 const CLOSE = { width: 760, height: 330, ...MARGINS };
 const MILLI = 1000;
 
-const seenAlong = (vector) => [vector[0] * horizontal[0] + vector[1] * horizontal[1], vector[2]];
+const projected = (vector) => [vector[0] * horizontal[0] + vector[1] * horizontal[1], vector[2]];
 
 // t_3 of a body, from its quaternion x, y, z, w.
 function axisOf([x, y, z, w]) {
   return [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)];
 }
 
-// Everything that is ever drawn must fit: bodies with their reach, or the friction circles as well.
+// Ranges [mm] that contain the bodies in all frames and, if `whole`, the friction circles.
 function extent(whole) {
   const x = [];
   const z = [];
@@ -22,13 +22,13 @@ function extent(whole) {
     report.bodies.forEach((pieces, body) => {
       const reach = Math.max(...pieces.flatMap((piece) => piece.points.map(([r]) => r)));
       const height = Math.max(...pieces.flatMap((piece) => piece.points.map(([, h]) => h)));
-      const [along, up] = seenAlong(at("bottom", frame, body));
+      const [along, up] = projected(at("bottom", frame, body));
       x.push(along - reach, along + reach);
       z.push(up, up + height);
     });
     report.surfaces.forEach(({ circle }, surface) => {
       if (!whole) return;
-      const [along, up] = seenAlong(at("centre", frame, surface));
+      const [along, up] = projected(at("centre", frame, surface));
       x.push(along - circle, along + circle);
       z.push(up - circle, up + circle);
     });
@@ -56,7 +56,7 @@ function addSection(parent, whole) {
   const box = whole ? WHOLE : CLOSE;
   const { svg } = drawing(parent, title, box.width, box.height);
   const inner = [box.width - box.left - box.right, box.height - box.top - box.bottom];
-  const [x, z] = equalised(...extent(whole), ...inner);
+  const [x, z] = withEqualScale(...extent(whole), ...inner);
   const degrees = fixed((report.azimuth * 180) / Math.PI, 0);
   const { px, py } = axes(svg, box, x, z, `along azimuth ${degrees}° from E₁ [mm]`, "height above the base [mm]");
   const scale = (px(1) - px(0)) * MILLI;
@@ -78,12 +78,12 @@ function addSection(parent, whole) {
     };
   });
   const screen = (vector) => {
-    const [along, up] = seenAlong(vector);
+    const [along, up] = projected(vector);
     return [px(along * MILLI), py(up * MILLI)];
   };
   return (frame) => {
     bodies.forEach((group, body) => {
-      const [along, up] = seenAlong(axisOf(at("turn", frame, body)));
+      const [along, up] = projected(axisOf(at("turn", frame, body)));
       const tilt = (Math.atan2(along, up) * 180) / Math.PI;
       const [left, top] = screen(at("bottom", frame, body));
       group.setAttribute("transform", `translate(${left.toFixed(2)} ${top.toFixed(2)}) rotate(${tilt.toFixed(4)})`);
@@ -92,7 +92,7 @@ function addSection(parent, whole) {
       const [cx, cy] = screen(at("centre", frame, surface));
       mark.circle.setAttribute("r", at("circle", frame)[surface] * scale);
       for (const circle of [mark.circle, mark.centre]) setAll(circle, { cx, cy });
-      setAll(mark.line, throughBox(screen(at("line", frame, surface)), seenAlong(at("force", frame, surface)), box));
+      setAll(mark.line, lineThroughBox(screen(at("line", frame, surface)), projected(at("force", frame, surface)), box));
     });
   };
 }
@@ -101,8 +101,8 @@ function setAll(node, attributes) {
   for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
 }
 
-// A line through a point of the picture from its lower to its upper edge; nothing where the force has no upward part.
-function throughBox([left, top], [along, up], box) {
+// Ends of a line through a point of the drawing, from its lower to its upper edge; a point if the force is horizontal.
+function lineThroughBox([left, top], [along, up], box) {
   if (!(Math.abs(up) > 0)) return { x1: 0, y1: 0, x2: 0, y2: 0 };
   const x = (y) => left - ((y - top) * along) / up;
   return { x1: x(box.height), y1: box.height, x2: x(0), y2: 0 };

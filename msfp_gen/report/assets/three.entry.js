@@ -1,4 +1,4 @@
-// What the page uses of three.js; docs/report.md says how three.min.js is made of it.
+// The parts of three.js that the HTML report uses; docs/report.md describes how three.min.js is built from them.
 export {
   BufferGeometry, CanvasTexture, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group,
   HemisphereLight, LatheGeometry, Line, LineBasicMaterial, LineLoop, Mesh, MeshStandardMaterial, PerspectiveCamera,

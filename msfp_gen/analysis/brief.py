@@ -1,0 +1,80 @@
+"""A run in a few lines of text, and as HTML with a small hysteresis loop for a notebook."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.analysis.summary import summarise
+
+if TYPE_CHECKING:
+    from msfp_gen.common.arrays import Array
+    from msfp_gen.results.run_data import RunData
+
+MAX_NOTES = 2  # printed; the others are counted
+MAX_POINTS = 600  # of the loop
+WIDTH, HEIGHT, MARGIN = 320, 200, 8  # of the loop [px]
+
+
+def brief_rows(result: RunData) -> list[tuple[str, str]]:
+    """Label and value of the main results, eight rows at most."""
+    summary, history = summarise(result), result.history
+    displacement, force = summary["peak_displacement"]["radial"], summary["peak_top_force"]["radial"]
+    ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
+    normal = history.normal_force
+    rows = [
+        ("status", result.status + (f": {result.message}" if result.message else "")),
+        ("time", f"{history.time[-1]:.6g} s in {summary['counters']['steps']} steps, {summary['wall_time']:.3g} s"),
+        ("peak displacement", f"{1e3 * displacement:.4g} mm"),
+        ("peak force", f"{1e-3 * force:.4g} kN{ratio}"),
+        ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in history.sliding.max(axis=0)) + " mm, bottom first"),
+        ("normal force", f"{1e-3 * normal.min():.4g} to {1e-3 * normal.max():.4g} kN"),
+    ]
+    notes = [note.line for note in result.notes]
+    more = f"; {len(notes) - MAX_NOTES} more in .notes" if len(notes) > MAX_NOTES else ""
+    return [*rows, *([("notes", "; ".join(notes[:MAX_NOTES]) + more)] if notes else [])]
+
+
+def brief_text(result: RunData) -> str:
+    """The main results, ten lines at most."""
+    lines = [f"{label:<18}{_one_line(value)}" for label, value in brief_rows(result)]
+    return "\n".join([f"Result of {result.scene.name or 'an unnamed scene'}", *(f"  {line}" for line in lines)])
+
+
+def brief_html(result: RunData) -> str:
+    """The main results as a table, beside the horizontal force over the displacement."""
+    rows = "".join(f"<tr><th>{escape(k)}</th><td>{escape(_one_line(v))}</td></tr>" for k, v in brief_rows(result))
+    title = escape(result.scene.name or "unnamed scene")
+    return (
+        f"<div><b>{title}</b><div style='display:flex;gap:1em'><table>{rows}</table>"
+        f"<figure style='margin:0'>{_loop(result)}<figcaption>force over displacement</figcaption></figure></div></div>"
+    )
+
+
+def _loop(result: RunData) -> str:
+    """Force over displacement, along the direction of the largest displacement, as SVG."""
+    history = result.history
+    peak = history.displacement[history.peak_row, :2]
+    size = float(np.hypot(*peak))
+    direction = peak / size if size else np.array([1.0, 0.0])
+    rows = np.unique(np.linspace(0, len(history.time) - 1, min(MAX_POINTS, len(history.time))).astype(int))
+    x = _scaled(history.displacement[rows, :2] @ direction, WIDTH)
+    y = HEIGHT - _scaled(history.top_force[rows, :2] @ direction, HEIGHT)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return (
+        f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="loop">'
+        f'<polyline points="{points}" fill="none" stroke="currentColor" stroke-width="1"/></svg>'
+    )
+
+
+def _scaled(values: Array, size: float) -> Array:
+    """Values mapped to a margin inside 0 ... `size`."""
+    low, spread = float(values.min()), float(np.ptp(values)) or 1.0
+    scaled: Array = MARGIN + (values - low) / spread * (size - 2 * MARGIN)
+    return scaled
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

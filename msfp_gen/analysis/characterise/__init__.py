@@ -1,0 +1,5 @@
+"""Effective properties of the loops, sliding regimes, and demands on the surfaces of a run (docs/characterise.md)."""
+
+from msfp_gen.analysis.characterise.report import Characterisation, Range, characterise
+
+__all__ = ["Characterisation", "Range", "characterise"]

@@ -1,0 +1,290 @@
+"""Characterisation of a run: closed cycles, first loading, demands on the surfaces, and envelope of the cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from msfp_gen.analysis.characterise.loops import REVERSAL, Loop, closed_cycles, effective_properties, turning_points
+from msfp_gen.analysis.characterise.stages import Branch, branch_of, signed_slip
+from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, surface_demands
+from msfp_gen.analysis.summary import axial_load
+from msfp_gen.analysis.transitions import is_monotonic, transitions
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.results.history import History
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+TRANSVERSE = 0.02  # largest transverse displacement of a motion in one direction, over the largest displacement
+REST_INTERVAL = 0.05  # last share of a run in which the bearing must be at rest
+REST_MOVEMENT = 0.01  # largest movement in it of a bearing at rest, over the largest displacement
+Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
+LOOP_QUANTITIES = (
+    "effective_stiffness",
+    "effective_period",
+    "energy_dissipated",
+    "effective_damping",
+    "zero_displacement_force",
+)
+NO_LOOP = "effective stiffness, damping, zero-displacement force and the sliding regimes of a cycle are not defined"
+
+
+@dataclass(frozen=True)
+class Range:
+    """Least, mean and largest value of a quantity over the cycles."""
+
+    least: float
+    mean: float
+    most: float
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One closed cycle, from a turning point to the next on the same side.
+
+    Attributes:
+        number: from 1.
+        start, end: times [s].
+        loop: effective properties.
+        effective_period: 2 pi sqrt(N/(g k_eff)) [s]; None without a constant load.
+        balance_energy: energy dissipated by friction, rims and top in this time by the energy balance [J], to compare
+            with the area of the loop.
+        branches: the half cycle to the opposite turning point, and the one back.
+        surfaces: demands on the surfaces within the cycle.
+    """
+
+    number: int
+    start: float
+    end: float
+    loop: Loop
+    effective_period: float | None
+    balance_energy: float
+    branches: tuple[Branch, Branch]
+    surfaces: tuple[SurfaceDemand, ...]
+
+    def stage_stiffness(self) -> dict[tuple[int, ...], float]:
+        """Sliding surfaces -> stiffness [N/m], mean of both half cycles; regimes in which all stick are left out."""
+        found: dict[tuple[int, ...], list[float]] = {}
+        for branch in self.branches:
+            for stage in branch.stages:
+                if stage.surfaces:
+                    found.setdefault(stage.surfaces, []).append(stage.stiffness)
+        return {surfaces: float(np.mean(values)) for surfaces, values in found.items()}
+
+
+@dataclass(frozen=True)
+class Characterisation:
+    """Result of `characterise`, in SI units; None for a quantity that is not defined, with the reason in `notes`.
+
+    Attributes:
+        name, status: of the run.
+        kind: "cycles" (one direction, with closed cycles), "monotonic", "one direction" (no closed cycle) or "two
+            directions".
+        direction: unit vector (E1, E2) of the largest displacement.
+        axial_load: constant axial load [N].
+        cycles: closed cycles.
+        first_loading: path from the start to the first turning point; None for a motion in two directions.
+        transitions: of a monotonic run (`transitions.transitions`).
+        envelope: of LOOP_QUANTITIES over the cycles.
+        surfaces: demands on the surfaces over the run.
+        peak_displacement, peak_force: largest horizontal displacement [m] and force [N].
+        secant_stiffness: force along the largest displacement, divided by it [N/m].
+        energy_dissipated: in the whole run, by the energy balance [J].
+        residual_displacement: horizontal displacement in the last row [m].
+        at_rest: whether the bearing is at rest by then.
+        maximum_uplift: of any surface [m].
+        notes: what is not defined, and why.
+    """
+
+    def __repr__(self) -> str:
+        """The main quantities in ten lines at most."""
+        stiffness = "-" if self.secant_stiffness is None else f"{1e-6 * self.secant_stiffness:.4g} kN/mm"
+        residual = "" if self.at_rest else ", still moving"
+        rows = {
+            "motion": f"{self.kind}, {len(self.cycles)} closed cycles",
+            "peak displacement": f"{1e3 * self.peak_displacement:.4g} mm",
+            "peak force": f"{1e-3 * self.peak_force:.4g} kN",
+            "secant stiffness": stiffness,
+            "energy dissipated": f"{1e-3 * self.energy_dissipated:.4g} kJ",
+            "residual": f"{1e3 * self.residual_displacement:.4g} mm{residual}",
+            **({"not defined": "; ".join(self.notes)} if self.notes else {}),
+        }
+        title = f"Characterisation of {self.name or 'an unnamed run'}, status {self.status}"
+        return "\n".join([title, *(f"  {label:<18}{value}" for label, value in rows.items())])
+
+    name: str
+    status: str
+    kind: Kind
+    direction: tuple[float, float]
+    axial_load: float | None
+    cycles: tuple[Cycle, ...]
+    first_loading: Branch | None
+    transitions: dict[str, float | None] | None
+    envelope: dict[str, Range]
+    surfaces: tuple[SurfaceDemand, ...]
+    peak_displacement: float
+    peak_force: float
+    secant_stiffness: float | None
+    energy_dissipated: float
+    residual_displacement: float
+    at_rest: bool
+    maximum_uplift: float | None
+    notes: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        return asdict(self)
+
+
+def characterise(result: RunData) -> Characterisation:
+    """Characterise a run; docs/characterise.md gives the formulas and the clauses of codes.
+
+    Raises InputError if the bearing did not move.
+    """
+    history = result.history
+    peak = float(history.horizontal.max())
+    if peak == 0.0:
+        raise InputError("characterise: the bearing did not move in this run; give a motion, or a longer duration")
+    row = history.peak_row
+    direction = history.displacement[row, :2] / history.horizontal[row]
+    cycles, first = _cycles_and_first_loading(result, direction)
+    kind = _kind(result, direction, cycles)
+    demands = surface_demands(result, slice(None))
+    uplifts = [demand.maximum_uplift for demand in demands if demand.maximum_uplift is not None]
+    at_rest = _at_rest(history, peak)
+    load = axial_load(result)
+    return Characterisation(
+        name=result.scene.name,
+        status=result.status,
+        kind=kind,
+        direction=(float(direction[0]), float(direction[1])),
+        axial_load=load,
+        cycles=cycles,
+        first_loading=first,
+        transitions=transitions(result, load) if kind == "monotonic" else None,
+        envelope=_envelope(cycles),
+        surfaces=demands,
+        peak_displacement=peak,
+        peak_force=float(np.hypot(*history.top_force[:, :2].T).max()),
+        secant_stiffness=float(history.top_force[row, :2] @ direction / history.horizontal[row]),
+        energy_dissipated=float(_dissipated(history)[-1]),
+        residual_displacement=float(history.horizontal[-1]),
+        at_rest=at_rest,
+        maximum_uplift=max(uplifts, default=None),
+        notes=tuple(_notes(result, kind, at_rest, demands)),
+    )
+
+
+def _cycles_and_first_loading(result: RunData, direction: Array) -> tuple[tuple[Cycle, ...], Branch | None]:
+    """Closed cycles and first loading of a motion in one direction; neither for any other motion."""
+    history = result.history
+    if not _is_straight(history, direction):
+        return (), None
+    u, force = (rows[:, :2] @ direction for rows in (history.displacement, history.top_force))
+    slip, plastic = signed_slip(result, direction)
+    turning = turning_points(u, REVERSAL * float(np.ptp(u)))
+
+    def branch(first: int, last: int) -> Branch:
+        rows = slice(first, last + 1)
+        return branch_of(u[rows], force[rows], slip[rows], plastic[rows], history.gap[rows])
+
+    cycles, dissipated, load = [], _dissipated(history), axial_load(result)
+    for number, (start, middle, end) in enumerate(closed_cycles(u, turning), 1):
+        rows = slice(start, end + 1)
+        loop = effective_properties(u[rows], force[rows], middle - start)
+        cycles.append(
+            Cycle(
+                number,
+                float(history.time[start]),
+                float(history.time[end]),
+                loop,
+                _period(loop.effective_stiffness, load, result.scene.bearing.gravity),
+                float(dissipated[end] - dissipated[start]),
+                (branch(start, middle), branch(middle, end)),
+                surface_demands(result, rows),
+            )
+        )
+    return tuple(cycles), branch(turning[0], turning[1]) if len(turning) > 1 else None
+
+
+def _is_straight(history: History, direction: Array) -> bool:
+    """Whether the motion is in one direction."""
+    transverse = history.displacement[:, :2] @ np.array([-direction[1], direction[0]])
+    return bool(np.abs(transverse).max() <= TRANSVERSE * history.horizontal.max())
+
+
+def _kind(result: RunData, direction: Array, cycles: Sequence[Cycle]) -> Kind:
+    """The kind of motion, as in `Characterisation.kind`."""
+    if cycles:
+        return "cycles"
+    if is_monotonic(result):
+        return "monotonic"
+    return "one direction" if _is_straight(result.history, direction) else "two directions"
+
+
+def _period(stiffness: float, load: float | None, gravity: float) -> float | None:
+    """Effective period [s]; None if the load is not constant or the stiffness not positive."""
+    return 2 * pi * sqrt(load / (gravity * stiffness)) if load and gravity and stiffness > 0 else None
+
+
+def _envelope(cycles: Sequence[Cycle]) -> dict[str, Range]:
+    """Quantity -> its range over the cycles in which it is defined."""
+    found = {}
+    for name in LOOP_QUANTITIES:
+        values = [v for v in (loop_quantity(cycle, name) for cycle in cycles) if v is not None]
+        if values:
+            found[name] = Range(min(values), float(np.mean(values)), max(values))
+    return found
+
+
+def loop_quantity(cycle: Cycle, name: str) -> float | None:
+    """One of LOOP_QUANTITIES of a cycle."""
+    value: float | None = getattr(cycle if name == "effective_period" else cycle.loop, name)
+    return value
+
+
+def _dissipated(history: History) -> Array:
+    """Energy dissipated since the start [J], shape (T,)."""
+    parts = [values for name, values in history.energy.items() if name.endswith("_dissipated")]
+    total: Array = np.sum(parts, axis=0)
+    return total
+
+
+def _at_rest(history: History, peak: float) -> bool:
+    """Whether the bearing moves by less than REST_MOVEMENT of its `peak` [m] in the last part of the run."""
+    begin = history.time[-1] - REST_INTERVAL * (history.time[-1] - history.time[0])
+    last = history.displacement[history.time >= begin, :2]
+    return bool(np.hypot(*np.ptp(last, axis=0)) <= REST_MOVEMENT * peak)
+
+
+def _notes(result: RunData, kind: Kind, at_rest: bool, demands: Sequence[SurfaceDemand]) -> list[str]:
+    """What is not defined in this run, and why."""
+    notes = []
+    if kind == "two directions":
+        notes.append(
+            f"the motion is in two directions and has no single loop: {NO_LOOP}; "
+            "peaks are radial, the secant stiffness is taken at the largest displacement"
+        )
+    elif kind in ("one direction", "monotonic"):
+        notes.append(f"no cycle closes: {NO_LOOP}; sliding regimes are given for the first loading")
+    if not at_rest:
+        notes.append(
+            "the bearing still moves when the run ends, so its last displacement is no residual displacement; "
+            "hold the motion at its end to let it come to rest"
+        )
+    unknown = [str(demand.surface) for demand in demands if demand.contact_area is None]
+    if unknown:
+        notes.append(
+            f"no radius of the slider is given, so no contact area and no heat flux: surface {', '.join(unknown)}"
+        )
+    if any(demand.maximum_uplift is None for demand in demands):
+        notes.append("uplift is not modelled in this run")
+    if axial_load(result) is None:
+        notes.append("no constant axial load: no effective period")
+    return notes

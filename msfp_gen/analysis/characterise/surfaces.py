@@ -1,0 +1,73 @@
+"""Demands on every sliding surface in a run: remaining capacity, slip velocity, heat flux, uplift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.results.sliding import separated
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+
+@dataclass(frozen=True)
+class SurfaceDemand:
+    """Extreme values of one surface over some rows.
+
+    Attributes:
+        surface: 1..n-1.
+        capacity_left: least gap to the rim [m]; negative where the rim is compressed.
+        capacity_left_share: the same over the capacity [-].
+        peak_velocity: largest slip velocity while the surface is in contact [m/s].
+        peak_heat_flux: largest mu N |v|/A [W/m^2]; None if A is not known.
+        heat: its integral over time [J/m^2]; None if A is not known.
+        contact_area: A = pi r^2, with r the radius of the sliding patch, else the rim radius of the slider [m^2]; None
+            if the bearing has neither.
+        maximum_uplift: largest opening of the surface [m]; None in a model without uplift.
+    """
+
+    surface: int
+    capacity_left: float
+    capacity_left_share: float
+    peak_velocity: float
+    peak_heat_flux: float | None
+    heat: float | None
+    contact_area: float | None
+    maximum_uplift: float | None
+
+
+def surface_demands(result: RunData, rows: slice) -> tuple[SurfaceDemand, ...]:
+    """Demands on every surface over `rows`, bottom first."""
+    history, bearing = result.history, result.scene.bearing
+    speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
+    power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
+    heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
+    has_uplift = result.scene.modelled.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
+    found = []
+    for i, surface in enumerate(bearing.surfaces):
+        gap, area = float(history.gap[rows, i].min()), _contact_area(result, i)
+        found.append(
+            SurfaceDemand(
+                i + 1,
+                gap,
+                gap / surface.capacity,
+                float(speed[:, i].max()),
+                float(power[:, i].max()) / area if area else None,
+                float(heat[i]) / area if area else None,
+                area,
+                float(history.lift[rows, i].max()) if has_uplift else None,
+            )
+        )
+    return tuple(found)
+
+
+def _contact_area(result: RunData, surface: int) -> float | None:
+    """Contact area of a surface (index from 0) [m^2]; None if no radius is given."""
+    bearing = result.scene.bearing
+    patch = bearing.surfaces[surface].patch_radius
+    radius = bearing.slider_rim_radius(surface) if patch is None else patch
+    return pi * radius**2 if radius > 0 else None

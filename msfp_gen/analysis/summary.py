@@ -1,0 +1,124 @@
+"""Summary of a run: the numbers that `msfp-gen run --json` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.analysis.transitions import is_monotonic, transitions
+from msfp_gen.common.arrays import Array
+from msfp_gen.results.history import LABELS, History
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+
+def summarise(result: RunData) -> dict[str, Any]:
+    """Summary of a run as plain data, ready for JSON; SI units; lists are one value per surface, bottom first.
+
+    Keys:
+        name, status, message: of the run.
+        notes: messages of monitors, one line each.
+        duration: simulated time [s].
+        peak_displacement, peak_top_force: largest magnitude along E1, E2, E3 and in the horizontal plane (`radial`)
+            [m], [N].
+        axial_load: constant axial load [N]; None without one.
+        peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
+        peak_sliding, minimum_gap: [m].
+        minimum_normal_force, maximum_normal_force: [N].
+        rims_met: surfaces (1..n-1) that reached their rim.
+        energy: see `energy_balance`.
+        counters: work of the solver.
+        wall_time: [s].
+        real_time_factor: simulated time over wall time; None if no time was measured.
+        least_friction, most_friction: coefficients, of runs with a friction law.
+        peak_temperature: [degC], of runs with a friction law that heats.
+        transitions: of monotonic runs, see `transitions.transitions`.
+    """
+    history, counters = result.history, asdict(result.counters)
+    duration = float(history.time[-1] - history.time[0])
+    wall_time = counters.pop("wall_time")
+    load = axial_load(result)
+    force = _peaks(history.top_force)
+    summary: dict[str, Any] = {
+        "name": result.scene.name,
+        "status": result.status,
+        "message": result.message,
+        "notes": [note.line for note in result.notes],
+        "duration": duration,
+        "peak_displacement": _peaks(history.displacement),
+        "peak_top_force": force,
+        "axial_load": load,
+        "peak_force_ratio": force["radial"] / load if load else None,
+        "peak_sliding": history.sliding.max(axis=0).tolist(),
+        "minimum_gap": history.gap.min(axis=0).tolist(),
+        "rims_met": rims_met(result),
+        "minimum_normal_force": history.normal_force.min(axis=0).tolist(),
+        "maximum_normal_force": history.normal_force.max(axis=0).tolist(),
+        "energy": energy_balance(history),
+        "counters": counters,
+        "wall_time": wall_time,
+        "real_time_factor": duration / wall_time if wall_time > 0 else None,
+    }
+    if history.friction_coefficient is not None:
+        summary["least_friction"] = history.friction_coefficient.min(axis=0).tolist()
+        summary["most_friction"] = history.friction_coefficient.max(axis=0).tolist()
+    if history.temperature is not None:
+        summary["peak_temperature"] = history.temperature.max(axis=0).tolist()
+    if is_monotonic(result):
+        summary["transitions"] = transitions(result, load)
+    return summary
+
+
+def energy_balance(history: History) -> dict[str, float | None]:
+    """Energy balance of a run.
+
+    Keys:
+        peak_input: largest magnitude of the input energy [J].
+        closure_error: largest magnitude of the numerical term over peak_input [-]; None without input.
+        dissipated_share: energy dissipated by friction, rims and dampers of the top over peak_input [-]; None without
+            input.
+    """
+    energy = history.energy
+    peak = float(np.abs(energy["input"]).max())
+    closure = float(np.abs(energy["numerical"]).max())
+    dissipated = float(sum(values[-1] for name, values in energy.items() if name.endswith("_dissipated")))
+    return {
+        "peak_input": peak,
+        "closure_error": closure / peak if peak else None,
+        "dissipated_share": dissipated / peak if peak else None,
+    }
+
+
+def rims_met(result: RunData) -> list[int]:
+    """Surfaces (1..n-1) whose slider reached its rim, by an event or by a gap of zero or less in some row."""
+    located = {event.surface for event in result.events if event.kind == "rim_contact"}
+    closed = np.flatnonzero((result.history.gap <= 0).any(axis=0)) + 1
+    return sorted(located | set(closed.tolist()))
+
+
+def axial_load(result: RunData) -> float | None:
+    """The constant axial load on the top plate [N]; None if there is none, or it varies."""
+    scene = result.scene
+    loads: dict[str, Callable[[Any], float]] = {
+        "rig": lambda top: top.axial_load,
+        "prescribed": lambda top: -top.force[2],
+        "mass": lambda top: top.mass * scene.bearing.gravity,
+    }
+    load = loads[scene.top.kind](scene.top)
+    if scene.load is not None:
+        vertical = scene.load.coefficients[:, 2]
+        if np.any(vertical[:, 1:]) or np.any(vertical[:, 0] != vertical[0, 0]):
+            return None
+        load -= float(vertical[0, 0])
+    return load if load > 0 else None
+
+
+def _peaks(vector: Array) -> dict[str, float]:
+    """Largest magnitude by axis and in the horizontal plane; `vector` has shape (T, 3)."""
+    magnitudes = np.abs(vector).max(axis=0).tolist()
+    radial = float(np.hypot(vector[:, 0], vector[:, 1]).max())
+    return dict(zip(LABELS["axis"], magnitudes, strict=True)) | {"radial": radial}

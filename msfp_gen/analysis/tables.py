@@ -1,0 +1,122 @@
+"""Tables of a run for the console (peaks, surfaces, transitions), and of many runs with one row each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.analysis.summary import summarise
+from msfp_gen.analysis.transitions import SYMBOLS
+from msfp_gen.common.tables import Table, yes
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+MEANINGS = {
+    "u_star": "surface 2 stops sliding",
+    "u_star_star": "surface 3 stops sliding",
+    "u_dr": "first contact with rim {}",
+    "F_dr": "force over axial load at first contact with rim {}",
+    "resolution": "largest spacing of rows at u* and u**",
+}
+
+
+def summary_tables(result: RunData) -> list[Table]:
+    """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
+    summary = summarise(result)
+    tables = [_run_table(summary), _surface_table(summary, result)]
+    if "transitions" in summary:
+        tables.append(transition_table(summary["transitions"]))
+    return tables
+
+
+def batch_table(results: Sequence[RunData]) -> Table:
+    """Many runs, one per row: status, peaks, number of rims met and wall time."""
+    rows = [
+        (
+            run["name"] or "unnamed scene",
+            run["status"],
+            f"{run['peak_displacement']['radial'] * 1e3:.2f}",
+            f"{run['peak_top_force']['radial'] * 1e-3:.3f}",
+            str(len(run["rims_met"])),
+            f"{run['wall_time'] * 1e3:.1f}",
+        )
+        for result in results
+        for run in (summarise(result),)
+    ]
+    columns = ("scene", "status", "peak displacement [mm]", "peak force [kN]", "rims met", "time [ms]")
+    return Table(f"{len(results)} runs", columns, rows)
+
+
+def _run_table(summary: Mapping[str, Any]) -> Table:
+    displacement, force, energy = summary["peak_displacement"], summary["peak_top_force"], summary["energy"]
+    ratio, counters = summary["peak_force_ratio"], summary["counters"]
+    over = "" if ratio is None else f", radial over axial load {ratio:.4f}"
+    rows = [
+        ("status", " - ".join(filter(None, (summary["status"], summary["message"])))),
+        ("time simulated", _speed(summary)),
+        ("peak displacement", f"{_peaks(displacement, 1e3)} mm"),
+        ("peak force on the top", f"{_peaks(force, 1e-3)} kN{over}"),
+        ("energy", _energy(energy)),
+        ("solver", ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counters.items() if count)),
+    ]
+    return Table(summary["name"] or "unnamed scene", (), rows)
+
+
+# Column -> (key of the values, scale, format). Columns whose key a run does not have are left out.
+SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
+    "peak sliding [mm]": ("peak_sliding", 1e3, ".2f"),
+    "capacity [mm]": ("capacity", 1e3, ".2f"),
+    "least gap [mm]": ("minimum_gap", 1e3, ".2f"),
+    "rim met": ("rim_met", 1, ""),
+    "least N [kN]": ("minimum_normal_force", 1e-3, ".3f"),
+    "peak N [kN]": ("maximum_normal_force", 1e-3, ".3f"),
+    "least mu": ("least_friction", 1.0, ".4f"),
+    "peak mu": ("most_friction", 1.0, ".4f"),
+    "peak T [degC]": ("peak_temperature", 1.0, ".1f"),
+}
+
+
+def _surface_table(summary: Mapping[str, Any], result: RunData) -> Table:
+    surfaces = result.scene.bearing.surfaces
+    values: dict[str, Any] = {
+        **summary,
+        "capacity": [surface.capacity for surface in surfaces],
+        "rim_met": [yes(index + 1 in summary["rims_met"]) for index in range(len(surfaces))],
+    }
+    columns = {name: column for name, column in SURFACE_COLUMNS.items() if column[0] in values}
+    rows = [
+        (str(index + 1), *(format(values[key][index] * scale, style) for key, scale, style in columns.values()))
+        for index in range(len(surfaces))
+    ]
+    return Table("surfaces, bottom first", ("surface", *columns), rows)
+
+
+def transition_table(transitions: Mapping[str, float | None]) -> Table:
+    """Transitions between the sliding regimes of a monotonic run; keys as in `transitions.transitions`."""
+    rows = []
+    for key, value in transitions.items():
+        kind = key.rstrip("0123456789")
+        shown = "none" if value is None else f"{value:.4f}" if kind == "F_dr" else f"{value * 1e3:.2f} mm"
+        rows.append((SYMBOLS.get(key, key), shown, MEANINGS[kind].format(key.removeprefix(kind))))
+    return Table("transitions between sliding regimes (PEER 2017/07, Table 4.2)", (), rows)
+
+
+def _peaks(peaks: Mapping[str, float], scale: float) -> str:
+    shown = {axis: value for axis, value in peaks.items() if axis != "E3"}
+    return ", ".join(f"{axis} {value * scale:.4g}" for axis, value in shown.items())
+
+
+def _speed(summary: Mapping[str, Any]) -> str:
+    factor = summary["real_time_factor"]
+    text = f"{summary['duration']:.6g} s in {summary['wall_time']:.3g} s"
+    return text if factor is None else f"{text}, {factor:.4g} times real time"
+
+
+def _energy(energy: Mapping[str, float | None]) -> str:
+    if energy["closure_error"] is None:
+        return "no energy input"
+    return (
+        f"balance closes to {energy['closure_error']:.2g} of the peak input {energy['peak_input']:.4g} J, "
+        f"{energy['dissipated_share']:.1%} dissipated"
+    )

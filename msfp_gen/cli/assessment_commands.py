@@ -1,0 +1,117 @@
+"""Commands for assessment: characterise, bound, factors."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.inputs import build, load_source, result_of
+from msfp_gen.errors import RunError
+
+if TYPE_CHECKING:
+    from msfp_gen.studies.bounding import Bounds
+
+app = typer.Typer()
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen characterise fenz-test5\n"
+    "  msfp-gen characterise out.nc --json\n  msfp-gen characterise scene.toml -o cycles.csv"
+)
+def characterise(
+    source: Annotated[
+        str, typer.Argument(metavar="SCENE", help="A scene file, the name of a preset, or a result (.nc).")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.csv", help="Write one row per cycle as CSV.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
+    from msfp_gen.analysis.characterise import characterise as characterise_run
+    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, characterisation_tables, write_csv
+    from msfp_gen.common.output import check_output
+
+    if output is not None:
+        check_output(output, CSV_SUFFIXES, "--output")
+    result, failure = result_of(load_source(source))
+    if failure is not None:
+        raise failure
+    found = characterise_run(result)
+    if as_json:
+        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        show(characterisation_tables(found))
+    if output is not None:
+        note(f"wrote {write_csv(found, output)}")
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen bound fenz-test5\n  msfp-gen bound scene.toml --factors mine.toml -o bounds\n"
+    "  msfp-gen factors asce7 > mine.toml   # a table to edit"
+)
+def bound(
+    scene: SceneName,
+    factors: Annotated[
+        str, typer.Option(metavar="FILE|NAME", help="A table of factors (TOML), or the name of one; see `factors`.")
+    ] = "asce7",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Write runs, numbers and the figure to this folder."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.studies.bounding import bound as run_bounds
+    from msfp_gen.studies.bounding import bounded_scenes, load_factors
+    from msfp_gen.studies.bounding.tables import bounding_tables
+
+    chosen, table = load_scene(scene), load_factors(factors)
+    bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
+    if output is not None:
+        make_folder(output, "--output")
+    build(chosen)
+    with ExitStack() as stack:
+        found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
+    if as_json:
+        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        show(bounding_tables(found))
+    written = _save(found, output) if output is not None else []
+    for path in written:
+        note(f"wrote {path}")
+    if not found.succeeded:
+        failed = "; ".join(f"{case.name}: {case.failure}" for case in found.cases if case.failure)
+        raise RunError(f"not all cases could be run; {failed}", status="bound")
+
+
+@app.command(epilog="Examples:\n\n\b\n  msfp-gen factors\n  msfp-gen factors asce7 > mine.toml")
+def factors(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Print this table as TOML, to edit it.")] = None,
+) -> None:
+    """List the tables of lambda factors that come with msfp-gen, or print one."""
+    from msfp_gen.common.tables import Table
+    from msfp_gen.studies.bounding import factor_tables, factor_text
+
+    if name is None:
+        show([Table("tables of property-modification factors", (), list(factor_tables().items()))])
+    else:
+        say(factor_text(name).rstrip("\n"))
+
+
+def _save(found: Bounds, folder: Path) -> list[Path]:
+    """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
+    from msfp_gen.studies.bounding.figure import plot_bounds
+    from msfp_gen.studies.bounding.tables import write_quantities
+
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases if case.result is not None]
+    plot_bounds(found, folder / "bounds.png")
+    return [*written, write_quantities(found, folder / "bounds.csv"), folder / "bounds.png"]

@@ -1,0 +1,201 @@
+"""Validation rules of input fields, written as annotations: one definition serves Python and scene files.
+
+A dataclass declares `radius: Annotated[float, Quantity("m", above=0)]` and calls `check_fields` in `__post_init__`. The
+reader of scene files builds its schema from the same annotations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
+from functools import lru_cache
+from numbers import Integral, Real
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from msfp_gen.common.quantities import to_si
+from msfp_gen.errors import InputError
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Rule of a field that holds finite numbers of one unit.
+
+    Attributes:
+        unit: SI unit; "" for a plain number.
+        above: exclusive lower bound [unit]; None: unbounded.
+        least: inclusive lower bound [unit]; None: unbounded.
+        shape: () for one number, (3,) for three numbers, (None, 3) for any number of triples.
+        whole: only integers are accepted.
+        pair: a single number is accepted for two equal ones.
+    """
+
+    unit: str
+    above: float | None = None
+    least: float | None = None
+    shape: tuple[int | None, ...] = ()
+    whole: bool = False
+    pair: bool = False
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` as a float, an int or nested tuples of them [unit]; with `text`, strings with units are accepted.
+
+        Raises ValueError that states the remedy only; the caller adds the field and the value.
+        """
+        if self.pair and not _is_sequence(value):
+            value = (value, value)
+        return self._parse(value, self.shape, text)
+
+    def _parse(self, value: object, shape: tuple[int | None, ...], text: bool) -> Any:
+        if not shape:
+            return self._number(value, text)
+        if not _is_sequence(value) or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
+            raise ValueError(self._remedy())
+        return tuple(self._parse(item, shape[1:], text) for item in value)  # type: ignore[attr-defined]
+
+    def _number(self, value: object, text: bool) -> float | int:
+        if text and isinstance(value, str):
+            value = to_si(value, self.unit)
+        kind = Integral if self.whole else Real
+        if isinstance(value, bool) or not isinstance(value, kind):
+            raise ValueError(self._remedy())
+        number = int(value) if self.whole else _float(value)  # type: ignore[call-overload]
+        too_low = (self.above is not None and number <= self.above) or (self.least is not None and number < self.least)
+        if too_low or not math.isfinite(_float(number)):
+            raise ValueError(self._remedy())
+        return number
+
+    def _remedy(self) -> str:
+        counts = ["any number of" if count is None else str(count) for count in self.shape]
+        noun = "whole number" if self.whole else "finite number"
+        head = f"give {' lists of '.join(counts)} {noun}s" if counts else f"give a {noun}"
+        bounds = {"above": self.above, "not below": self.least}
+        limit = "".join(f" {word} {bound:g}" for word, bound in bounds.items() if bound is not None)
+        return head + limit + (f" [{self.unit}]" if self.unit else "")
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Rule of a field that takes one of a few values: words, or True and False.
+
+    Attributes:
+        words: the permitted values; as a mapping, each with its meaning.
+    """
+
+    words: Collection[Any]
+
+    @property
+    def meanings(self) -> Mapping[Any, str]:
+        """Permitted value -> its meaning; "" where `words` gives none."""
+        return self.words if isinstance(self.words, Mapping) else dict.fromkeys(self.words, "")
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` itself if it is permitted. Raises ValueError that states the remedy only."""
+        if not any(type(value) is type(word) and value == word for word in self.words):
+            raise ValueError("give one of " + ", ".join(repr(word) for word in self.words))
+        return value
+
+
+@dataclass(frozen=True)
+class Text:
+    """Rule of a field that takes any text."""
+
+    def parse(self, value: object, *, text: bool = False) -> str:
+        """`value` itself if it is a text. Raises ValueError that states the remedy only."""
+        if not isinstance(value, str):
+            raise ValueError("give a text in quotes")
+        return value
+
+
+@dataclass(frozen=True)
+class Notes:
+    """Rule of a field that takes a table: names with texts or finite numbers as values."""
+
+    def parse(self, value: object, *, text: bool = False) -> dict[str, str | float]:
+        """A copy of `value`. Raises ValueError that states the remedy only."""
+        valid = isinstance(value, Mapping) and all(
+            isinstance(key, str) and (isinstance(item, str) or (isinstance(item, Real) and math.isfinite(_float(item))))
+            for key, item in value.items()
+        )
+        if not valid:
+            raise ValueError("give a table of texts and finite numbers")
+        return dict(value)  # type: ignore[call-overload, no-any-return]
+
+
+Rule = Quantity | Choice | Text | Notes
+
+
+def check_fields(instance: Any, path: str) -> None:
+    """Check every field of a frozen dataclass that has a rule, and replace its value by the normalised one.
+
+    None is accepted where it is the default. Raises InputError that names `path.field`, the value and the remedy.
+    """
+    for name, rule, default in ruled_fields(type(instance)):
+        value = getattr(instance, name)
+        if value is None and default is None:
+            continue
+        try:
+            object.__setattr__(instance, name, rule.parse(value))
+        except ValueError as error:
+            raise InputError(f"{path}.{name} = {value!r}: {error}") from None
+
+
+@contextmanager
+def errors_at(prefix: str, path: str) -> Iterator[None]:
+    """Replace `prefix` by `path` in every InputError of the block whose message begins with `prefix.`.
+
+    An object checks its fields under a short name, such as `surface.radius`. Where it is part of a larger input, the
+    message must name the field in that input, such as `bearing.surfaces[2].radius`.
+    """
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(path + text.removeprefix(prefix) if text.startswith(f"{prefix}.") else text) from None
+
+
+def require_type(value: object, kind: type | tuple[type, ...], path: str) -> None:
+    """Raise InputError unless `value` is an instance of `kind`."""
+    if not isinstance(value, kind):
+        names = " or ".join(each.__name__ for each in (kind if isinstance(kind, tuple) else (kind,)))
+        raise InputError(f"{path} = {value!r}: give a {names}")
+
+
+def ruled_fields(kind: type) -> Iterator[tuple[str, Rule, object]]:
+    """(name, rule, default) of every field of the dataclass `kind` that has a rule; MISSING for no default."""
+    rules = _rules(kind)
+    return ((field.name, rules[field.name], field.default) for field in dataclass_fields(kind) if field.name in rules)
+
+
+# Rules of fields that are annotated with a plain type.
+_TYPE_RULES: dict[Any, Rule] = {bool: Choice((True, False)), str: Text(), str | None: Text()}
+
+
+@lru_cache(maxsize=64)
+def _rules(kind: type) -> dict[str, Rule]:
+    hints = get_type_hints(kind, include_extras=True)
+    rules = {name: _rule(hint) for name, hint in hints.items()}
+    return {name: rule for name, rule in rules.items() if rule is not None}
+
+
+def _rule(hint: Any) -> Rule | None:
+    if hint in _TYPE_RULES:
+        return _TYPE_RULES[hint]
+    if get_origin(hint) is Literal:
+        return Choice(get_args(hint))
+    return next((item for item in getattr(hint, "__metadata__", ()) if isinstance(item, Rule)), None)
+
+
+def _float(value: Any) -> float:
+    """`value` as a float; infinity where it exceeds the range of a float."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _is_sequence(value: object) -> bool:
+    is_array = hasattr(value, "ndim") and hasattr(value, "__len__")  # recognises ndarrays without importing numpy
+    return (isinstance(value, Sequence) and not isinstance(value, str | bytes)) or (is_array and value.ndim > 0)  # type: ignore[attr-defined]

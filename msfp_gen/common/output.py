@@ -1,0 +1,82 @@
+"""Output files: paths are checked before any computation, and a file is written completely or not at all."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from glob import escape
+from pathlib import Path
+from secrets import token_hex
+
+from msfp_gen.errors import InputError
+
+FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
+DATASET_SUFFIXES = (".nc",)
+
+
+def check_output(path: str | Path, suffixes: Collection[str], name: str = "output") -> Path:
+    """`path`, if a file with one of `suffixes` can be written there. Raises InputError that begins with `name`."""
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{name} = {str(path)!r}: give a name that ends in {' or '.join(suffixes)}")
+    if path.is_dir():
+        raise InputError(f"{name} = {str(path)!r}: this is a folder; give a file name")
+    check_folder(path.parent, name)
+    return path
+
+
+def check_folder(folder: Path, name: str = "output") -> None:
+    """Raise InputError that begins with `name` unless `folder` exists and is writable."""
+    if not folder.is_dir():
+        raise InputError(f"{name}: folder {str(folder)!r} does not exist; create it or give another")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{name}: folder {str(folder)!r} cannot be written to; give another")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary path beside `path`: renamed to `path` if the block succeeds, deleted if it raises.
+
+    A process that is killed while writing leaves its temporary file behind; a later write to `path` deletes it.
+    """
+    clear_leftovers(path)
+    temporary = path.with_name(f".{path.stem}-{token_hex(4)}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path, parts: Iterable[bytes | memoryview]) -> None:
+    """Write a file completely or not at all: the bytes are flushed to disk before the file is renamed to `path`.
+
+    Raises OSError if the disk is full or the folder is not writable.
+    """
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        file.writelines(parts)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def clear_leftovers(path: Path, age: float = 3600.0) -> None:
+    """Delete temporary files of `path` that were last modified at least `age` [s] ago.
+
+    Younger ones may belong to a process that is still writing.
+    """
+    limit = time.time() - age
+    for temporary in path.parent.glob(f".{escape(path.stem)}-{'[0-9a-f]' * 8}{escape(path.suffix)}"):
+        with suppress(OSError):
+            if temporary.stat().st_mtime <= limit:
+                temporary.unlink()
+
+
+def make_folder(folder: Path, name: str = "output") -> None:
+    """Create `folder` if it does not exist. Raises InputError that begins with `name` if it cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{name} = {str(folder)!r}: {error.strerror}; give another folder") from error
+    check_folder(folder, name)

@@ -1,0 +1,215 @@
+"""Build of a compiled model: taken from the cache if it is there, else derived, lowered, emitted, compiled and stored.
+
+| stage | module | input -> output |
+|---|---|---|
+| derive, lower, emit | `msfp_gen.generator` | ModelSpec -> sources |
+| compile | `msfp_gen.jit.compiler` | sources and the runtime's C -> extension |
+| store | `msfp_gen.jit.cache` | folder -> entry with a manifest |
+| load | `msfp_gen.jit.build` | extension -> imported module |
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+
+from msfp_gen.errors import CompileError, InputError
+from msfp_gen.jit import cache
+from msfp_gen.jit.compiler import LOG_NAME, compile_extension
+from msfp_gen.specification.layout import ModelSpec
+
+Progress = Callable[[str, float], None]
+GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
+
+
+@dataclass(frozen=True)
+class BuildInfo:
+    """Location and build times of a compiled model.
+
+    Attributes:
+        path: the extension.
+        folder: folder of the extension, its sources, manifest and `build.log`.
+        module: name of the extension module.
+        spec: name of the model, `ModelSpec.key`.
+        cached: whether the cache held the model before the call.
+        stages: stage -> its time when the model was built, now or earlier [s].
+        seconds: duration of this call [s].
+        statements, operations: numbers of statements and of arithmetic operations of the emitted kernels.
+        key: cache key, the hash of all inputs that determine the compiled model.
+    """
+
+    path: Path
+    folder: Path
+    module: str
+    spec: str
+    cached: bool
+    stages: dict[str, float]
+    seconds: float
+    statements: int
+    operations: int
+    key: str = ""
+
+
+def prepare(spec: ModelSpec, progress: Progress | None = None) -> BuildInfo:
+    """Build the model unless the cache holds it; the extension is not imported.
+
+    Args:
+        spec: layout and effects.
+        progress: called with a text and the completed share of the build, 0 to 1.
+
+    Raises:
+        CompileError: no C compiler was found, or it rejected a file.
+        InputError: the cache folder cannot be written to.
+    """
+    begin = perf_counter()
+    entry = cache.Entry.of(spec)
+    manifest, built = entry.find(), False
+    if manifest is None:
+        notify = progress or _no_progress
+        with entry.building(notify) as part:
+            # Another process may have built it while this one waited for the lock.
+            manifest = entry.find()
+            if manifest is None:
+                manifest, built = _build(entry, part, notify), True
+                entry.publish(part)
+    return BuildInfo(
+        path=entry.folder / manifest.extension,
+        folder=entry.folder,
+        module=entry.module,
+        spec=spec.key,
+        cached=not built,
+        stages=manifest.stages,
+        seconds=perf_counter() - begin,
+        statements=manifest.statements,
+        operations=manifest.operations,
+        key=entry.key,
+    )
+
+
+def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType, BuildInfo]:
+    """Import the compiled module of a model, after building it if necessary; arguments and errors as of `prepare`."""
+    begin = perf_counter()
+    info = prepare(spec, progress)
+    extension = load_extension(info.path, info.module)
+    return extension, replace(info, seconds=perf_counter() - begin)
+
+
+def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None = None) -> BuildInfo:
+    """Write the sources and the compiled module of a model into `folder`, for a plain `import msfp_5_2_2`.
+
+    Each file is replaced in one rename, the manifest first and the extension last. Files that msfp-gen did not write
+    are never changed.
+
+    Raises
+    ------
+    InputError
+        If the folder holds files but no manifest of this tool, another layout, or a file of the same name that is not
+        in its manifest.
+
+    """
+    target = Path(folder).absolute()
+    replaceable = _replaceable_files(target, cache.module_name(spec))
+    info = prepare(spec, progress)
+    manifest = cache.Manifest.read(info.folder)
+    files = [cache.MANIFEST_NAME, *sorted(set(manifest.files) - {manifest.extension}), manifest.extension]
+    if foreign := [name for name in files if name not in replaceable and (target / name).exists()]:
+        raise InputError(
+            f"output folder {target}: msfp-gen did not write {foreign[0]}: move it away or name another folder"
+        )
+    with cache.write_errors(target, "output folder"):
+        target.mkdir(parents=True, exist_ok=True)
+        for name in files:
+            _replace(info.folder / name, target / name)
+    return replace(info, path=target / manifest.extension, folder=target)
+
+
+def load_extension(path: Path, module: str) -> ModuleType:
+    """Import the extension at `path` as `module`, without a change of `sys.path`. Raises CompileError."""
+    spec = importlib.util.spec_from_file_location(module, path)
+    if spec is None or spec.loader is None:
+        raise CompileError(f"{path} is not an extension that this Python can import")
+    try:
+        extension = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(extension)
+    except ImportError as error:
+        reason = str(error).partition("\n")[0]
+        raise CompileError(f"{path.name} does not load: {reason} (log: {path.parent / LOG_NAME})") from error
+    return extension
+
+
+def runtime_sources() -> dict[str, str]:
+    """Hand-written C files that are compiled with every model: file name, without its folder -> text.
+
+    Names are unique across the folders, so that generated sources lie in one folder.
+    """
+    files = sorted((cache.PACKAGE / "runtime").rglob("*.[ch]"))
+    return {path.name: path.read_text(encoding="utf-8") for path in files}
+
+
+def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest:
+    """Derive, lower, emit and compile a model into `folder`, and write its manifest."""
+    from msfp_gen.generator import generate
+
+    notify(f"deriving and emitting {entry.spec.key}", 0.0)
+    generated = generate(entry.spec, entry.module)
+    sources = {**runtime_sources(), **generated.files}
+    begin = perf_counter()
+    extension = compile_extension(
+        sources,
+        entry.module,
+        folder,
+        lambda done, count: notify(
+            f"compiling {entry.module} ({done} of {count} files)",
+            GENERATION_SHARE + (1 - GENERATION_SHARE) * done / count,
+        ),
+    )
+    manifest = cache.Manifest(
+        module=entry.module,
+        spec=entry.spec.key,
+        key=entry.key,
+        inputs=entry.inputs,
+        extension=extension.name,
+        files={path.name: cache.digest(path) for path in sorted(folder.iterdir())},
+        statements=generated.statements,
+        operations=generated.operations,
+        stages={**generated.stages, "compile": perf_counter() - begin},
+    )
+    manifest.write(folder)
+    return manifest
+
+
+def _replaceable_files(target: Path, module: str) -> set[str]:
+    """Names of the files in `target` that msfp-gen wrote and may replace.
+
+    Raises InputError if `target` is a file, holds files without a manifest, or holds another model.
+    """
+    if target.exists() and not target.is_dir():
+        raise InputError(f"output folder {target}: this is a file: name a folder")
+    if not target.exists() or not any(target.iterdir()):
+        return set()
+    try:
+        manifest = cache.Manifest.read(target)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"output folder {target}: it holds files that msfp-gen did not write: name a new or an empty folder"
+        ) from error
+    if manifest.module != module:
+        raise InputError(f"output folder {target}: it holds {manifest.module}: name another folder for {module}")
+    return {cache.MANIFEST_NAME, *manifest.files}
+
+
+def _replace(source: Path, target: Path) -> None:
+    """Copy a file; at any time `target` is the complete old or the complete new file."""
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    shutil.copyfile(source, part)
+    part.replace(target)
+
+
+def _no_progress(_: str, __: float) -> None:
+    """Progress callback that does nothing."""

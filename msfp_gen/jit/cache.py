@@ -1,0 +1,237 @@
+"""Cache of compiled models: location, keys, and verification of its entries.
+
+An entry is a folder `<module>-<key>` with a `manifest.json`. It is built in `<entry>.part-<process>` under the lock
+`<entry>.lock` and renamed when it is complete. A build that is killed leaves only the `.part` folder, which is never
+read; the next build deletes it. Finding an entry needs no lock and imports neither SymPy nor Cython.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from msfp_gen.errors import InputError
+from msfp_gen.jit.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler
+from msfp_gen.specification.layout import ModelSpec
+from msfp_gen.version import __version__
+
+MANIFEST_NAME = "manifest.json"
+PACKAGE = Path(__file__).parents[1]
+# (folder, pattern) of all sources that determine the content of a compiled model.
+SOURCES = (("specification", "*.py"), ("generator", "*.py"), ("templates", "*.jinja"), ("runtime", "*.[ch]"))
+TOOLS = ("sympy", "cython", "jinja2")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Description of an entry, stored as its `manifest.json`.
+
+    Attributes:
+        module: name of the extension module.
+        spec: name of the model, `ModelSpec.key`.
+        key: cache key, the sha256 of `inputs`.
+        inputs: all inputs that determine the compiled model.
+        extension: file name of the extension.
+        files: file name -> its sha256.
+        statements, operations: numbers of statements and of arithmetic operations of the emitted kernels.
+        stages: stage of the build -> its time [s].
+    """
+
+    module: str
+    spec: str
+    key: str
+    inputs: dict[str, Any]
+    extension: str
+    files: dict[str, str]
+    statements: int
+    operations: int
+    stages: dict[str, float]
+
+    @property
+    def text(self) -> str:
+        """Content of `manifest.json`: JSON whose last item is the sha256 of the others."""
+        values = asdict(self)
+        return json.dumps(values | {"sha256": _sha256(json.dumps(values))}, indent=1) + "\n"
+
+    def write(self, folder: Path) -> None:
+        """Write `manifest.json` into `folder`."""
+        (folder / MANIFEST_NAME).write_bytes(self.text.encode())
+
+    @classmethod
+    def read(cls, folder: Path) -> Manifest:
+        """Read and verify `manifest.json` of `folder`.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError, TypeError: the content is not that of a manifest, or was changed.
+        """
+        content = (folder / MANIFEST_NAME).read_bytes()
+        try:
+            values = dict(json.loads(content))
+        except RecursionError:
+            raise ValueError("the manifest is nested too deeply") from None
+        manifest = cls(**{name: value for name, value in values.items() if name != "sha256"})
+        if manifest.text.encode() != content:
+            raise ValueError("the manifest is not as it was written")
+        return manifest
+
+
+def cache_root() -> Path:
+    """Folder of the cache: `MSFP_GEN_CACHE`, else `build/models/` of a checkout, else the user's cache folder."""
+    if named := os.environ.get("MSFP_GEN_CACHE", "").strip():
+        return Path(named).expanduser().absolute()
+    checkout = PACKAGE.resolve().parent
+    if (checkout / "pyproject.toml").is_file() and (checkout / "build").is_dir():
+        return checkout / "build" / "models"
+    from platformdirs import user_cache_path
+
+    return user_cache_path("msfp-gen") / "models"
+
+
+def module_name(spec: ModelSpec) -> str:
+    """Name of the extension module, `msfp_<n>_<m>_<p>`."""
+    return f"msfp_{spec.layout.name}"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Location of one model in the cache, whether it is built or not.
+
+    Attributes:
+        spec: layout and effects.
+        module: name of the extension module.
+        inputs: all inputs that determine the extension: model, sources, versions of tools, compiler, flags. No derived
+            expression is among them, so that an entry is found without deriving the equations.
+        key: sha256 of `inputs`.
+        folder: folder of the entry.
+    """
+
+    spec: ModelSpec
+    module: str
+    inputs: dict[str, Any]
+    key: str
+    folder: Path
+
+    @classmethod
+    def of(cls, spec: ModelSpec) -> Entry:
+        """The entry of a model; reading the sources and asking the compiler for its version takes milliseconds."""
+        compiler = find_compiler()
+        inputs = {
+            "manifest": 2,
+            "spec": spec.key,
+            "sources": _digest_sources(),
+            "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
+            "abi": EXTENSION_SUFFIX,
+            "compiler": [*compiler.command, compiler.path, compiler.version],
+            "flags": {use: list(flags) for use, flags in FLAGS.items()},
+        }
+        key = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+        module = module_name(spec)
+        return cls(spec, module, inputs, key, cache_root() / f"{module}-{key[:20]}")
+
+    def find(self) -> Manifest | None:
+        """Manifest of the compiled model; None if it is not built or is damaged. A damaged one raises a warning."""
+        if not self.folder.is_dir():
+            return None
+        try:
+            manifest = Manifest.read(self.folder)
+            intact = manifest.key == self.key and manifest.extension in manifest.files
+            # The sources are verified too, since `generate_to` copies them.
+            intact = intact and all(digest(self.folder / name) == known for name, known in manifest.files.items())
+        except (OSError, ValueError, TypeError):
+            intact = False
+        # If the folder has disappeared by now, another process is replacing it.
+        if not intact and self.folder.is_dir():
+            warnings.warn(f"{self.folder} is damaged and is built again", RuntimeWarning, stacklevel=3)
+        if intact:
+            with suppress(OSError):  # records the time of last use for `msfp-gen cache --prune`
+                os.utime(self.folder / MANIFEST_NAME)
+        return manifest if intact else None
+
+    @contextmanager
+    def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
+        """Hold the lock of the entry and provide an empty folder to build in, for `publish`.
+
+        After an error the folder with its sources and log is kept until the next build of the entry.
+
+        Args:
+            progress: called with a text and the completed share of the build while another process holds the lock.
+        """
+        from filelock import FileLock, Timeout
+
+        part = self.folder.with_name(f"{self.folder.name}.part-{os.getpid()}")
+        with write_errors(self.folder.parent):
+            self.folder.parent.mkdir(parents=True, exist_ok=True)
+            lock = FileLock(f"{self.folder}.lock")
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                progress(f"waiting for another process that builds {self.module}", 0.0)
+                lock.acquire()
+        try:
+            with write_errors(self.folder.parent):
+                for abandoned in part.parent.glob(f"{self.folder.name}.part-*"):
+                    # Errors are ignored: the compiler of a killed build may still be writing there.
+                    shutil.rmtree(abandoned, ignore_errors=True)
+                part.mkdir()
+            yield part
+        finally:
+            lock.release()
+
+    def publish(self, part: Path) -> None:
+        """Rename the finished folder to the entry, after deleting a damaged predecessor. The lock must be held."""
+        with write_errors(self.folder.parent):
+            if self.folder.is_dir():
+                shutil.rmtree(self.folder)
+            part.rename(self.folder)
+
+
+@contextmanager
+def write_errors(folder: Path, field: str = "MSFP_GEN_CACHE") -> Iterator[None]:
+    """Convert an OSError of the block to an InputError that names `field`, `folder` and the remedy."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(
+            f"{field}: cannot write {folder} ({reason}): name a folder that you can write, with space left"
+        ) from error
+
+
+def digest(path: Path) -> str:
+    """The sha256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _digest_sources() -> str:
+    """The sha256 of names and contents of all files of `SOURCES`. Raises InputError if a folder has none."""
+    total = hashlib.sha256()
+    for folder, pattern in SOURCES:
+        files = sorted((PACKAGE / folder).rglob(pattern))
+        if not files:
+            raise InputError(f"{PACKAGE / folder}: no {pattern} here: install msfp-gen again (pip install msfp-gen)")
+        for path in files:
+            data = path.read_bytes()
+            total.update(f"{folder}/{path.relative_to(PACKAGE / folder).as_posix()}\0{len(data)}\0".encode())
+            total.update(data)
+    return total.hexdigest()
+
+
+def _version(tool: str) -> str:
+    try:
+        return metadata.version(tool)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,245 @@
+"""C compiler: finds it and compiles sources to one extension module.
+
+`compile_extension` writes the sources, runs Cython and the compiler on them (two commands at a time) and links. Every
+tool runs as a subprocess with its own working folder, so the state of this process does not change. Commands and their
+output are written to `build.log` beside the sources.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+from typing import NamedTuple
+
+from msfp_gen.errors import CompileError
+
+JOBS = 2
+LOG_NAME = "build.log"
+EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
+PLATFORM_COMPILERS = ("cc", "gcc", "clang")
+
+# Warnings appear in the log only: a newer compiler of a user may warn where those of the tests (-Werror) do not.
+# MSFP_GEN_CFLAGS adds flags for the C code of models, such as -march=native.
+FLAGS: dict[str, tuple[str, ...]] = {
+    "c": (
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-fPIC",
+        "-fvisibility=hidden",
+        "-O2",
+        "-fno-math-errno",
+        "-fno-trapping-math",
+        "-ffp-contract=off",
+    ),
+    "user": tuple(shlex.split(os.environ.get("MSFP_GEN_CFLAGS", ""))),
+    # Cython's output causes warnings and takes little of the run time: no warnings, little optimisation.
+    "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
+    "libraries": ("-lm",),
+}
+
+# Patterns of the line that states an error: gcc and clang, Cython, the linker.
+ERROR_PATTERNS = (
+    re.compile(r"^\S+:\d+(?::\d+)?: (?:fatal )?error: .*$", re.MULTILINE),
+    re.compile(r"^\S+\.pyx:\d+:\d+: .*$", re.MULTILINE),
+    re.compile(r"^.*(?:undefined reference|undefined symbol|multiple definition|Error:).*$", re.MULTILINE),
+)
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler that runs on this machine.
+
+    Attributes:
+        command: its command line, as separate words.
+        path: the executable.
+        version: first line of its `--version`.
+    """
+
+    command: tuple[str, ...]
+    path: str
+    version: str
+
+
+class Step(NamedTuple):
+    """One command of a build; `subject` is the file that it processes."""
+
+    subject: str
+    command: tuple[str, ...]
+
+
+def find_compiler() -> Compiler:
+    """The compiler that `CC` names, else the one that built Python, else cc, gcc or clang on the path.
+
+    Raises
+    ------
+    CompileError
+        If none runs; the message lists the names that were tried and how to install one.
+
+    """
+    chosen = os.environ.get("CC", "").strip()
+    candidates = [chosen] if chosen else [sysconfig.get_config_var("CC") or "", *PLATFORM_COMPILERS]
+    for candidate in filter(None, candidates):
+        words = shlex.split(candidate)
+        path = shutil.which(words[0])
+        if path is not None and (version := _version(words)):
+            return Compiler(tuple(words), path, version)
+    tried = f"CC={chosen}" if chosen else ", ".join(dict.fromkeys(filter(None, candidates)))
+    raise CompileError(
+        f"no C compiler found (looked for {tried}): install one (apt install gcc, xcode-select --install, "
+        "conda install c-compiler) or name it with CC=..."
+    )
+
+
+def check_headers() -> Path:
+    """Folder of `Python.h`. Raises CompileError with the remedy if the headers of Python are not installed."""
+    include = Path(sysconfig.get_path("include"))
+    if not (include / "Python.h").is_file():
+        raise CompileError(f"Python.h is not in {include}: install the Python headers (apt install python3-dev)")
+    return include
+
+
+def compile_extension(
+    sources: dict[str, str],
+    module: str,
+    folder: Path,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Write `sources` into `folder` and build the extension `module` there.
+
+    Parameters
+    ----------
+    sources
+        File name -> text: any number of `.c` and `.h` files and the wrapper `<module>.pyx`.
+    module
+        Name under which the extension is imported.
+    folder
+        Working folder; sources, `build.log` and the extension remain there, also after a failure.
+    progress
+        Called with the number of compiled C files and the number of all.
+
+    Returns
+    -------
+    Path
+        The extension, `folder / (module + EXTENSION_SUFFIX)`.
+
+    Raises
+    ------
+    CompileError
+        If a tool is missing or rejects a file; one line with the file, the first error and the log.
+
+    """
+    compiler, include = find_compiler(), check_headers()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in sources.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    log = Log(folder)
+    units = sorted(name for name in sources if name.endswith(".c"))
+    chains = [_wrapper_steps(module, compiler, include), *([_compile_step(name, compiler)] for name in units)]
+    for done in _run_parallel(chains, log.run):
+        if progress is not None:
+            progress(done, len(chains))
+    objects = [_object_file(name) for name in [*units, f"{module}.c"]]
+    target = folder / f"{module}{EXTENSION_SUFFIX}"
+    log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
+    for name in objects:
+        (folder / name).unlink()
+    return target
+
+
+class Log:
+    """Runs the steps of a build in a folder and writes each command with its output to `build.log` there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.path = folder / LOG_NAME
+        self.path.write_text("", encoding="utf-8")
+
+    def run(self, step: Step) -> None:
+        """Run one step. Raises CompileError if its exit status is not 0."""
+        # `ERROR_PATTERNS` expect English messages.
+        environment = {**os.environ, "LC_ALL": "C"}
+        done = subprocess.run(
+            step.command,
+            cwd=self.folder,
+            env=environment,
+            text=True,
+            errors="replace",
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        command = shlex.join(step.command)
+        with self.path.open("a", encoding="utf-8") as stream:
+            stream.write(f"$ {command}\n{done.stdout}[exit {done.returncode}]\n\n")
+        if done.returncode != 0:
+            message = f"cannot compile {step.subject}: {first_error(done.stdout, done.returncode)} (log: {self.path})"
+            raise CompileError(message, command=command, log=self.path, output=done.stdout)
+
+
+def first_error(output: str, code: int) -> str:
+    """The line of a tool's output that states the error; `code` is its exit status."""
+    for pattern in ERROR_PATTERNS:
+        if found := pattern.search(output):
+            return found.group().strip()
+    lines = output.split("\n")
+    return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
+
+
+def _run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
+    """Run all chains, `JOBS` at a time, and yield the number of finished ones; after a failure no chain is started."""
+
+    def run_chain(chain: Sequence[Step]) -> None:
+        for step in chain:
+            run(step)
+
+    with ThreadPoolExecutor(JOBS) as pool:
+        tasks = [pool.submit(run_chain, chain) for chain in chains]
+        try:
+            yield 0
+            for count, task in enumerate(as_completed(tasks), start=1):
+                task.result()
+                yield count
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _compile_step(name: str, compiler: Compiler) -> Step:
+    return Step(name, (*compiler.command, *FLAGS["c"], *FLAGS["user"], "-c", name, "-o", _object_file(name)))
+
+
+def _wrapper_steps(module: str, compiler: Compiler, include: Path) -> list[Step]:
+    """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation."""
+    pyx, c = f"{module}.pyx", f"{module}.c"
+    cython = (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c)
+    return [
+        Step(pyx, cython),
+        Step(c, (*compiler.command, *FLAGS["wrapper"], "-I", str(include), "-c", c, "-o", _object_file(c))),
+    ]
+
+
+def _link_command(compiler: Compiler) -> tuple[str, ...]:
+    """The linker options that Python was built with, for the given compiler."""
+    platform = shlex.split(sysconfig.get_config_var("LDSHARED") or "cc -shared")
+    return (*compiler.command, *platform[1:])
+
+
+def _object_file(name: str) -> str:
+    return f"{Path(name).stem}.o"
+
+
+def _version(words: Sequence[str]) -> str:
+    """First line of `<compiler> --version`; empty if that fails, as for a stub that only offers to install one."""
+    done = subprocess.run([*words, "--version"], text=True, errors="replace", capture_output=True)
+    return done.stdout.partition("\n")[0].strip() if done.returncode == 0 else ""

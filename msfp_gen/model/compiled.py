@@ -1,0 +1,102 @@
+"""Types of the classes `Stack` and `Run` of a compiled module (`templates/module.pyx.jinja`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from msfp_gen.common.arrays import Array
+
+EventRow = tuple[float, int, int, tuple[float, ...], tuple[float, ...]]
+
+
+class Stack(Protocol):
+    """One bearing with its top. Arrays are contiguous float64 in SI units.
+
+    heat: keyword `rise`, the temperature above its start value [K], for friction laws with temperature.
+    """
+
+    def accelerations(
+        self, q: Array, v: Array, f: Array, base: Array, load: Array, *, report: bool = False, **heat: Array
+    ) -> tuple[str, Array, Array, Array, float, int, int, Array | None]:
+        """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns."""
+
+    def observe(
+        self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **heat: Array
+    ) -> tuple[Array, Array, Array, int]:
+        """Row, powers, friction rates, and the surface that would have to transmit tension (0: none)."""
+
+    def condensed(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        f: Array,
+        base: Array,
+        load: Array,
+        cq: float,
+        cv: float,
+        ca: float,
+        beta: float,
+        **heat: Array,
+    ) -> tuple[str, Array, Array, Array]:
+        """Status, residual, tangent, and Y, Z of the condensed equations."""
+
+    def report(
+        self,
+        q: Array,
+        v: Array,
+        f: Array,
+        base: Array,
+        load: Array,
+        unknowns: Array,
+        variables: Sequence[tuple[int, int, int]] = (),
+    ) -> tuple[Array, Array, Array]:
+        """Residual of the balances (3.26)-(3.29), its Jacobian, and that of the friction rates."""
+
+    def vectors(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array, Array]:
+        """Named points, rotations and bases (3.1)-(3.12)."""
+
+
+class Run(Protocol):
+    """A run of the compiled integrator, in progress or ended."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    @property
+    def status(self) -> tuple[str, int, float]:
+        """Name, surface (from 1, 0: none) and value."""
+
+    @property
+    def trips(self) -> dict[str, tuple[float, int, float]]:
+        """Monitors that tripped: name -> time, surface, value."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters."""
+
+    @property
+    def row_count(self) -> int:
+        """Number of recorded rows."""
+
+    @property
+    def rows(self) -> Array:
+        """Recorded rows, shape (T, row size)."""
+
+    @property
+    def events(self) -> list[EventRow]:
+        """Time, surface, kind, displacement and top force of every event."""
+
+    def advance(self, steps: int = 2000) -> bool:
+        """Take at most `steps` steps; False where the run has ended."""
+
+    def record_now(self) -> None:
+        """Record a row of the current state, unless there is one."""
+
+    def snapshot(self, rows: int = -1) -> bytes:
+        """State, with so many of the last rows and no events; negative: with all rows and events."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""

@@ -1,0 +1,295 @@
+"""`Model`: evaluation of the equations, the balances (3.26)-(3.29), the named vectors; `build_model`."""
+
+from __future__ import annotations
+
+import threading
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.jit.build import BuildInfo, Progress, load
+from msfp_gen.model.columns import columns
+from msfp_gen.model.compiled import Stack
+from msfp_gen.model.evaluation import FAILURES, Evaluation, named_vectors
+from msfp_gen.model.marshalling import bodies_and_surfaces, top_values, vector
+from msfp_gen.model.ode import Ode
+from msfp_gen.model.plane import State, into_plane, out_of_plane
+from msfp_gen.scene.friction_parameters import check_bearing, law_parameters
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.top import Top
+
+Triple = tuple[float, float, float]
+Rotation = tuple[ArrayLike, ArrayLike, ArrayLike]
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+_models: dict[ModelSpec, Model] = {}
+_models_lock = threading.Lock()
+
+
+class Model:
+    """Compiled equations of one layout with one set of effects; made by `build_model`.
+
+    A planar model has the same array shapes as a spatial one. It accepts states in the E1-E3 or the E2-E3 plane.
+    """
+
+    def __init__(self, spec: ModelSpec, extension: ModuleType, info: BuildInfo) -> None:
+        self.spec = spec
+        self.layout = spec.layout
+        self.effects = spec.effects
+        self.extension = extension
+        self.info = info
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle layout and effects alone: the model is loaded from the cache, or built, where it is unpickled."""
+        return build_model, (self.layout, self.effects)
+
+    def __repr__(self) -> str:
+        return f"Model({self.spec.key})"
+
+    @property
+    def planar(self) -> bool:
+        """Whether the model is planar."""
+        return self.effects.dimension == "planar"
+
+    def stack(self, bearing: Bearing, top: Top | None = None, anchor: ArrayLike = (0.0, 0.0)) -> Stack:
+        """The compiled stack of one bearing and top.
+
+        anchor: horizontal position of the fixed end of the springs of a rig, shape (2,) [m]. Raises InputError where
+        the bearing does not belong to this model.
+        """
+        if bearing.layout != self.layout:
+            raise InputError(f"bearing.layout = {bearing.layout.name}: this model is for {self.layout.name}")
+        check_bearing(self.effects.law, self.effects.friction, bearing)
+        values = bodies_and_surfaces(bearing, self.effects)
+        stack: Stack = self.extension.Stack(bearing.gravity, *values, top_values(top, anchor))
+        return stack
+
+    def evaluate(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        *,
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+        temperature: ArrayLike | None = None,
+        formulation: str = "condensed",
+    ) -> Evaluation:
+        """Accelerations, normal forces and friction rates at a state.
+
+        q, v: angles psi, theta, phi of bodies 2..n and rates, shape (n-1, 3) [rad], [rad/s]. h: Y, Z, shape (n-1, 2)
+        [-]. base_acceleration: shape (3,) [m/s^2]. top_force, top_moment: external load on the top plate at r_nn, shape
+        (3,) [N], [N m]. base_rotation: (angles, rates, accelerations) of psi_1, theta_1, phi_1, each of shape (3,)
+        [rad], [rad/s], [rad/s^2]. temperature: shape (n-1,) [degC], for a friction law with temperature; None: start
+        temperatures. formulation: "condensed" (contact in closed form), or "report" (Newton's method on all 6(n-1)
+        unknowns of (2.119)). Raises InputError for wrong shapes; RunError where no acceleration exists or is found.
+        """
+        if formulation not in ("condensed", "report"):
+            raise InputError(f"formulation = {formulation!r}: give 'condensed' or 'report'")
+        state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
+        stack, heat = self.stack(bearing), self._heat(bearing, temperature)
+        if self.effects.sliders == "massless":
+            return self._quasistatic(stack, state, heat)
+        status, a, row, rates, residual, iterations, sign, _ = stack.accelerations(
+            state.q, state.v, state.f, state.base, state.load, report=formulation == "report", **heat
+        )
+        if status != "ok":
+            raise RunError(
+                f"evaluate: {FAILURES.get(status, status)} ({iterations} iterations, residual {residual:.3g})",
+                status=status,
+            )
+        return self._evaluation(state, a, row, rates, residual, iterations, sign)
+
+    def _heat(self, bearing: Bearing, temperature: ArrayLike | None) -> dict[str, Array]:
+        """Keyword `rise` of the stack: temperature above its start value, shape (n-1,) [K]."""
+        law = self.effects.law
+        if temperature is None:
+            return {}
+        if law is None or not law.depends_on_temperature:
+            raise InputError(f"temperature: effects.friction = {self.effects.friction!r} depends on none; leave it out")
+        count = self.layout.surfaces
+        start = [law_parameters(law, bearing, index)["start_temperature"] for index in range(count)]
+        return {"rise": vector(temperature, "temperature", (count,), "degC") - start}
+
+    def _quasistatic(self, stack: Stack, state: State, heat: dict[str, Array]) -> Evaluation:
+        """Evaluation of a massless model: the residual moments measure the distance from equilibrium."""
+        zero = np.zeros_like(state.q)
+        status, residual, _, _ = stack.condensed(
+            state.q, state.v, zero, state.f, state.base, state.load, 0.0, 0.0, 0.0, 0.0, **heat
+        )
+        if status != "ok":
+            raise RunError(f"evaluate: {FAILURES.get(status, status)}", status=status)
+        row, _, rates, in_tension = stack.observe(state.q, state.v, zero, state.f, state.base, state.load, **heat)
+        if in_tension:
+            raise RunError(f"evaluate, surface {in_tension}: {FAILURES['uplift']}", status="uplift")
+        fields = self.unpack(row)
+        size = float(np.max(np.abs(residual)) / max(float(np.max(fields["normal"])), 1e-12))
+        return self._evaluation(state, None, row, rates, size, 0, 0)
+
+    def _evaluation(
+        self, state: State, a: Array | None, row: Array, rates: Array, residual: float, iterations: int, sign: int
+    ) -> Evaluation:
+        fields = self.unpack(row)
+        turn = state.azimuth
+        return Evaluation(
+            acceleration=None if a is None else out_of_plane(a, turn, "angles"),
+            normal_force=fields["normal"],
+            contact_angles=out_of_plane(fields["angles"], turn, "pair_angles"),
+            friction_rate=out_of_plane(rates, turn, "pair"),
+            interface_force=out_of_plane(fields["force"], turn, "vector"),
+            slip_velocity=out_of_plane(fields["slip"], turn, "pair"),
+            friction_coefficient=fields.get("mu"),
+            sliding=fields["sliding"],
+            gap=fields["gap"],
+            residual_norm=float(residual),
+            newton_iterations=int(iterations),
+            determinant=int(sign),
+        )
+
+    def unpack(self, rows: Array) -> dict[str, Array]:
+        """Recorded rows, shape (..., row size), as arrays by name; `ROW` of the extension has names and shapes."""
+        out, start = {}, 0
+        for name, shape in self.extension.ROW:
+            size = int(np.prod(shape, dtype=int))
+            out[name] = rows[..., start : start + size].reshape(rows.shape[:-1] + shape)
+            start += size
+        return out
+
+    def residual(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        unknowns: ArrayLike,
+        *,
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+    ) -> Array:
+        """Residual of the momentum balances (3.26)-(3.29) at given unknowns: left side less right side.
+
+        unknowns: shape (6(n-1),) in the order of (2.119): accelerations psi'', theta'', phi'' body by body [rad/s^2],
+        psi~, theta~ surface by surface [rad], N [N]. Returns ndarray, shape (6(n-1),): for each body the linear balance
+        along E1, E2, E3 [N], then the angular one along t_1, t_2, t_3 of the body [N m]; with locked spin, phi'' takes
+        the place of the axial component. A planar model has 3(n-1) unknowns (theta'', theta~, N) and balances (E1, E3,
+        t_2). Other inputs and errors as in `evaluate`.
+        """
+        state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
+        values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
+        residual: Array = self.stack(bearing).report(state.q, state.v, state.f, state.base, state.load, values)[0]
+        return residual
+
+    def jacobian(
+        self,
+        bearing: Bearing,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        unknowns: ArrayLike,
+        *,
+        wrt: str = "unknowns",
+        base_acceleration: ArrayLike = ZERO,
+        top_force: ArrayLike = ZERO,
+        top_moment: ArrayLike = ZERO,
+        base_rotation: Rotation | None = None,
+    ) -> Array:
+        """Jacobian of `residual`, ndarray, shape (6(n-1), k).
+
+        wrt: "unknowns" (k = 6(n-1), their order); "state" (k = 8(n-1): q, v, h, each flattened); "inputs" (k = 24: base
+        displacement, velocity, acceleration; psi_1, theta_1, phi_1, rates, accelerations; top force; top moment).
+        Other inputs and errors as in `residual`.
+        """
+        variables = columns(wrt, self.layout.surfaces, self.planar)
+        state = self._state(q, v, h, base_acceleration, base_rotation, top_force, top_moment)
+        values = vector(unknowns, "unknowns", (self.extension.UNKNOWNS,), "rad/s^2, rad, N")
+        stack = self.stack(bearing)
+        jacobian: Array = stack.report(state.q, state.v, state.f, state.base, state.load, values, variables)[1]
+        return jacobian
+
+    def kinematics(
+        self, bearing: Bearing, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, base: ArrayLike | None = None
+    ) -> dict[str, Array]:
+        """Every named vector of (3.1)-(3.12) with velocity and acceleration.
+
+        q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2]. base: shape
+        (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad], and their first and second derivatives; None: zero.
+        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], "v_..." [m/s], "a_..." [m/s^2], "omega_k" and
+        "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. Components along E1,
+        E2, E3. Raises InputError for wrong shapes and planar models.
+        """
+        if self.planar:
+            raise InputError("kinematics: not available for a planar model; build it with dimension = 'spatial'")
+        shape = (self.layout.surfaces, 3)
+        q, v, a = (vector(x, name, shape, "rad") for x, name in ((q, "q"), (v, "v"), (a, "a")))
+        motion = vector(np.zeros((3, 6)) if base is None else base, "base", (3, 6), "m, rad")
+        points, rotations, bases = self.stack(bearing).vectors(q, v, a, motion)
+        return named_vectors(self.layout.n, points, rotations, bases)
+
+    def as_ode(self, bearing: Bearing, motion: Motion, top: Top) -> Ode:
+        """The model as y' = fun(t, y) with its Jacobian, for library integrators such as SciPy's; see `ode.Ode`."""
+        return Ode(self, bearing, motion, top)
+
+    def _state(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        h: ArrayLike,
+        acceleration: ArrayLike,
+        rotation: Rotation | None,
+        force: ArrayLike,
+        moment: ArrayLike,
+    ) -> State:
+        count = self.layout.surfaces
+        base = np.zeros((3, 6))
+        base[2, :3] = vector(acceleration, "base_acceleration", (3,), "m/s^2")
+        if rotation is not None:
+            base[:, 3:] = vector(np.asarray(rotation, dtype=float), "base_rotation", (3, 3), "rad, rad/s, rad/s^2")
+        load = np.concatenate([vector(force, "top_force", (3,), "N"), vector(moment, "top_moment", (3,), "N m")])
+        state = State(
+            vector(q, "q", (count, 3), "rad"),
+            vector(v, "v", (count, 3), "rad/s"),
+            vector(h, "h", (count, 2), "-"),
+            base,
+            load,
+        )
+        return into_plane(state) if self.planar else state
+
+
+def build_model(layout: Layout, effects: Effects | None = None, *, progress: Progress | None = None) -> Model:
+    """The compiled model of a layout: derived, emitted and compiled once, then imported from the cache.
+
+    Parameters
+    ----------
+    layout, effects
+        They determine the equations; `effects=None` means `Effects()`.
+    progress
+        Called with the name of the current step of the build and the completed share, 0 to 1; None: no calls.
+
+    Raises
+    ------
+    CompileError
+        If there is no C compiler or it refuses the emitted sources.
+    InputError
+        If the cache cannot be written.
+
+    """
+    spec = ModelSpec(layout, Effects() if effects is None else effects)
+    if (model := _models.get(spec)) is not None:  # read without the lock, which another thread may hold during a build
+        return model
+    with _models_lock:
+        if spec not in _models:
+            _models[spec] = Model(spec, *load(spec, progress))
+        return _models[spec]

@@ -1,0 +1,146 @@
+"""Planar models in any vertical plane: inputs rotated into its frame, results back (docs/model.md, choice 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+
+Kind = Literal["angles", "pair_angles", "pair", "vector", "axial"]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """State, base motion and load as arguments of a compiled stack.
+
+    azimuth: of the E1 axis of their frame in the frame of the user [rad].
+    """
+
+    q: Array
+    v: Array
+    f: Array
+    base: Array
+    load: Array
+    azimuth: float = 0.0
+
+
+def rotated(vectors: Array, angle: float) -> Array:
+    """Components (..., 3) of vectors in a frame that is rotated by `angle` [rad] about E3."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.ascontiguousarray(vectors @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
+    """Angles psi, theta, phi of tilts in the E1-E3 plane (azimuth 0) or the E2-E3 plane (pi/2) as theta alone.
+
+    q: shape (..., 3) [rad]; `name` is used in messages. Raises InputError for tilts outside the plane.
+    """
+    across, along, sign = (0, 1, 1.0) if abs(azimuth) < 1e-9 else (1, 0, -1.0)
+    if azimuth and abs(azimuth - np.pi / 2) > 1e-9 and np.any(q):
+        raise InputError(
+            f"{name}: a planar model accepts a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'"
+        )
+    if np.any(q[..., [across, 2]]):
+        raise InputError(
+            f"{name} leaves the vertical plane of the model: give angles of that plane, or dimension = 'spatial'"
+        )
+    out = np.zeros_like(q)
+    out[..., 1] = sign * q[..., along]
+    return out
+
+
+def motion_in_plane(motion: Motion, azimuth: float) -> Motion:
+    """A motion in the frame of its vertical plane."""
+    if not azimuth:
+        return motion
+    coefficients = motion.coefficients.copy()
+    coefficients[:, :3] = rotated(coefficients[:, :3].transpose(0, 2, 1), azimuth).transpose(0, 2, 1)
+    coefficients[:, 3:] = tilt_pieces(coefficients[:, 3:], azimuth)
+    return replace(motion, coefficients=coefficients)
+
+
+def wrench_in_plane(wrench: Array, azimuth: float) -> Array:
+    """Polynomials of force and moment, shape (k, 6, 6), in the frame of a vertical plane."""
+    rows = wrench.transpose(0, 2, 1)
+    return np.ascontiguousarray(
+        np.concatenate([rotated(rows[..., :3], azimuth), rotated(rows[..., 3:], azimuth)], axis=-1).transpose(0, 2, 1)
+    )
+
+
+def tilt_pieces(angles: Array, azimuth: float) -> Array:
+    """Polynomials of psi, theta and further angles, shape (k, c, 6), of tilts in the E1-E3 or E2-E3 plane as theta.
+
+    Other components are not checked: a planar model uses theta only, and its run ends where the plane is left.
+    """
+    if abs(azimuth - np.pi / 2) > 1e-9:
+        return angles
+    out = np.zeros_like(angles)
+    out[:, 1] = -angles[:, 0]
+    return out
+
+
+def into_plane(state: State) -> State:
+    """A state in the frame of its vertical plane, E1-E3 or E2-E3. Raises InputError if it lies in neither."""
+    base = state.base.copy()
+    in_second = any(
+        np.any(x) for x in (state.q[:, 0], state.v[:, 0], state.f[:, 1], base[:, [1, 3]], state.load[[1, 3]])
+    )
+    azimuth = np.pi / 2 if in_second else 0.0
+    base[:, :3] = rotated(base[:, :3], azimuth) if in_second else base[:, :3]
+    base[:, 3:] = tilts_into_plane(base[:, 3:], azimuth, "base_rotation")
+    force, moment = (rotated(x, azimuth) if in_second else x for x in (state.load[:3], state.load[3:]))
+    f = rotated_pairs(state.f, azimuth)
+    for name, value in (
+        ("h", f[:, 1]),
+        ("base_acceleration", base[:, 1]),
+        ("top_force", force[1:2]),
+        ("top_moment", moment[[0, 2]]),
+    ):
+        if np.any(np.abs(value) > 1e-12 * (1 + np.abs(np.concatenate([force, moment])).max())):
+            raise InputError(f"{name} leaves the vertical plane of the state: give one plane, or dimension = 'spatial'")
+    base[:, 1] = 0.0
+    return replace(
+        state,
+        q=tilts_into_plane(state.q, azimuth, "q"),
+        v=tilts_into_plane(state.v, azimuth, "v"),
+        f=np.ascontiguousarray(f * [1.0, 0.0]),
+        base=base,
+        load=np.concatenate([force, moment]),
+        azimuth=azimuth,
+    )
+
+
+def rotated_pairs(pairs: Array, angle: float) -> Array:
+    """Components (..., 2) along t_1, t_2 in a frame that is rotated by `angle` [rad]."""
+    if not angle:
+        return pairs
+    padded = np.concatenate([pairs, np.zeros((*pairs.shape[:-1], 1))], axis=-1)
+    return np.ascontiguousarray(rotated(padded, angle)[..., :2])
+
+
+def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
+    """Results of a planar model in the frame of the user; angles are exact at azimuth 0 and pi/2, else to order tilt^2.
+
+    values: shape (..., 2) or (..., 3), of which `kind` says whether they are Euler angles, contact angles, components
+    along t_1 and t_2, a vector or an axial vector.
+    """
+    if not azimuth:
+        return values
+    if kind in ("vector", "axial"):
+        return rotated(values, -azimuth)
+    if kind == "pair":
+        return rotated_pairs(values, -azimuth)
+    first = 1 if kind in ("angles", "pair_angles") else 0
+    out = np.array(values)
+    out[..., 0] = -np.sin(azimuth) * values[..., first]
+    out[..., 1] = np.cos(azimuth) * values[..., first]
+    if abs(azimuth - np.pi / 2) < 1e-9:
+        out[..., 1] = 0.0
+    return out

@@ -1,0 +1,1 @@
+"""Prescribed functions of time: base motions, loads and rotations."""

@@ -1,0 +1,284 @@
+"""Prescribed motion of the base as piecewise polynomials, with consistent displacement, velocity and acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.errors import InputError
+from msfp_gen.motions import piecewise, samples, waveforms
+from msfp_gen.motions.checks import positive
+from msfp_gen.motions.piecewise import Pieces
+from msfp_gen.motions.trajectory import CHANNELS, Trajectory
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from msfp_gen.motions.prescribed import Rotation
+    from msfp_gen.motions.records import Record, ScaleTo
+
+_BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "acceleration": "from_acceleration"}
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Motion(Trajectory):
+    """Motion of the ground and of the base, twice continuously differentiable except at declared `jumps`.
+
+    Attributes:
+        knots: ndarray, shape (k+1,), [s]: ends of the pieces, increasing from zero.
+        coefficients: ndarray, shape (k, 6, 6): piece, channel (u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad]),
+            ascending power of (t - knots[piece]).
+        jumps: ndarray, shape (j,), [s]: knots at which the acceleration may be discontinuous.
+        max_step: longest step of a run that resolves the motion [s]; None: determined from the pieces.
+        name: a label for figures and files.
+        metadata: origin and processing of the motion.
+
+    Raises:
+        InputError: shapes, order or finiteness are wrong; the displacement or the velocity jumps (an impulse), or the
+            acceleration jumps at a time that is not in `jumps`.
+    """
+
+    def rocking(self, rotation: Rotation) -> Motion:
+        """The motion with an additional rotation of the base: a base that is not level, or one that rocks.
+
+        Raises InputError if the rotation ends with a nonzero rate before the motion ends.
+        """
+        whole = rotation.until(self.duration)
+        pieces = np.zeros((len(whole.knots) - 1, 6, piecewise.ORDER))
+        pieces[:, 3:5] = whole.coefficients
+        inside = whole.knots[:-1] < self.duration
+        knots = np.append(whole.knots[:-1][inside], self.duration)
+        end = [rotation.duration] if 0 < rotation.duration < self.duration else []
+        return self + Motion(knots, pieces[inside], np.array(end), name=rotation.name)
+
+    def rotated(self, angle: float) -> Motion:
+        """The motion with its horizontal components rotated by `angle` [rad] about E3, from E1 towards E2.
+
+        Raises InputError for a rocking base, whose Euler angles do not transform like a vector.
+        """
+        if np.any(self.coefficients[:, 3:5]):
+            raise InputError(
+                f"rotated: angle {angle:g} on a motion that rocks the base (psi_1 or theta_1 not zero); "
+                "build the motion in the turned axes"
+            )
+        c, s = np.cos(angle), np.sin(angle)
+        coefficients = self.coefficients.copy()
+        coefficients[:, 0] = c * self.coefficients[:, 0] - s * self.coefficients[:, 1]
+        coefficients[:, 1] = s * self.coefficients[:, 0] + c * self.coefficients[:, 1]
+        return replace(self, coefficients=coefficients)
+
+    def held(self, duration: float) -> Motion:
+        """The motion followed by `duration` [s] without motion at its final position, for free vibration.
+
+        A nonzero acceleration at the end of the motion becomes a declared jump. Raises InputError if the motion does
+        not end at rest.
+        """
+        positive("duration", duration)
+        end, speed, acceleration = (self.evaluate(self.duration, d) for d in range(3))
+        peaks = np.max(np.abs(self.coefficients), axis=0)
+        if np.any(np.abs(speed) > 1e-9 * peaks[:, 1]):
+            worst = int(np.argmax(np.abs(speed)))
+            raise InputError(
+                f"held: the motion ends with {CHANNELS[worst]} moving at {speed[worst]:.3g} per second; "
+                "end it at rest (whole half cycles, a taper) before holding it"
+            )
+        rest = np.zeros((1, 6, piecewise.ORDER))
+        rest[0, :, 0] = end
+        jumps = bool(np.any(np.abs(acceleration) > 2e-9 * peaks[:, 2]))
+        return replace(
+            self,
+            knots=np.append(self.knots, self.duration + duration),
+            coefficients=np.concatenate([self.coefficients, rest]),
+            jumps=np.append(self.jumps, self.duration) if jumps else self.jumps,
+        )
+
+    def __add__(self, other: Motion) -> Motion:
+        """Sum of two motions on their merged knots. Raises InputError unless both have the same duration (`held`)."""
+        if not isinstance(other, Motion):
+            return NotImplemented
+        if self.duration != other.duration:
+            raise InputError(
+                f"motion: durations {self.duration:g} s and {other.duration:g} s differ; "
+                "lengthen the shorter one with motion.held(duration)"
+            )
+        knots = np.union1d(self.knots, other.knots)
+        known = self.max_step is not None and other.max_step is not None
+        return Motion(
+            knots,
+            piecewise.refined(self.knots, self.coefficients, knots)
+            + piecewise.refined(other.knots, other.coefficients, knots),
+            np.union1d(self.jumps, other.jumps),
+            min(self.max_step or 0.0, other.max_step or 0.0) if known else None,
+            " + ".join(n for n in (self.name, other.name) if n),
+            {**other.metadata, **self.metadata},
+        )
+
+    @classmethod
+    def _of(cls, pieces: Pieces, name: str) -> Motion:
+        return cls(pieces.knots, pieces.coefficients, max_step=pieces.max_step, name=name, metadata=pieces.metadata)
+
+    @classmethod
+    def from_arrays(
+        cls, time: ArrayLike, displacement: ArrayLike, rotation: ArrayLike | None = None, *, name: str = ""
+    ) -> Motion:
+        """Motion from sampled displacements, interpolated by cubic splines (twice continuously differentiable).
+
+        A channel is taken to be at rest at an end, and its spline clamped there, if its velocity is at most a
+        thousandth of its peak velocity. Otherwise it keeps the velocity of the data. A run then starts with base and
+        bearing moving at this velocity, without an impulse; metadata `initial_speed` is its magnitude [m/s].
+
+        Args:
+            time: shape (k,), [s], increasing, k >= 4; times count from the first, which is stored as metadata if not 0.
+            displacement: shape (k, 3), [m].
+            rotation: shape (k, 3), [rad]: psi_1, theta_1, phi_1; None for a base that does not rotate.
+            name: a label.
+        """
+        return cls._of(samples.from_displacement(time, displacement, rotation), name)
+
+    @classmethod
+    def from_acceleration(cls, time: ArrayLike, acceleration: ArrayLike, *, name: str = "") -> Motion:
+        """Motion from sampled accelerations, piecewise linear and integrated twice exactly from rest at zero.
+
+        Args:
+            time: shape (k,), [s], increasing, k >= 4; times count from the first, which is stored as metadata if not 0.
+            acceleration: shape (k, 3), [m/s^2]; a nonzero first value is a jump at the start of the run.
+            name: a label.
+        """
+        return cls._of(samples.from_acceleration(time, acceleration), name)
+
+    @classmethod
+    def from_velocity(cls, time: ArrayLike, velocity: ArrayLike, *, name: str = "") -> Motion:
+        """Motion from sampled velocities, interpolated by cubic splines and integrated from zero displacement.
+
+        Args:
+            time: shape (k,), [s], increasing, k >= 4; times count from the first, which is stored as metadata if not 0.
+            velocity: shape (k, 3), [m/s]; if the first value is not zero, a run starts with base and bearing moving.
+            name: a label.
+        """
+        return cls._of(samples.from_velocity(time, velocity), name)
+
+    @classmethod
+    def harmonic(
+        cls,
+        amplitude: float,
+        frequency: float,
+        *,
+        direction: float = 0.0,
+        cycles: float = 2.0,
+        lead_in: float | None = None,
+        name: str = "",
+    ) -> Motion:
+        """A S(t/lead_in) sin(2 pi f t) from rest at zero: the unidirectional tests of PEER 2017/07, section 4.1.
+
+        With the default lead-in of a quarter period the motion reaches A with zero velocity at the end of the lead-in.
+        It continues as A cos(2 pi f (t - lead_in)), as in PEER 2017/07, for `cycles` cycles.
+
+        Args:
+            amplitude: A [m].
+            frequency: f [Hz].
+            direction: azimuth from E1 towards E2 [rad].
+            cycles: number of full cycles after the lead-in.
+            lead_in: duration of the smooth start [s]; None: a quarter period.
+            name: a label.
+        """
+        period = 1 / positive("frequency", frequency)
+        rise = period / 4 if lead_in is None else lead_in
+        sines = [(np.cos(direction), 1.0, 0.0), (np.sin(direction), 1.0, 0.0)]
+        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, rise), name)
+
+    @classmethod
+    def circle(
+        cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
+    ) -> Motion:
+        """Circular orbit A S cos(Omega t), A S sin(Omega t) of PEER 2017/07, section 4.4.
+
+        Args:
+            amplitude: A [m].
+            angular_frequency: Omega [rad/s].
+            cycles: number of periods after the smooth start.
+            lead_in: duration of the smooth start S [s].
+            name: a label.
+        """
+        period = 2 * np.pi / positive("angular_frequency", angular_frequency)
+        sines = [(1.0, 1.0, np.pi / 2), (1.0, 1.0, 0.0)]
+        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
+
+    @classmethod
+    def figure_eight(
+        cls, amplitude: float, angular_frequency: float, *, cycles: float = 2.0, lead_in: float = 20.0, name: str = ""
+    ) -> Motion:
+        """Figure-eight orbit A S cos(Omega t), A S sin(2 Omega t) of PEER 2017/07, section 4.4.
+
+        Args:
+            amplitude: A [m].
+            angular_frequency: Omega [rad/s].
+            cycles: number of periods 2 pi/Omega after the smooth start.
+            lead_in: duration of the smooth start S [s].
+            name: a label.
+        """
+        period = 2 * np.pi / positive("angular_frequency", angular_frequency)
+        sines = [(1.0, 1.0, np.pi / 2), (1.0, 2.0, 0.0)]
+        return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, lead_in), name)
+
+    @classmethod
+    def ramp(cls, acceleration: float, duration: float, *, direction: float = 0.0, name: str = "") -> Motion:
+        """Constant acceleration from rest, u = acceleration t^2/2 (PEER 2017/07, section 4.1, with 0.1 m/s^2).
+
+        The motion does not end at rest, so it cannot be `held`.
+
+        Args:
+            acceleration: [m/s^2].
+            duration: [s].
+            direction: azimuth from E1 towards E2 [rad].
+            name: a label.
+        """
+        knots = np.array([0.0, positive("duration", duration)])
+        pieces = np.zeros((1, 6, piecewise.ORDER))
+        half = positive("acceleration", acceleration) / 2
+        pieces[0, :2, 2] = half * np.cos(direction), half * np.sin(direction)
+        return cls(knots, pieces, name=name, metadata={"source": "ramp", "acceleration": acceleration})
+
+    @classmethod
+    def from_record(
+        cls,
+        record: Record,
+        *,
+        scale: float = 1.0,
+        scale_to: ScaleTo | None = None,
+        start: float | None = None,
+        duration: float | None = None,
+        correct: bool = True,
+        corner: float = 0.05,
+        taper: float = 1.0,
+        name: str | None = None,
+    ) -> Motion:
+        """Motion from a recorded ground motion, baseline corrected by `records.baseline_corrected`.
+
+        Args:
+            record: from `records.read_record` or `records.bundled`.
+            scale: factor on the motion.
+            scale_to: target to which the corrected motion is scaled instead; metadata `scale` is the factor.
+            start: start of the window that is used [s]; None with a duration: the window of largest Arias intensity.
+            duration: length of the window [s]; None: to the end of the record.
+            correct: False uses the record without correction (`records.uncorrected`), if its agency has corrected it.
+            corner: corner frequency of the high-pass filter [Hz].
+            taper: duration of the smooth start and end [s].
+            name: a label; None: that of the record.
+        """
+        from msfp_gen.motions.records import prepared
+
+        corrected, factor = prepared(record, scale, scale_to, start, duration, correct, corner, taper)
+        return cls._of(samples.from_corrected(corrected, factor), record.name if name is None else name)
+
+    @classmethod
+    def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:
+        """Motion from a CSV table of displacements, velocities or accelerations: see `records.read_table`."""
+        from msfp_gen.motions.records import read_table
+
+        table = read_table(path)
+        build: Callable[..., Motion] = getattr(cls, _BUILDERS[table.quantity])
+        return build(table.time, table.values, name=name or table.name)

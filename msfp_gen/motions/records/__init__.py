@@ -1,0 +1,110 @@
+"""Recorded ground motions: reading, correction, scaling and response spectra; two records come with the package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from os import PathLike
+from pathlib import Path
+
+from msfp_gen.errors import InputError
+from msfp_gen.motions.records import cosmos, csmip, knet, peer, table
+from msfp_gen.motions.records.channel import Channel, assemble_record
+from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
+from msfp_gen.motions.records.peer import read_peer
+from msfp_gen.motions.records.record import Record
+from msfp_gen.motions.records.scaling import ScaleTo, asce7_spectrum, prepared
+from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
+from msfp_gen.motions.records.table import Table, read_table, write_csv
+from msfp_gen.motions.records.text import Lines, read_lines
+
+__all__ = [
+    "BUNDLED",
+    "Corrected",
+    "Record",
+    "ScaleTo",
+    "Spectrum",
+    "Table",
+    "asce7_spectrum",
+    "baseline_corrected",
+    "bundled",
+    "prepared",
+    "read_peer",
+    "read_record",
+    "read_table",
+    "response_spectrum",
+    "strong_window",
+    "uncorrected",
+    "write_csv",
+]
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A file format of channels.
+
+    Attributes:
+        name: name of the format.
+        matches: whether a file has this format.
+        read: reads the channels of a file.
+        notes: notes for every record of this format.
+    """
+
+    name: str
+    matches: Callable[[Lines], bool]
+    read: Callable[[Lines], list[Channel]]
+    notes: tuple[str, ...] = ()
+
+
+_FORMATS = (
+    _Format(csmip.FORMAT, csmip.matches, csmip.read),
+    _Format(cosmos.FORMAT, cosmos.matches, cosmos.read),
+    _Format(knet.FORMAT, knet.matches, knet.read, (knet.NOTE,)),
+    _Format(peer.FORMAT, peer.matches, peer.read),
+)
+BUNDLED = ("ridgecrest-2019-ci-ccc", "ridgecrest-2019-ci-clc")
+
+
+def read_record(path: str | PathLike[str], *more: str | PathLike[str]) -> Record:
+    """Read a record from one file, or from several files of one recording.
+
+    The format is recognised from the content: CSMIP and COSMOS V1 and V2, PEER .AT2, .VT2 and .DT2, K-NET and KiK-net,
+    and CSV with units in its header (docs/data.md). Files compressed by gzip are decompressed. The components are
+    assigned to E1, E2, E3 by their azimuths, in a right-handed frame; where a file has none, by the order of the files.
+
+    Raises:
+        InputError: the format is unknown, the data are damaged, or the files are not of one recording. The message
+            names file, line and reason.
+    """
+    parts = [read_lines(Path(p)) for p in (path, *more)]
+    if not more and table.matches(parts[0]):
+        return table.read(parts[0])
+    formats = [_format_of(lines) for lines in parts]
+    for lines, each in zip(parts, formats, strict=True):
+        if each is not formats[0]:
+            raise InputError(
+                f"{lines.path.name}: {each.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
+            )
+    channels = [channel for lines in parts for channel in formats[0].read(lines)]
+    return assemble_record(channels, formats[0].name, formats[0].notes)
+
+
+def _format_of(lines: Lines) -> _Format:
+    """Format of a file. Raises InputError if it is unknown."""
+    for each in _FORMATS:
+        if each.matches(lines):
+            return each
+    names = ", ".join(each.name for each in _FORMATS)
+    lines.fail(0, f"unknown format; give {names}, or one CSV with a header like: time [s], a1 [m/s^2]")
+
+
+def bundled(name: str) -> Record:
+    """A record of the package, one of `BUNDLED`. Its origin is stated in the README beside the files.
+
+    Raises InputError for another name.
+    """
+    if name not in BUNDLED:
+        raise InputError(f"record: {name!r} does not come with the package; choose from {', '.join(BUNDLED)}")
+    with as_file(files(__package__) / "files" / f"{name}.v1.gz") as path:
+        return read_record(path)

@@ -1,0 +1,197 @@
+"""Scaling of a motion to a target: a peak, a spectral ordinate, or a design spectrum over a range of periods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Quantity, check_fields, ruled_fields
+from msfp_gen.errors import InputError
+from msfp_gen.motions.checks import finite, positive
+from msfp_gen.motions.records.correction import Corrected, baseline_corrected, uncorrected
+from msfp_gen.motions.records.spectrum import DAMPING, ContinuousMotion, Progress, measure_index, response_spectrum
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.records.record import Record
+
+_ACCELERATION = Quantity("m/s^2", above=0.0)
+_PERIOD = Quantity("s", above=0.0)
+_FIT_POINTS = 100  # number of periods of a fit to a design spectrum, evenly spaced on a logarithmic axis
+_TARGETS = ("pga", "sa and period", "sds, sd1 and between")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaleTo:
+    """Target of scaling: give `pga`, or `sa` and `period`, or `sds`, `sd1` and `between`.
+
+    All three components are multiplied by the same factor, so their ratios do not change.
+
+    Attributes:
+        pga: peak ground acceleration [m/s^2].
+        sa: pseudo-acceleration at `period` [m/s^2].
+        period: period of `sa` [s].
+        sds: ordinate of the design spectrum of ASCE 7 at short periods [m/s^2].
+        sd1: ordinate of that spectrum at 1 s [m/s^2].
+        long_period: its transition period to constant displacement, T_L [s].
+        between: shortest and longest period of the fit to it [s], by least squares of the logarithms.
+        component: component or measure that meets the target: E1, E2, E3, geomean, rotd50 or rotd100.
+        damping: damping ratio of the spectra [-].
+
+    Raises:
+        InputError: a value is not permitted, or the values do not form one of the three targets.
+    """
+
+    pga: Annotated[float | None, _ACCELERATION] = None
+    sa: Annotated[float | None, _ACCELERATION] = None
+    period: Annotated[float | None, _PERIOD] = None
+    sds: Annotated[float | None, _ACCELERATION] = None
+    sd1: Annotated[float | None, _ACCELERATION] = None
+    long_period: Annotated[float, _PERIOD] = 8.0
+    between: Annotated[tuple[float, float] | None, Quantity("s", above=0.0, shape=(2,))] = None
+    component: Literal["E1", "E2", "E3", "geomean", "rotd50", "rotd100"] = "rotd50"
+    damping: Annotated[float, Quantity("", above=0.0)] = DAMPING
+
+    def __post_init__(self) -> None:
+        check_fields(self, "scale_to")
+        given = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
+        if given not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
+            raise InputError(f"scale_to: {', '.join(given) or 'nothing'} given; give {', or '.join(_TARGETS)}")
+        if self.between is not None and self.between[0] >= self.between[1]:
+            raise InputError(f"scale_to.between = {list(self.between)}: give the shorter period first")
+
+    def factor(self, motion: Record | Corrected | ContinuousMotion, progress: Progress | None = None) -> float:
+        """Factor by which `motion` must be multiplied to meet the target; `progress` as of `response_spectrum`.
+
+        Raises InputError if the component is zero.
+        """
+        column = measure_index(self.component)
+        if self.pga is not None:
+            spectrum = response_spectrum(motion, [1.0])
+            return self._ratio(np.array([self.pga]), spectrum.pga[[column]])
+        if self.between is None:
+            periods = np.array([self.period], dtype=float)
+            target = np.array([self.sa], dtype=float)
+        else:
+            periods = np.geomspace(*self.between, _FIT_POINTS)
+            target = asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+        spectrum = response_spectrum(motion, periods, damping=self.damping, progress=progress)
+        return self._ratio(target, spectrum.psa[:, column])
+
+    def curve(self, period: Array) -> tuple[Array, Array] | None:
+        """The target as a curve for a plot of spectra; None for a peak acceleration.
+
+        Args:
+            period: periods of the plot, shape (p,), [s].
+
+        Returns:
+            Periods [s] and pseudo-accelerations [m/s^2], ndarrays of one shape.
+        """
+        if self.pga is not None:
+            return None
+        if self.between is None:
+            level = np.full(2, float(self.sa or 0.0))
+            return np.array([0.8, 1.25]) * float(self.period or 0.0), level
+        return period, asce7_spectrum(period, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+
+    @classmethod
+    def parse(cls, text: str) -> ScaleTo:
+        """Target from a text such as "sa=0.6 g, period=2.5 s" or "sds=1 g, sd1=0.6 g, between=0.5:4".
+
+        Raises InputError for an unknown name or an invalid value.
+        """
+        rules = {name: rule for name, rule, _ in ruled_fields(cls)}
+        values: dict[str, Any] = {}
+        for part in text.split(","):
+            name, equals, value = (piece.strip() for piece in part.partition("="))
+            if not equals or name not in rules:
+                raise InputError(f"scale_to: {part.strip()!r}; give name=value with a name of {', '.join(rules)}")
+            given = value.split(":") if ":" in value else value
+            numbers = [_number(v) for v in given] if isinstance(given, list) else _number(given)
+            try:
+                values[name] = rules[name].parse(numbers, text=True)
+            except ValueError as error:
+                raise InputError(f"scale_to.{name} = {value!r}: {error}") from None
+        return cls(**values)
+
+    def _ratio(self, target: Array, found: Array) -> float:
+        """Geometric mean of target/found, the factor of least squares of the logarithms."""
+        if not np.all(found > 0):
+            raise InputError(f"scale_to.component = {self.component!r}: the motion has none; choose another component")
+        return float(np.exp(np.mean(np.log(target / found))))
+
+    def __str__(self) -> str:
+        """Description of the target."""
+        if self.pga is not None:
+            return f"{self.component} peak acceleration {self.pga:.4g} m/s^2"
+        if self.between is None:
+            return f"{self.component} pseudo-acceleration {self.sa:.4g} m/s^2 at {self.period:g} s"
+        low, high = self.between
+        return (
+            f"{self.component} to the ASCE 7 spectrum of {self.sds:.4g} and {self.sd1:.4g} m/s^2, "
+            f"least squares from {low:g} to {high:g} s"
+        )
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
+
+
+def prepared(
+    record: Record,
+    scale: float,
+    scale_to: ScaleTo | None,
+    start: float | None,
+    duration: float | None,
+    correct: bool,
+    corner: float,
+    taper: float,
+    progress: Progress | None = None,
+) -> tuple[Corrected, float]:
+    """The processed record and its scale factor; arguments as of `Motion.from_record`.
+
+    `progress` reports the spectrum that `scale_to` needs, as of `response_spectrum`. Raises InputError.
+    """
+    if correct:
+        corrected = baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
+    else:
+        corrected = uncorrected(record, start=start, duration=duration)
+    if scale_to is None:
+        return corrected, positive("scale", scale)
+    if scale != 1:
+        raise InputError(f"scale = {scale!r}: scale_to is given too; give one of them")
+    metadata = {**corrected.metadata, "scaled_to": str(scale_to)}
+    return replace(corrected, metadata=metadata), scale_to.factor(corrected, progress)
+
+
+def asce7_spectrum(period: ArrayLike, sds: float, sd1: float, long_period: float = 8.0) -> Array:
+    """Design response spectrum of ASCE 7-16, section 11.4.6 (equations 11.4-5 to 11.4-7): pseudo-acceleration.
+
+    The ordinates of the MCE_R spectrum (11.4.7) are 1.5 times larger: give S_MS and S_M1 to obtain it.
+
+    Args:
+        period: shape (p,), [s].
+        sds: ordinate at short periods, in any unit of acceleration.
+        sd1: ordinate at 1 s, in the same unit.
+        long_period: T_L [s].
+
+    Returns:
+        ndarray, shape (p,), in the unit of `sds` and `sd1`.
+
+    Raises:
+        InputError: a value is not positive, or a period is negative.
+    """
+    t = finite("period", period)
+    if not (sds > 0 and sd1 > 0 and long_period > 0 and np.all(t >= 0)):
+        raise InputError(f"sds = {sds:g}, sd1 = {sd1:g}, long_period = {long_period:g}: give positive numbers")
+    corner = sd1 / sds
+    safe = np.maximum(t, 1e-12)
+    rising = sds * (0.4 + 0.6 * t / (0.2 * corner))
+    pieces = [t < 0.2 * corner, t <= corner, t <= long_period]
+    return np.select(pieces, [rising, np.full_like(t, sds), sd1 / safe], sd1 * long_period / safe**2)

@@ -1,0 +1,129 @@
+"""Lines and numbers of a text file; errors name file, line and reason."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import zlib
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_MAX_VALUE = 1e100  # larger numbers are rejected, so that conversions of units cannot overflow
+_MAX_BYTES = 256 << 20  # of text, after decompression
+_GZIP = b"\x1f\x8b"
+_DOS_END = b"\x1a"  # end-of-file character that fills the last block of files from CP/M and DOS
+
+
+class Lines:
+    """The lines of one file; `fail` raises an InputError with file and line."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path = path
+        self.lines = text.splitlines()
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __getitem__(self, index: int) -> str:
+        """The line at `index`, counted from zero. Raises InputError if the file ends before."""
+        if index >= len(self.lines):
+            self.fail(len(self.lines) - 1, "the file ends here, truncated; fetch it again")
+        return self.lines[index]
+
+    def fail(self, index: int, reason: str) -> NoReturn:
+        """Raise InputError for the line at `index`, counted from zero; the message counts from one."""
+        raise InputError(f"{self.path.name}, line {index + 1}: {reason}")
+
+    def number(self, index: int, field: str) -> float:
+        """`field`, a part of the line at `index`, as a float. Raises InputError unless it is a finite number."""
+        text = field.strip()
+        value = float(text) if _NUMBER.fullmatch(text) else np.nan
+        if not abs(value) < _MAX_VALUE:
+            self.fail(index, f"{text[:24]!r} is not a finite number; repair or cut the data")
+        return value
+
+    def numbers(self, index: int, fields: list[str]) -> list[float]:
+        """`number` for several fields of the line at `index`."""
+        return [self.number(index, field) for field in fields]
+
+    def positive(self, index: int, name: str, field: str) -> float:
+        """`field` as a float. Raises InputError that begins with `name` unless it is a positive finite number."""
+        value = self.number(index, field)
+        if value <= 0:
+            self.fail(index, f"{name} is {field.strip()}; it must be positive")
+        return value
+
+    def block(self, top: int, points: int, layout: tuple[int, int]) -> tuple[Array, int]:
+        """Numbers in columns of fixed width.
+
+        The columns are cut by their width, not split at blanks, since a number may fill its column.
+
+        Args:
+            top: index of the first line.
+            points: number of numbers.
+            layout: columns in a line and characters in a column, as in a Fortran format.
+
+        Returns:
+            ndarray, shape (points,), and the index of the line after them.
+        """
+        per_line, width = layout
+        if not (points and per_line and width):
+            self.fail(top - 1, f"{points} points in {per_line} columns of width {width}; nothing to read")
+        values: list[float] = []
+        index = top
+        while len(values) < points:
+            row = self[index].rstrip()
+            expected = min(per_line, points - len(values))
+            if len(row) != expected * width:
+                self.fail(index, f"{expected} columns of width {width} expected after {len(values)} of {points} points")
+            values += self.numbers(index, [row[i : i + width] for i in range(0, len(row), width)])
+            index += 1
+        return column(values), index
+
+
+def read_lines(path: Path) -> Lines:
+    """The lines of a text file in UTF-8 or Latin-1, decompressed if it is a gzip file.
+
+    Raises InputError if the file cannot be read, is empty, binary, damaged or too long.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path.name}: no file but a folder, pipe or device; give the path of a record")
+        with path.open("rb") as file:
+            content = file.read(_MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path.name}: cannot be read ({reason}); check the path") from None
+    if content.startswith(_GZIP) and len(content) <= _MAX_BYTES:
+        try:
+            with gzip.open(path) as compressed:
+                content = compressed.read(_MAX_BYTES + 1)
+        except (OSError, EOFError, zlib.error):
+            raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None
+    if len(content) > _MAX_BYTES:
+        raise InputError(
+            f"{path.name}: more than {_MAX_BYTES >> 20} MiB of text; no record is that long, give another file"
+        )
+    content = content.rstrip(_DOS_END)
+    if not content.strip():
+        raise InputError(f"{path.name}: the file is empty; give a record")
+    if b"\0" in content:
+        raise InputError(f"{path.name}: a binary file; give a text file of a known format (docs/data.md)")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return Lines(path, text)
+
+
+def column(values: list[float]) -> Array:
+    """Numbers as an ndarray, shape (k,)."""
+    return np.array(values, dtype=np.float64)

@@ -1,0 +1,149 @@
+"""Export of a result as CSV, Parquet or MATLAB file; netCDF is in `dataset.py`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import check_output, replacing, write_bytes
+from msfp_gen.errors import InputError
+from msfp_gen.results.dataset import to_dataset, write_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.results.run_data import RunData
+
+
+class Column(NamedTuple):
+    """One column of the table of a run: name, unit, meaning, and one value per row."""
+
+    name: str
+    unit: str
+    meaning: str
+    values: Array
+
+
+def save(result: RunData, path: str | Path) -> Path:
+    """Write `result` in the format of the suffix: .nc, .parquet, .csv or .mat; completely or not at all.
+
+    Raises InputError for an invalid path.
+    """
+    target = check_result_path(path)
+    return WRITERS[target.suffix.lower()](result, target)
+
+
+def check_result_path(path: str | Path, name: str = "output") -> Path:
+    """`path` if a result can be written there; raises InputError otherwise, also for .parquet without pyarrow.
+
+    name: that of the option, for the message.
+    """
+    target = check_output(path, WRITERS, name)
+    if target.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+        raise InputError(
+            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give .nc, .csv or .mat"
+        )
+    return target
+
+
+def columns(dataset: xr.Dataset) -> list[Column]:
+    """Every variable along time as columns, one for each component: `displacement_E1`, `sliding_2`, `tilt_3_psi`."""
+    found = [_column(dataset["time"], "time", dataset["time"].to_numpy())]
+    for name, variable in dataset.data_vars.items():
+        if variable.dims[:1] == ("time",):
+            values = variable.to_numpy()
+            for index in np.ndindex(values.shape[1:]):
+                labels = [str(dataset[dim].values[i]) for dim, i in zip(variable.dims[1:], index, strict=True)]
+                found.append(_column(variable, "_".join([str(name), *labels]), values[(slice(None), *index)]))
+    return found
+
+
+def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
+    return Column(name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
+
+
+def write_csv(result: RunData, path: str | Path) -> Path:
+    """Write a CSV file: `name [unit]` as header, one line per row; scene, events and provenance as # comments."""
+    target = check_output(path, (".csv",))
+    dataset = to_dataset(result)
+    table = columns(dataset)
+    rows = np.column_stack([column.values for column in table]).tolist()
+    with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
+        file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+    return target
+
+
+def _provenance(result: RunData, dataset: xr.Dataset) -> list[str]:
+    """Attributes of the dataset, events, and the scene as TOML text, as lines."""
+    attributes = dict(dataset.attrs)
+    scene = str(attributes.pop("scene")).splitlines()
+    about = [f"{key}: {' '.join(str(value).split())}" for key, value in attributes.items()]
+    return [*about, *(f"event: {json.dumps(event)}" for event in _events(result)), "scene:", *scene]
+
+
+def _events(result: RunData) -> list[dict[str, Any]]:
+    return [
+        {
+            "time": event.time,
+            "surface": event.surface,
+            "kind": event.kind,
+            "displacement": np.asarray(event.displacement).tolist(),
+            "top_force": np.asarray(event.top_force).tolist(),
+        }
+        for event in result.events
+    ]
+
+
+def write_parquet(result: RunData, path: str | Path) -> Path:
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow."""
+    target = check_result_path(check_output(path, (".parquet",)))
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    dataset = to_dataset(result)
+    table = columns(dataset)
+    fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
+    about = {str(key): str(value) for key, value in dataset.attrs.items()}
+    schema = pa.schema(fields, metadata=about | {"events": json.dumps(_events(result))})
+    content = BytesIO()
+    pq.write_table(pa.table([np.ascontiguousarray(c.values) for c in table], schema=schema), content)
+    write_bytes(target, [content.getbuffer()])
+    return target
+
+
+def write_mat(result: RunData, path: str | Path) -> Path:
+    """Write a MATLAB 5 file: every variable of the dataset by name, and structs `units`, `meaning`, `attributes`."""
+    target = check_output(path, (".mat",))
+    from scipy.io import savemat
+
+    dataset = to_dataset(result)
+    # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
+    content: dict[str, Any] = {str(name): _matlab(variable.to_numpy()) for name, variable in dataset.variables.items()}
+    for key, attribute in (("units", "units"), ("meaning", "long_name")):
+        content[key] = {str(n): v.attrs[attribute] for n, v in dataset.variables.items() if attribute in v.attrs}
+    content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
+    stream = BytesIO()
+    savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
+    write_bytes(target, [stream.getbuffer()])
+    return target
+
+
+def _matlab(values: Any) -> Any:
+    return values.astype(object) if values.dtype.kind == "U" else values
+
+
+WRITERS: dict[str, Callable[[RunData, str | Path], Path]] = {
+    ".nc": write_netcdf,
+    ".parquet": write_parquet,
+    ".csv": write_csv,
+    ".mat": write_mat,
+}

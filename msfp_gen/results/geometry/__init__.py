@@ -1,0 +1,1 @@
+"""Geometry of the deformed stack: positions of its bodies, their outlines, and vertical sections."""

@@ -1,0 +1,187 @@
+"""The rows of a run as NumPy arrays, its events and counters.
+
+The annotations of `History` give dimensions, unit and meaning of every quantity. The check of shapes here and the
+dataset in `dataset.py` are based on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Literal, get_origin, get_type_hints
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+
+# Labels of the dimensions of fixed length. The length of `body` and `surface` is the number of surfaces, n - 1.
+LABELS: dict[str, tuple[str, ...]] = {
+    "axis": ("E1", "E2", "E3"),
+    "angle": ("psi", "theta", "phi"),
+    "contact_angle": ("psi~", "theta~"),
+    "direction": ("t~1", "t~2"),
+}
+STACK = ("body", "surface")
+
+ENERGY: dict[str, str] = {
+    "input": "work done on the bearing and its top by the base motion and the loads",
+    "kinetic": "kinetic energy relative to the base",
+    "potential": "potential energy of weights and vertical loads",
+    "restraint": "energy stored in the springs of the top",
+    "friction_stored": "recoverable energy stored in friction while stuck",
+    "friction_dissipated": "energy dissipated by friction",
+    "rim_stored": "energy stored in the rims",
+    "rim_dissipated": "energy dissipated at the rims",
+    "top_dissipated": "energy dissipated by the dampers of the top",
+    "seat_stored": "energy stored in the unilateral contacts of the surfaces, with uplift",
+    "seat_dissipated": "energy dissipated in the unilateral contacts, impacts at landing included",
+    "numerical": "input less all other terms: the error of the integration",
+}
+
+
+EQUAL_PEAKS = 1e-3
+"""Relative difference of two peaks up to which they are equal: rounding may then decide which is larger."""
+
+
+def first_peak(size: Array) -> int:
+    """Row of the largest of `size`, shape (T,); of peaks that differ by less than `EQUAL_PEAKS`, that of the first."""
+    near = size >= (1.0 - EQUAL_PEAKS) * size.max()
+    first = int(near.argmax())
+    last = len(size) if near[first:].all() else first + int((~near[first:]).argmax())
+    return first + int(size[first:last].argmax())
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A quantity of `History`: dimensions after time, unit, meaning ({} stands for the name), names in the dataset.
+
+    names: none for the name of the field itself; several for the components of the last dimension.
+    """
+
+    dims: tuple[str, ...]
+    unit: str
+    meaning: str
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The T rows of a run.
+
+    Every quantity has T entries along its first dimension. The dimensions `body` (bodies 2..n) and `surface` have n - 1
+    entries each, bottom first; `LABELS` gives the others. Raises InputError where an array has another shape or an
+    entry that is not finite, or where the time does not increase.
+    """
+
+    time: Annotated[Array, Rows((), "s", "time t")]
+    tilt_angles: Annotated[Array, Rows(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
+    tilt_rates: Annotated[Array, Rows(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
+    tilt_accelerations: Annotated[
+        Array, Rows(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
+    ]
+    friction_state: Annotated[Array, Rows(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
+    normal_force: Annotated[Array, Rows(("surface",), "N", "normal force N on the surface")]
+    contact_angles: Annotated[Array, Rows(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")]
+    sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
+    gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
+    rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
+    separation: Annotated[
+        Array, Rows(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
+    ]
+    lift: Annotated[Array, Rows(("surface",), "m", "clearance between separated faces; 0 while in contact")]
+    interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
+    slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
+    base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
+    top_displacement: Annotated[Array, Rows(("axis",), "m", "displacement of the top plate at r_nn")]
+    displacement: Annotated[
+        Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
+    ]
+    top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
+    top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
+    energy: dict[str, Array]
+    # None unless the model has a friction law, or one with temperature.
+    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")] = None
+    temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
+
+    def __post_init__(self) -> None:
+        if not len(self.time):
+            raise InputError("history.time has no rows: give at least the start of the run")
+        if np.any(late := np.diff(self.time) <= 0):
+            row = int(np.argmax(late)) + 1
+            before, here = self.time[row - 1 : row + 1]
+            raise InputError(f"history.time[{row}] = {here:g} s follows {before:g} s: give rows in rising time")
+        surfaces = self.normal_force.shape[-1]
+        for name, values in self.arrays().items():
+            self._check(name, values, self._shape(quantities()[name].dims, surfaces))
+        if set(self.energy) != set(ENERGY):
+            raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(ENERGY)}")
+        for name, values in self.energy.items():
+            self._check(f"energy[{name!r}]", values, (len(self.time),))
+
+    @property
+    def surfaces(self) -> int:
+        """Number of surfaces, n - 1."""
+        return int(self.normal_force.shape[1])
+
+    @property
+    def horizontal(self) -> Array:
+        """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
+        return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
+
+    @property
+    def peak_row(self) -> int:
+        """Row of the largest horizontal displacement; see `first_peak`."""
+        return first_peak(self.horizontal)
+
+    def arrays(self) -> dict[str, Array]:
+        """The arrays of this run by field, without those that are None."""
+        found = {name: getattr(self, name) for name in quantities()}
+        return {name: values for name, values in found.items() if values is not None}
+
+    def _shape(self, dims: tuple[str, ...], surfaces: int) -> tuple[int, ...]:
+        return (len(self.time), *(surfaces if dim in STACK else len(LABELS[dim]) for dim in dims))
+
+    @staticmethod
+    def _check(name: str, values: Array, shape: tuple[int, ...]) -> None:
+        if values.shape != shape:
+            raise InputError(f"history.{name} has shape {values.shape}: give {shape}")
+        if not np.isfinite(values).all():
+            row = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise InputError(f"history.{name} is not finite in row {row}: leave out rows that were not computed")
+
+
+@cache
+def quantities() -> dict[str, Rows]:
+    """The description of each array of `History`, by field."""
+    hints = get_type_hints(History, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """An instant located inside a step: rim contact or release, lift-off or landing, the stop condition (surface 0)."""
+
+    time: float  # [s]
+    surface: int  # 1..n-1, bottom first
+    kind: Literal["rim_contact", "rim_release", "stop", "lift_off", "landing"]
+    displacement: Array  # shape (3,), [m]
+    top_force: Array  # shape (3,), [N]
+
+
+@dataclass(frozen=True)
+class Counters:
+    """Counters of the work of one run; wall_time [s]."""
+
+    steps: int = 0
+    rejected_steps: int = 0
+    newton_iterations: int = 0
+    evaluations: int = 0
+    factorisations: int = 0
+    newton_failures: int = 0
+    events: int = 0
+    halved_newton_steps: int = 0
+    fresh_tangents: int = 0
+    other_starts: int = 0
+    quasistatic_starts: int = 0
+    wall_time: float = 0.0

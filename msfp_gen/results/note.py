@@ -1,0 +1,29 @@
+"""`Note`: the message of a monitor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Note:
+    """Message of a monitor, in one line.
+
+    time [s]. kind: "rims", "uplift", "inertia", "heat", "law_speed", "law_load", "law_temperature", "plane", "jammed"
+    or "energy". surface: 1..n-1; 0: none. value: the quantity in the text: distance beyond the capacity [m], normal
+    force [N], inertial over normal force [-], bound of the temperature rise [K], slip velocity [m/s], temperature
+    [degC], share of the energy [-]. action: the effects with which the run continued; "": it continued unchanged, or
+    ended.
+    """
+
+    time: float
+    kind: str
+    surface: int
+    value: float
+    text: str
+    action: str = ""
+
+    @property
+    def line(self) -> str:
+        """Time, text and action."""
+        return f"t = {self.time:.6g} s: {self.text}" + (f"; continued with {self.action}" if self.action else "")

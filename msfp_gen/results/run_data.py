@@ -1,0 +1,47 @@
+"""`RunData`: the data of a run, from which its tables, figures and files are made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.results.history import Counters, Event, History
+
+if TYPE_CHECKING:
+    from msfp_gen.results.note import Note
+    from msfp_gen.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """Scene, rows, events and provenance of a run. `msfp_gen.Result` adds dataset, summary and files.
+
+    status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
+    text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
+    options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
+    """
+
+    scene: Scene
+    history: History
+    events: tuple[Event, ...] = ()
+    counters: Counters = field(default_factory=Counters)
+    status: str = "ok"
+    message: str = ""
+    provenance: dict[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the run reached its end or its stop condition."""
+        return self.status in ("ok", "stopped")
+
+    @property
+    def friction_coefficient(self) -> Array:
+        """Friction coefficient mu of every surface, ndarray, shape (T, n-1): recorded, or that of the bearing."""
+        recorded = self.history.friction_coefficient
+        if recorded is not None:
+            return recorded
+        return np.broadcast_to(self.scene.bearing.arrays()["friction"], self.history.normal_force.shape)

@@ -1,0 +1,168 @@
+/* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. */
+#include <math.h>
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+enum { NB = MSFP_NB, DOF = MSFP_DOF, NA = MSFP_NA, ND = MSFP_ND, FORCE = MSFP_FORCE_SIZE };
+
+static const int unknown[ND] = MSFP_FREE;
+
+/* Interface forces that balance loads, weights and inertia, summed from the top down. With uplift the unilateral
+ * contacts give the forces instead, and the differences are rows of the residual. */
+static void forces(const msfp_parameters *p, msfp_work *w, double *residual)
+{
+    double sum[FORCE];
+    memcpy(sum, w->force[NB], sizeof sum);
+    for (int j = NB - 1; j >= 0; --j) {
+        msfp_interface_force(p->body[j + 1], w->body[j + 1], sum, w->force[j]);
+        memcpy(sum, w->force[j], sizeof sum);
+#if MSFP_UPLIFT
+        msfp_unilateral_force(p, w, j);
+        for (int i = 0; i < MSFP_SPACE; ++i) /* these rows follow the angular ones */
+            residual[j * ND + NA + i] = sum[i] - w->force[j][i];
+#else
+        (void)residual;
+#endif
+    }
+}
+
+/* Moment of the surface above body k. */
+static const double *moment_above(const msfp_work *w, int k)
+{
+#if MSFP_UPLIFT
+    if (k < NB)
+        return w->below[k];
+#endif
+    return w->moment[k];
+}
+
+MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                             double f[MSFP_NB][2], double *residual, double *tangent)
+{
+    double out[MSFP_ANGULAR_SIZE];
+    msfp_surface_jacobians jacobians;
+    if (!seed->same_base)
+        msfp_base(p, at, w);
+    msfp_kinematics(p, at, w);
+    msfp_top(p, at, w);
+    forces(p, w, residual);
+#if MSFP_LAW
+    msfp_friction_conditions(at, w);
+#endif
+    const int status = msfp_surfaces(p, w, seed, f, tangent ? &jacobians : NULL);
+    if (status)
+        return status;
+    for (int k = 1; k <= NB; ++k) {
+        msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], moment_above(w, k),
+                             out);
+        memcpy(residual + (k - 1) * ND, out, NA * sizeof *residual);
+        w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
+    }
+    if (tangent)
+        msfp_tangent(p, at, seed, w, &jacobians, tangent);
+    return MSFP_OK;
+}
+
+void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
+{
+    for (int k = 0; k < NB; ++k) {
+        const double *par = p->surface[k];
+#if MSFP_RIMS
+        const double rim = fabs(w->rim[k][MSFP_RIM_FC]);
+#else
+        const double rim = 0.0;
+#endif
+        /* At rates far from the solution N is arbitrarily large and no scale; it is bounded by the loads. */
+        const double normal = w->contact[k][MSFP_CONTACT_N], most = 1e3 * w->reference;
+        const double pressed = (normal < most ? normal : most) + rim + (MSFP_UPLIFT ? 1e-3 * w->reference : 0.0);
+        const double natural = pressed * par[MSFP_SURFACE_PARAMETERS_R] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01);
+        for (int i = 0; i < ND; ++i)
+            scale[k * ND + i] = fmax(i < NA ? natural : pressed, 1e-12);
+    }
+}
+
+int msfp_surface_in_tension(const msfp_work *w)
+{
+    for (int j = 0; j < NB && !MSFP_UPLIFT; ++j) {
+        double p[3];
+        msfp_local_p_get(w->local[j], p);
+        if (p[2] <= 0.0)
+            return j + 1;
+    }
+    return 0;
+}
+
+int msfp_invalid_friction(const msfp_work *w)
+{
+#if MSFP_LAW
+    for (int j = 0; j < NB; ++j)
+        if (!(w->contact[j][MSFP_CONTACT_MU] >= 0.0 && w->contact[j][MSFP_CONTACT_MU] < INFINITY))
+            return j + 1;
+#else
+    (void)w;
+#endif
+    return 0;
+}
+
+void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
+{
+    for (int j = 0; j < NB; ++j) {
+        rates[j][0] = w->contact[j][MSFP_CONTACT_DY];
+        rates[j][1] = msfp_contact_dZ(w->contact[j]);
+    }
+}
+
+double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst)
+{
+    double scale[DOF], size = 0.0;
+    msfp_residual_scale(p, w, scale);
+    for (int i = 0; i < DOF; ++i) {
+        const double one = fabs(residual[i]) / scale[i];
+        if (one <= size)
+            continue;
+        size =
+            one < INFINITY ? one : INFINITY; /* also where the residual is not a number, which then stays the largest */
+        *worst = i;
+    }
+    return size;
+}
+
+/* The equations are nearly linear in the accelerations: the first factors are kept while a step reduces the residual a
+ * hundredfold. */
+int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
+{
+    double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
+    int pivots[DOF], good = 0, worst;
+    msfp_seed seed = { .ca = 1.0 };
+    memcpy(seed.fp, at->f, sizeof seed.fp);
+    memcpy(f, at->f, sizeof f);
+    out->determinant = 1;
+    for (out->iterations = 0; out->iterations < 50; ++out->iterations) {
+        const int first = out->iterations == 0;
+        int status = msfp_condensed(p, at, &seed, w, f, residual, first ? tangent : NULL);
+        if (status)
+            return status;
+        seed.same_base = 1;
+        out->residual = msfp_residual_size(p, w, residual, &worst);
+        if (!(out->residual < INFINITY))
+            return MSFP_E_FINITE;
+        /* Converged, or at the floor that rounding leaves; a step is taken all the same, for the determinant. */
+        if ((out->iterations && out->residual <= 1e-13) || (out->residual <= 1e-9 && out->residual >= 0.5 * last))
+            return MSFP_OK;
+        good = out->residual < 1e-2 * last;
+        last = out->residual;
+        if (!first && !good && (status = msfp_condensed(p, at, &seed, w, f, residual, tangent)))
+            return status;
+        if (first || !good) {
+            out->determinant = msfp_lu(tangent, DOF, pivots);
+            if (out->determinant == 0)
+                return MSFP_E_IRREGULAR;
+        }
+        msfp_lu_solve(tangent, DOF, pivots, residual);
+        for (int k = 0; k < NB; ++k)
+            for (int i = 0; i < ND; ++i)
+                at->a[k][unknown[i]] -= residual[k * ND + i];
+    }
+    return MSFP_E_NEWTON;
+}

@@ -1,0 +1,260 @@
+/* contact.c: friction and contact of all surfaces at once, one surface in each lane of a vector.
+ *
+ * For each surface, Newton's method solves the stage formula f = fp + beta df/dt of Y, Z, and mu from its law: two or
+ * three local unknowns. They are eliminated from the tangent of the moment and of N by their consistent tangent.
+ */
+#include <math.h>
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+enum {
+    NB = MSFP_NB,
+    LANES = MSFP_LANES,
+    MOMENT = MSFP_MOMENT_SIZE,
+    FRICTION = MSFP_FRICTION_SIZE,
+    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: Y, Z, and mu where it follows a law */
+    ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */
+    INPUTS = MSFP_LOCAL_SIZE        /* force and slip rotation */
+};
+#if MSFP_HEAT
+#define SLOPE(out, s)                                                                                                  \
+    (out)[MSFP_CONTACT_LAW_MU * LANES + s] /* d mu/d mu by the law, because friction heats the surface */
+#else
+#define SLOPE(out, s) 0.0
+#endif
+
+/* Fields of all surfaces, [field][lane]; spare lanes repeat the last surface. */
+typedef struct {
+    double local[INPUTS * LANES], f[FRICTION * LANES], before[FRICTION * LANES], out[MSFP_CONTACT_SIZE * LANES];
+#if MSFP_LAW
+    double x[MSFP_COEFFICIENT_SIZE * LANES];
+#endif
+} lanes;
+
+#if MSFP_LAW
+void msfp_friction_conditions(const msfp_point *at, msfp_work *w)
+{
+    for (int j = 0; j < NB; ++j) {
+        double *x = w->coefficient[j];
+#if MSFP_HEAT
+        x[MSFP_COEFFICIENT_RISE] = at->rise[j];
+        x[MSFP_COEFFICIENT_WARMING] = at->warming;
+#else
+        (void)at;
+#endif
+        if (!(fabs(x[MSFP_COEFFICIENT_MU]) < 1e3)) /* not finite after a failed step */
+            x[MSFP_COEFFICIENT_MU] = 0.0;
+    }
+}
+#endif
+
+/* From the blocks of the surfaces to lanes. */
+MSFP_INLINE void gather(const msfp_work *w, const msfp_seed *seed, double f[NB][2], lanes *all)
+{
+    for (int s = 0; s < LANES; ++s) {
+        const int j = s < NB ? s : NB - 1;
+        for (int k = 0; k < INPUTS; ++k)
+            all->local[k * LANES + s] = w->local[j][k];
+        for (int k = 0; k < FRICTION; ++k) {
+            all->f[k * LANES + s] = f[j][k];
+            all->before[k * LANES + s] = seed->fp[j][k];
+        }
+#if MSFP_LAW
+        for (int k = 0; k < MSFP_COEFFICIENT_SIZE; ++k)
+            all->x[k * LANES + s] = w->coefficient[j][k];
+#endif
+    }
+}
+
+/* From lanes to the blocks of the surfaces. */
+MSFP_INLINE void scatter(const lanes *all, msfp_work *w, double f[NB][2])
+{
+    for (int j = 0; j < NB; ++j) {
+        for (int k = 0; k < MSFP_CONTACT_SIZE; ++k)
+            w->contact[j][k] = all->out[k * LANES + j];
+        for (int k = 0; k < FRICTION; ++k)
+            f[j][k] = all->f[k * LANES + j];
+#if MSFP_LAW
+        w->coefficient[j][MSFP_COEFFICIENT_MU] = all->x[MSFP_COEFFICIENT_MU * LANES + j];
+#endif
+    }
+}
+
+/* Solve the 1x1 or 2x2 system a x = b of every lane, in place of b. */
+MSFP_INLINE void solve_small(const double *a, double *b)
+{
+    for (int s = 0; s < LANES; ++s) {
+#if MSFP_PLANAR
+        b[s] /= a[s];
+#else
+        const double inverse = 1.0 / (a[s] * a[3 * LANES + s] - a[LANES + s] * a[2 * LANES + s]);
+        const double x = (b[s] * a[3 * LANES + s] - a[LANES + s] * b[LANES + s]) * inverse;
+        b[LANES + s] = (a[s] * b[LANES + s] - a[2 * LANES + s] * b[s]) * inverse;
+        b[s] = x;
+#endif
+    }
+}
+
+/* One Newton step on Y, Z (and mu) of every surface that has not converged, with derivatives at constant slip velocity
+ * and N, on which they depend weakly. Where the residual has grown, past a switch of the hysteresis law, half of the
+ * last step is taken back. Returns how many surfaces have not converged, -1 if a value is not finite. */
+MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *step, double *best)
+{
+    double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
+    const double *out = all->out;
+    int unconverged = 0, not_finite = 0;
+    for (int s = 0; s < LANES; ++s)
+        size[s] = sum[s] = 0.0;
+    for (int r = 0; r < FRICTION; ++r)
+        for (int s = 0; s < LANES; ++s) {
+            const double g =
+                all->f[r * LANES + s] - all->before[r * LANES + s] - beta * out[(MSFP_CONTACT_DY + r) * LANES + s];
+            newton[r * LANES + s] = g;
+            size[s] = fabs(g) > size[s] ? fabs(g) : size[s];
+            sum[s] += fabs(g);
+        }
+#if MSFP_LAW
+    double excess[LANES];
+    for (int s = 0; s < LANES; ++s) {
+        excess[s] = all->x[MSFP_COEFFICIENT_MU * LANES + s] - out[MSFP_CONTACT_MU * LANES + s];
+        size[s] = fabs(excess[s]) > size[s] ? fabs(excess[s]) : size[s];
+        sum[s] += fabs(excess[s]);
+    }
+#endif
+    for (int s = 0; s < LANES; ++s) {
+        not_finite += !(sum[s] < INFINITY);
+        unconverged += size[s] > accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+    }
+    if (not_finite || !unconverged)
+        return not_finite ? -1 : 0;
+    for (int i = 0; i < FRICTION * FRICTION; ++i)
+        for (int s = 0; s < LANES; ++s)
+            a[i * LANES + s] = (i % (FRICTION + 1) == 0) - beta * out[(MSFP_CONTACT_YY + i) * LANES + s];
+    solve_small(a, newton);
+    for (int s = 0; s < LANES; ++s) {
+        const int converged = size[s] <= accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+        const int overshot = size[s] > best[s];
+        const double sign = converged ? 0.0 : overshot ? 1.0 : -1.0;
+#if MSFP_LAW
+        double change = excess[s];
+        for (int c = 0; c < FRICTION; ++c)
+            change += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * newton[c * LANES + s];
+        change = overshot ? 0.5 * step[FRICTION * LANES + s] : change / (1.0 - SLOPE(out, s));
+        step[FRICTION * LANES + s] = change;
+        all->x[MSFP_COEFFICIENT_MU * LANES + s] += sign * change;
+#endif
+        for (int r = 0; r < FRICTION; ++r) {
+            step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
+            all->f[r * LANES + s] += sign * step[r * LANES + s];
+        }
+        best[s] = overshot ? best[s] : size[s];
+    }
+    return unconverged;
+}
+
+/* Y, Z (and mu) of all surfaces by Newton's method on their stage formula. */
+MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, double accuracy)
+{
+    double step[UNKNOWNS * LANES] = { 0 }, best[LANES];
+    for (int s = 0; s < LANES; ++s)
+        best[s] = INFINITY;
+    for (int i = 0; i < 60; ++i) {
+        msfp_contact_lanes(par, all->local, all->f MSFP_IF_LAW(all->x), all->out);
+        const int unconverged = newton_step(all, beta, accuracy, step, best);
+        if (unconverged <= 0)
+            return unconverged == 0 ? MSFP_OK : i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
+    }
+    return MSFP_E_NEWTON;
+}
+
+#if MSFP_CLOSED_FORM
+/* Y of all surfaces after the slip of the step, and their contacts; slope: dY/d(angular velocity of the body)
+ * [s/rad]. */
+MSFP_INLINE int closed_form_stage(const msfp_parameters *p, lanes *all, const msfp_seed *seed, double *slope)
+{
+    double finite = 0.0;
+    for (int s = 0; s < LANES; ++s) {
+        const int j = s < NB ? s : NB - 1;
+        const double per_turn = msfp_slip_per_turn(p->surface[j]);
+        const double slip = per_turn * (seed->beta * all->local[MSFP_LOCAL_DWY * LANES + s] + seed->turn[j]);
+        const double Y = all->f[s] = msfp_friction_after_slip(all->before[s], slip);
+        slope[s] = per_turn * seed->beta * (Y * slip > 0.0 ? 1.0 - Y * Y : 1.0);
+        finite += Y;
+    }
+    msfp_contact_lanes(&p->lanes[0][0], all->local, all->f, all->out);
+    return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
+}
+
+/* As `condense`, with Y a function of the slip of the step. */
+MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const double *slope, double *condensed)
+{
+    double jacobian[ROWS * MSFP_LOCAL * LANES];
+    msfp_contact_jacobian(par, all->local, all->f, all->out, jacobian);
+    for (int r = 0; r <= MOMENT; ++r) {
+        const double *row = jacobian + (r < MOMENT ? r : MOMENT + UNKNOWNS) * MSFP_LOCAL * LANES;
+        for (int k = 0; k < INPUTS; ++k)
+            for (int s = 0; s < LANES; ++s)
+                condensed[(r * INPUTS + k) * LANES + s] =
+                    row[k * LANES + s] + (k == MSFP_LOCAL_DWY ? row[INPUTS * LANES + s] * slope[s] : 0.0);
+    }
+}
+#endif
+
+/* Jacobian of the moment and of N with Y, Z and mu eliminated: [MOMENT + 1][INPUTS][lane]. The matrix of the local
+ * unknowns is close to the identity plus a dissipative part, so that elimination needs no pivots. */
+MSFP_INLINE void condense(const double *par, lanes *all, double beta, double *condensed)
+{
+    double jacobian[ROWS * MSFP_LOCAL * LANES], a[UNKNOWNS][UNKNOWNS + INPUTS][LANES];
+    msfp_contact_jacobian(par, all->local, all->f MSFP_IF_LAW(all->x), all->out, jacobian);
+    for (int r = 0; r < UNKNOWNS; ++r)
+        for (int c = 0; c < UNKNOWNS + INPUTS; ++c) {
+            const double *from =
+                jacobian + ((MOMENT + r) * MSFP_LOCAL + (c < UNKNOWNS ? INPUTS + c : c - UNKNOWNS)) * LANES;
+            const double factor = r < FRICTION ? beta : 1.0;
+            for (int s = 0; s < LANES; ++s)
+                a[r][c][s] = c < UNKNOWNS ? (r == c) - factor * from[s] : factor * from[s];
+        }
+    for (int k = 0; k < UNKNOWNS; ++k) /* Gauss-Jordan elimination */
+        for (int r = 0; r < UNKNOWNS; ++r) {
+            double factor[LANES];
+            for (int s = 0; s < LANES; ++s)
+                factor[s] = r == k ? 1.0 - 1.0 / a[k][k][s] : a[r][k][s] / a[k][k][s];
+            for (int c = k + 1; c < UNKNOWNS + INPUTS && r != k; ++c)
+                for (int s = 0; s < LANES; ++s)
+                    a[r][c][s] -= factor[s] * a[k][c][s];
+        }
+    for (int r = 0; r <= MOMENT; ++r) {
+        const double *row = jacobian + (r < MOMENT ? r : MOMENT + UNKNOWNS) * MSFP_LOCAL * LANES;
+        for (int k = 0; k < INPUTS; ++k) {
+            double *sum = condensed + (r * INPUTS + k) * LANES;
+            for (int s = 0; s < LANES; ++s)
+                sum[s] = row[k * LANES + s];
+            for (int c = 0; c < UNKNOWNS; ++c)
+                for (int s = 0; s < LANES; ++s)
+                    sum[s] += row[(INPUTS + c) * LANES + s] * a[c][UNKNOWNS + k][s] / a[c][c][s];
+        }
+    }
+}
+
+MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2],
+                            double *condensed)
+{
+    lanes all;
+    gather(w, seed, f, &all);
+#if MSFP_CLOSED_FORM
+    if (seed->closed_form) {
+        double slope[LANES];
+        const int status = closed_form_stage(p, &all, seed, slope);
+        if (status == MSFP_OK && condensed)
+            condense_closed_form(&p->lanes[0][0], &all, slope, condensed);
+        scatter(&all, w, f);
+        return status;
+    }
+#endif
+    const int status = friction_stage(&p->lanes[0][0], &all, seed->beta, fmax(seed->accuracy, 1e-12));
+    if (status == MSFP_OK && condensed)
+        condense(&p->lanes[0][0], &all, seed->beta, condensed);
+    scatter(&all, w, f);
+    return status;
+}

@@ -1,0 +1,103 @@
+/* contact_unilateral.c: a contact that transmits compression only, in models with uplift (docs/uplift.md). */
+#include <math.h>
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+#if MSFP_UPLIFT
+enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
+
+static const int signs[NB] = MSFP_SIGNS;
+
+/* The body whose face is the footprint of surface j. */
+static int slider_of(int j) { return signs[j] > 0 ? j + 1 : j; }
+
+/* Components of the compression along the axis of the slider and across it [m]. */
+static void compression(const msfp_work *w, int j, double *along, double *across)
+{
+    double d[3], axis[3], square = 0.0;
+    msfp_coordinates_d_get(w->x[j + 1], d);
+    msfp_body_t3_get(w->body[slider_of(j)], axis);
+    *along = -(d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]);
+    for (int i = 0; i < 3; ++i)
+        square += (d[i] + *along * axis[i]) * (d[i] + *along * axis[i]);
+    *across = sqrt(square);
+}
+
+/* Whether the compression points into the footprint. */
+static int inside(const double *par, double along, double across)
+{
+    return across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA];
+}
+
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    double along, across;
+    const double *par = p->surface[j];
+    compression(w, j, &along, &across);
+    if (inside(par, along, across))
+        return sqrt(along * along + across * across);
+    return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
+}
+
+void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
+{
+    double along, across, *contact = w->unilateral[j];
+    compression(w, j, &along, &across);
+    contact[MSFP_UNILATERAL_GRIP] = contact[MSFP_UNILATERAL_STORED] = contact[MSFP_UNILATERAL_POWER] = 0.0;
+    if (msfp_compression(p, w, j) > 0.0) {
+        if (inside(p->surface[j], along, across))
+            msfp_unilateral_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);
+        else
+            msfp_unilateral_edge(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);
+    }
+    if (contact[MSFP_UNILATERAL_GRIP] <= 0.0)
+        memset(contact, 0, (FORCE + MOMENT) * sizeof *contact);
+    memcpy(w->force[j], contact, sizeof w->force[j]);
+}
+
+void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j)
+{
+    const int k = slider_of(j);
+    double along, across, contact[MSFP_UNILATERAL_SIZE], *dunilateral = w->dunilateral[j];
+    compression(w, j, &along, &across);
+    if (w->unilateral[j][MSFP_UNILATERAL_GRIP] <= 0.0)
+        memset(dunilateral, 0, sizeof w->dunilateral[j]);
+    else if (inside(p->surface[j], along, across))
+        msfp_unilateral_inside_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
+                                       dunilateral);
+    else
+        msfp_unilateral_edge_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
+                                     dunilateral);
+    memcpy(w->dforce[j], dunilateral, sizeof w->dforce[j]);
+}
+
+/* Moments are about the sphere centre of each body; on the slider, the moment of the interface force is added. */
+void msfp_split_moment(msfp_work *w, int j)
+{
+    const double *moment = w->unilateral[j] + FORCE;
+    const int above = signs[j] > 0;
+    memcpy(w->below[j], w->moment[j], sizeof w->below[j]);
+    double *slider = above ? w->moment[j] : w->below[j];
+    for (int i = 0; i < MOMENT; ++i) /* `below` is the reverse of the moment on the body below */
+        slider[i] += above ? moment[i] : -moment[i];
+}
+
+void msfp_split_moment_tangent(msfp_work *w, int j)
+{
+    const double *dmoment = w->dunilateral[j] + FORCE * DOF;
+    const int above = signs[j] > 0;
+    memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
+    double *dslider = above ? w->dmoment[j] : w->dbelow[j];
+    for (int i = 0; i < MOMENT * DOF; ++i)
+        dslider[i] += above ? dmoment[i] : -dmoment[i];
+}
+#else
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    (void)p;
+    (void)w;
+    (void)j;
+    return 1.0;
+}
+#endif

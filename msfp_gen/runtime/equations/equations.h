@@ -1,0 +1,221 @@
+/* equations.h: what the files of equations/ share, and what steppers/ and run/ take from them. Private to the runtime.
+ *
+ * Arguments as in msfp_runtime.h; j is a surface, 0..MSFP_NB - 1; k a body, 0..MSFP_NB. "Columns" are derivatives with
+ * respect to the MSFP_DOF unknowns of a step, stored [field][column].
+ */
+#ifndef MSFP_EQUATIONS_H
+#define MSFP_EQUATIONS_H
+#include <math.h>
+#include "msfp_model.h"
+
+enum { MSFP_PAIR = MSFP_PLANAR ? 1 : 2 }; /* tilt angles of a body */
+#if MSFP_LAW
+#define MSFP_IF_LAW(...) , __VA_ARGS__ /* one more argument where the friction coefficient is an unknown */
+#else
+#define MSFP_IF_LAW(...)
+#endif
+#if MSFP_TOP_ROTATION
+#define MSFP_IF_TOP_ROTATION(...) , __VA_ARGS__ /* one more argument where the support of the top plate rotates */
+#else
+#define MSFP_IF_TOP_ROTATION(...)
+#endif
+
+/* Field of the block of coordinates: angle i of order 0, 1, 2. */
+static inline int msfp_coordinate_field(int order, int i) { return MSFP_PLANAR ? order : 3 * order + i; }
+
+#if MSFP_UPLIFT
+/* Field of the block of coordinates: component i of the separation, order 0, 1, 2. */
+static inline int msfp_separation_field(int order, int i) { return MSFP_COORDINATES_DX + MSFP_SPACE * order + i; }
+#endif
+
+/* Field of the block of coordinates: unknown i of a body, order 0, 1, 2. */
+static inline int msfp_unknown_field(int order, int i)
+{
+#if MSFP_UPLIFT
+    if (i >= MSFP_NA)
+        return msfp_separation_field(order, i - MSFP_NA);
+#endif
+    return msfp_coordinate_field(order, i);
+}
+
+#if MSFP_CLOSED_FORM
+/* Friction in closed form over a slip s (over d_y) in one direction. While friction opposes the slip, dY/ds = 1 - Y^2
+ * (3.18), so Y is a hyperbolic tangent of s; while it unloads, dY/ds = 1. */
+
+/* Take the unloading part of a slip from `slip` and add it to `Y`. Returns 0 if friction does not reach zero in it. */
+MSFP_INLINE int msfp_unload_to_zero(double *Y, double *slip)
+{
+    if (*Y >= 0.0)
+        return 1;
+    if (*slip <= -*Y) {
+        *Y += *slip;
+        return 0;
+    }
+    *slip += *Y;
+    *Y = 0.0;
+    return 1;
+}
+
+/* Y after a slip over d_y: (3.18) integrated. */
+MSFP_INLINE double msfp_friction_after_slip(double Y, double slip)
+{
+    const double sign = slip < 0.0 ? -1.0 : 1.0;
+    double y = sign * Y, rest = fabs(slip);
+    if (!msfp_unload_to_zero(&y, &rest) || y == 1.0) /* at 1 friction is saturated and stays so */
+        return sign * y;
+    const double left = (1.0 - y) * exp(-2.0 * rest);
+    return sign * (1.0 + y - left) / (1.0 + y + left);
+}
+
+/* Work that friction dissipates over that slip, over mu N d_y: the integral of Y^3 ds while friction opposes the
+ * slip. */
+MSFP_INLINE double msfp_friction_loss(double Y, double slip)
+{
+    double y = slip < 0.0 ? -Y : Y, rest = fabs(slip);
+    if (!msfp_unload_to_zero(&y, &rest))
+        return 0.0;
+    if (y == 1.0)
+        return rest;
+    const double left = (1.0 - y) * exp(-2.0 * rest), end = (1.0 + y - left) / (1.0 + y + left);
+    return rest + log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
+}
+
+/* Slip over d_y per rotation of the body above (3.19) [1/rad]; in the plane the contact position does not enter. */
+MSFP_INLINE double msfp_slip_per_turn(const double *par)
+{
+    return -par[MSFP_SURFACE_PARAMETERS_SIGN] * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
+}
+#endif
+
+/* ---- kinematics.c ---- */
+
+/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
+void msfp_inertial_frame(const msfp_point *at, double *body);
+/* Kinematics of body 0. */
+void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+/* Kinematics of the moving bodies; body 0 is in `w`. */
+void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+/* The same with columns; those of the coordinates and of body 0 are in `w`. */
+void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+/* Force and moment above the top plate: loads, springs, dampers, the supported mass. */
+void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+/* The same with columns. dload: columns of the load [6][MSFP_DOF], or NULL. */
+void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload);
+#if MSFP_TOP_ROTATION
+/* Axis of the support of the top plate and its angular velocity, into the block `upright`. */
+void msfp_support_axis(const msfp_point *at, double *upright);
+#endif
+
+/* ---- contact_unilateral.c ---- */
+
+/* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */
+double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
+#if MSFP_UPLIFT
+/* Force of the unilateral contact of surface j, into w->force[j]; zero where it is open or its damping would pull. */
+void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);
+/* Columns of that force and of its moment; the force itself is in `w`. */
+void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j);
+/* Moments of surface j on the body above and on the body below, from the moment about the centre of its concave
+ * side. */
+void msfp_split_moment(msfp_work *w, int j);
+/* Columns of those moments. */
+void msfp_split_moment_tangent(msfp_work *w, int j);
+#endif
+
+/* ---- surface.c ---- */
+
+/* Jacobians of all surfaces with respect to their inputs: moment and N of the contacts, lane by lane; rims. */
+typedef struct {
+    double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+} msfp_surface_jacobians;
+/* Rim force of surface j; drim: its Jacobian [force, moment][psi, theta and their rates], or NULL. */
+void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
+/* Columns of that force and of its moment, from the Jacobian. */
+void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
+/* Share of the rim force that the contact of surface j carries: 1, but with uplift no more than the interface force, so
+ * that a rim met by an open surface adds no normal force. */
+double msfp_rim_share(const msfp_work *w, int j);
+/* Moment of surface j on the body above, in the basis of the body below [N m]. */
+void msfp_surface_moment(const msfp_work *w, int j, double *moment);
+/* Contact force, slip, friction and moment of all surfaces; jacobians: for the tangent, or NULL. Returns a status. */
+int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[MSFP_NB][2],
+                  msfp_surface_jacobians *jacobians);
+/* Sliding displacements and gaps (3.20), (3.21) [m] at given coordinates. */
+void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
+
+/* ---- contact.c ---- */
+
+/* Y, Z and the contact of all surfaces. condensed: Jacobian of moment and N with respect to the inputs of a surface,
+ * with Y, Z (and mu) eliminated, lane by lane; or NULL. Returns a status. */
+int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[MSFP_NB][2],
+                  double *condensed);
+#if MSFP_LAW
+/* Temperatures of the surfaces for the friction law, and a finite first guess of mu. */
+void msfp_friction_conditions(const msfp_point *at, msfp_work *w);
+#endif
+
+/* ---- condensed.c, and its tangent in tangent.c or, with uplift, in tangent_uplift.c ---- */
+
+/* Natural size of each residual [MSFP_DOF]: (N + rim force) R (mu + 1/100) of the surface below; of a force N + rim
+ * force. */
+void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale);
+/* Largest residual relative to its natural size, infinite where one is not finite. worst: its row, unchanged if all are
+ * zero. */
+double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
+/* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
+void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                  const msfp_surface_jacobians *jacobians, double *tangent);
+
+/* ---- observe.c ---- */
+
+/* Power of friction at one surface, added: `stored` recoverable, `lost` dissipated [W]. par, contact: blocks of the
+ * surface; f: Y, Z. */
+void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
+/* Integrands of all integrals but those of friction [W]. */
+void msfp_powers_without_friction(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
+                                  const msfp_mechanical *mechanical, double power[MSFP_WORKS]);
+/* Power of the load on the top plate, relative to the moving base [W]. */
+double msfp_load_power(const msfp_point *at, const msfp_work *w);
+/* Power of everything that moves as prescribed, a part of the input: the base of the rig and a rotating base [W]. */
+double msfp_prescribed_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
+/* Kinetic and potential energy and that of all springs but friction [J]. */
+double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
+                          const msfp_mechanical *mechanical);
+/* Fill a row from the evaluation in `w`. */
+void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,
+                 msfp_row *row);
+
+/* ---- history.c ---- */
+
+/* Value and derivatives of a prescribed history at time t [s]: out [orders][6]. */
+void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
+
+/* ---- heat.c: nothing of it is compiled into models without heat ---- */
+#if MSFP_HEAT
+/* Rates [MSFP_NB][MSFP_HEAT] of the parts of the temperature rise [K/s]: dheat/dt = -lambda heat + weight flux. */
+void msfp_heat_rates(const double *heat, const double flux[MSFP_NB], double *rates);
+/* Temperature of a state, for an evaluation. */
+void msfp_heat_point(const msfp_state *s, msfp_point *at);
+/* Heat flux of the evaluation in run->work, into the present state. */
+void msfp_heat_initial_state(msfp_run *run);
+/* A step: begin; prepare and close each stage i (weights: of the earlier stages, beta: diagonal entry [s]); finish. */
+void msfp_heat_begin(msfp_run *run);
+void msfp_heat_prepare(msfp_run *run, const double *weights, int i, double h, double beta, msfp_point *at);
+void msfp_heat_stage(msfp_run *run, int i, double beta);
+/* Copy the present stage to an interpolation node. */
+void msfp_heat_node(const msfp_run *run, msfp_node *node);
+void msfp_heat_finish(msfp_run *run);
+/* Largest error of a temperature over its tolerance [-]; weights: of the method less the embedded ones. */
+double msfp_heat_error(const msfp_run *run, const double *weights, int stages, double h, double beta);
+#else
+#define msfp_heat_point(s, at) ((void)0)
+#define msfp_heat_initial_state(run) ((void)0)
+#define msfp_heat_begin(run) ((void)0)
+#define msfp_heat_prepare(run, weights, i, h, beta, at) ((void)0)
+#define msfp_heat_stage(run, i, beta) ((void)0)
+#define msfp_heat_node(run, node) ((void)0)
+#define msfp_heat_finish(run) ((void)0)
+#define msfp_heat_error(run, weights, stages, h, beta) 0.0
+#endif
+
+#endif

@@ -1,0 +1,223 @@
+/* kinematics.c: parameters, kinematics from the base upward, force and moment above the top plate, named points. */
+#include <math.h>
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
+
+static const int signs[NB] = MSFP_SIGNS;
+
+void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies, const double *surfaces,
+                         const double *top)
+{
+    memset(p, 0, sizeof *p);
+    p->gravity = gravity;
+    for (int k = 0; k <= NB; ++k) {
+        const double *b = bodies + k * MSFP_BODY_VALUES;
+        double *d = p->dimensions[k], *out = p->body[k], arms[MSFP_ARMS_SIZE];
+        d[MSFP_DIMENSIONS_HEIGHT] = b[MSFP_BODY_VALUE_HEIGHT];
+        d[MSFP_DIMENSIONS_CENTROID] = b[MSFP_BODY_VALUE_CENTROID];
+        d[MSFP_DIMENSIONS_SIGN_LOWER] = k > 0 ? signs[k - 1] : 1.0;
+        d[MSFP_DIMENSIONS_SIGN_UPPER] = k < NB ? signs[k] : 1.0;
+        d[MSFP_DIMENSIONS_RADIUS_LOWER] =
+            k > 0 ? surfaces[(k - 1) * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_RADIUS] : 0.0;
+        d[MSFP_DIMENSIONS_RADIUS_UPPER] = k < NB ? surfaces[k * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_RADIUS] : 0.0;
+        msfp_arms(d, arms);
+        out[MSFP_BODY_PARAMETERS_C] = arms[MSFP_ARMS_C];
+        out[MSFP_BODY_PARAMETERS_E] = arms[MSFP_ARMS_E];
+        out[MSFP_BODY_PARAMETERS_M] = b[MSFP_BODY_VALUE_MASS];
+        out[MSFP_BODY_PARAMETERS_JT] = b[MSFP_BODY_VALUE_INERTIA_TRANSVERSE];
+        out[MSFP_BODY_PARAMETERS_JA] = b[MSFP_BODY_VALUE_INERTIA_AXIAL];
+        out[MSFP_BODY_PARAMETERS_G] = gravity;
+    }
+    for (int j = 0; j < NB; ++j) {
+        const double *s = surfaces + j * MSFP_SURFACE_VALUES;
+        const double radius = s[MSFP_SURFACE_VALUE_RADIUS], tilt = s[MSFP_SURFACE_VALUE_CAPACITY] / radius;
+        const double *slider = bodies + (signs[j] > 0 ? j + 1 : j) * MSFP_BODY_VALUES;
+        double *out = p->surface[j];
+        out[MSFP_SURFACE_PARAMETERS_SIGN] = signs[j];
+        out[MSFP_SURFACE_PARAMETERS_R] = radius;
+        out[MSFP_SURFACE_PARAMETERS_SC] = s[MSFP_SURFACE_VALUE_CAPACITY];
+        out[MSFP_SURFACE_PARAMETERS_MU] = s[MSFP_SURFACE_VALUE_FRICTION];
+        out[MSFP_SURFACE_PARAMETERS_DY] = s[MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT];
+        out[MSFP_SURFACE_PARAMETERS_KC] = s[MSFP_SURFACE_VALUE_RIM_STIFFNESS];
+        out[MSFP_SURFACE_PARAMETERS_CC] = s[MSFP_SURFACE_VALUE_RIM_DAMPING];
+        out[MSFP_SURFACE_PARAMETERS_RS] = slider[MSFP_BODY_VALUE_RIM_RADIUS];
+        out[MSFP_SURFACE_PARAMETERS_PR] = slider[MSFP_BODY_VALUE_RIM_OFFSET];
+#if MSFP_UPLIFT
+        out[MSFP_SURFACE_PARAMETERS_KS] = s[MSFP_SURFACE_VALUE_SEAT_STIFFNESS];
+        out[MSFP_SURFACE_PARAMETERS_CS] = s[MSFP_SURFACE_VALUE_SEAT_DAMPING];
+#endif
+        /* The footprint bounds the contact position; friction inclines the resultant further by its angle. */
+        const double footprint = fmin(
+            asin(fmin(slider[MSFP_BODY_VALUE_RIM_RADIUS] / radius, 1.0)) + atan(s[MSFP_SURFACE_VALUE_FRICTION]), 1.5);
+        out[MSFP_SURFACE_PARAMETERS_CA] = cos(footprint);
+        out[MSFP_SURFACE_PARAMETERS_SA] = sin(footprint);
+        for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* the numbers of a friction law come last in both */
+            out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
+        p->rim_cosine[j] = cos(tilt);
+        p->rim_slope[j] = radius / sin(tilt);
+    }
+    for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)
+        for (int lane = 0; lane < MSFP_LANES; ++lane)
+            p->lanes[i][lane] = p->surface[lane < NB ? lane : NB - 1][i];
+    double *t = p->top;
+    t[MSFP_TOP_PARAMETERS_K] = top[MSFP_TOP_VALUE_STIFFNESS];
+    t[MSFP_TOP_PARAMETERS_C] = top[MSFP_TOP_VALUE_DAMPING];
+    t[MSFP_TOP_PARAMETERS_KR] = top[MSFP_TOP_VALUE_ROTATIONAL_STIFFNESS];
+    t[MSFP_TOP_PARAMETERS_CR] = top[MSFP_TOP_VALUE_ROTATIONAL_DAMPING];
+    t[MSFP_TOP_PARAMETERS_M] = top[MSFP_TOP_VALUE_MASS];
+    t[MSFP_TOP_PARAMETERS_JT] = top[MSFP_TOP_VALUE_INERTIA_TRANSVERSE];
+    t[MSFP_TOP_PARAMETERS_JA] = top[MSFP_TOP_VALUE_INERTIA_AXIAL];
+    t[MSFP_TOP_PARAMETERS_H] = top[MSFP_TOP_VALUE_HEIGHT];
+    t[MSFP_TOP_PARAMETERS_G] = gravity;
+    const double anchor[3] = { top[MSFP_TOP_VALUE_ANCHOR_X], top[MSFP_TOP_VALUE_ANCHOR_Y], 0.0 };
+    msfp_top_parameters_x0_put(t, anchor);
+    p->weight = top[MSFP_TOP_VALUE_MASS] * gravity;
+    for (int k = 1; k <= NB; ++k)
+        p->weight += bodies[k * MSFP_BODY_VALUES + MSFP_BODY_VALUE_MASS] * gravity;
+}
+
+/* The block of coordinates from q, v, a of a body; separated: with the separation, which the base has not. */
+static void load_coordinates(double *x, const double *q, const double *v, const double *a, int separated)
+{
+    const double *orders[MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT] = { q, v, a };
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < (MSFP_PLANAR ? 1 : 3); ++i)
+            x[msfp_coordinate_field(order, i)] = orders[order][MSFP_PLANAR ? 1 : i];
+#if MSFP_UPLIFT
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < MSFP_SPACE; ++i)
+            x[msfp_separation_field(order, i)] = separated ? orders[order][3 + (MSFP_PLANAR ? 2 * i : i)] : 0.0;
+#else
+    (void)separated;
+#endif
+}
+
+void msfp_inertial_frame(const msfp_point *at, double *body)
+{
+    static const double e[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+    memset(body, 0, MSFP_BODY_SIZE * sizeof *body);
+    msfp_body_t1_put(body, e[0]);
+    msfp_body_t2_put(body, e[1]);
+    msfp_body_t3_put(body, e[2]);
+    msfp_body_C_put(body, at->base[0]);
+    msfp_body_V_put(body, at->base[1]);
+    msfp_body_A_put(body, at->base[2]);
+}
+
+void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    double below[MSFP_BODY_SIZE];
+    msfp_inertial_frame(at, below);
+    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
+    msfp_forward(p->body[0], below, w->x[0], w->body[0]);
+}
+
+MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    for (int k = 1; k <= NB; ++k) {
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
+        msfp_forward(p->body[k], w->body[k - 1], w->x[k], w->body[k]);
+    }
+}
+
+MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    for (int k = 1; k <= NB; ++k) {
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
+        msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
+    }
+}
+
+static void load_top(const msfp_point *at, double *force, double *moment)
+{
+    msfp_force_F_put(force, at->load);
+    msfp_moment_M_put(moment, at->load + 3);
+}
+
+#if MSFP_TOP_ROTATION
+void msfp_support_axis(const msfp_point *at, double *upright)
+{
+    double support[MSFP_SUPPORT_SIZE];
+    for (int order = 0; order < 2; ++order)
+        for (int i = 0; i < MSFP_PAIR; ++i)
+            support[order * MSFP_PAIR + i] = at->support[order][MSFP_PLANAR ? 1 : i];
+    msfp_upright(support, upright);
+}
+#endif
+
+static void split_wrench(const double *wrench, double *force, double *moment)
+{
+    memcpy(force, wrench, FORCE * sizeof *force);
+    memcpy(moment, wrench + FORCE, MOMENT * sizeof *moment);
+}
+
+MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    double force[FORCE], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE];
+    load_top(at, force, moment);
+#if MSFP_TOP_ROTATION
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_support_axis(at, upright);
+#endif
+    msfp_top_wrench(p->top, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench);
+    split_wrench(wrench, w->force[NB], w->moment[NB]);
+    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
+}
+
+MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload)
+{
+    static const double zero[6 * DOF];
+    double force[FORCE], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
+    load_top(at, force, moment);
+#if MSFP_TOP_ROTATION
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_support_axis(at, upright);
+#endif
+    const double *df = dload ? dload : zero, *dm = dload ? dload + FORCE * DOF : zero;
+    msfp_top_wrench_tangent(p->top, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench,
+                            w->dbody[NB], w->dx[NB], df, dm, dwrench);
+    split_wrench(wrench, w->force[NB], w->moment[NB]);
+    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
+    memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);
+    memcpy(w->dmoment[NB], dwrench + FORCE * DOF, sizeof w->dmoment[NB]);
+}
+
+static void points_of(const double *block, double *out /* [4][3][3] */)
+{
+    msfp_points_r_lo_get(block, out);
+    msfp_points_v_lo_get(block, out + 3);
+    msfp_points_a_lo_get(block, out + 6);
+    msfp_points_r_cm_get(block, out + 9);
+    msfp_points_v_cm_get(block, out + 12);
+    msfp_points_a_cm_get(block, out + 15);
+    msfp_points_r_up_get(block, out + 18);
+    msfp_points_v_up_get(block, out + 21);
+    msfp_points_a_up_get(block, out + 24);
+    msfp_points_r_sc_get(block, out + 27);
+    msfp_points_v_sc_get(block, out + 30);
+    msfp_points_a_sc_get(block, out + 33);
+}
+
+void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *points, double *rotations,
+                        double *bases)
+{
+    msfp_work w;
+    double below[MSFP_BODY_SIZE], block[MSFP_POINTS_SIZE];
+    msfp_base(p, at, &w);
+    msfp_kinematics(p, at, &w);
+    msfp_inertial_frame(at, below);
+    for (int k = 0; k <= NB; ++k) {
+        msfp_named_points(p->dimensions[k], k ? w.body[k - 1] : below, w.x[k], block);
+        points_of(block, points + k * 36);
+        msfp_body_w_get(w.body[k], rotations + k * 12);
+        msfp_body_wp_get(w.body[k], rotations + k * 12 + 3);
+        msfp_body_al_get(w.body[k], rotations + k * 12 + 6);
+        msfp_body_alp_get(w.body[k], rotations + k * 12 + 9);
+        msfp_body_t1_get(w.body[k], bases + k * 9);
+        msfp_body_t2_get(w.body[k], bases + k * 9 + 3);
+        msfp_body_t3_get(w.body[k], bases + k * 9 + 6);
+    }
+}

@@ -1,0 +1,190 @@
+/* tangent.c: the tangent of the condensed equations without uplift: an unknown moves its body and all bodies above it
+ * as one rigid body.
+ *
+ * Columns are formed from the top down in body-fixed frames (generator/columns.py). A body above an unknown sees only
+ * the variation of its angular velocity and acceleration, a body below only the variation of the interface force.
+ */
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+#if !MSFP_UPLIFT
+enum {
+    NB = MSFP_NB,
+    DOF = MSFP_DOF,
+    NA = MSFP_NA,
+    ND = MSFP_ND,
+    FORCE = MSFP_FORCE_SIZE,
+    MOMENT = MSFP_MOMENT_SIZE,
+    PAIR = MSFP_PAIR
+};
+/* Fields of the local variation of a body: the inputs of the contact beside its force come first. */
+enum {
+    TWIST = MSFP_TWIST_SIZE,
+    VARIATION = MSFP_VARIATION_SIZE,
+    VARIATION_P = MSFP_LOCAL_SIZE - FORCE,
+    VARIATION_F = VARIATION_P + FORCE,
+    VARIATION_M = VARIATION_F + FORCE,
+    VARIATION_WP = VARIATION_M + MOMENT
+};
+enum { INPUTS = MSFP_LOCAL_SIZE };
+static const double no_twist[TWIST]; /* columns are derivatives at zero twist */
+
+/* All columns at one body, [field][column], and at the surfaces next to it. */
+typedef struct {
+    double twist[TWIST * DOF]; /* of the unknowns of this body and of those below it; zero for unknowns above */
+    double above[FORCE * DOF], moment_above[MOMENT * DOF]; /* body-fixed frame; basis of the body */
+    double below[FORCE * DOF], moment_below[MOMENT * DOF]; /* body-fixed frame; basis of the body below */
+    double turning[MSFP_TURNING_SIZE * DOF];
+} columns;
+
+/* Add the local variation of body k to the columns of `count` fields, from its field `field` on. */
+MSFP_INLINE void add_variation(double *column, int k, const double *variation, int field, int count)
+{
+    for (int i = 0; i < ND; ++i)
+        for (int f = 0; f < count; ++f)
+            column[f * DOF + (k - 1) * ND + i] += variation[i * VARIATION + field + f];
+}
+
+/* Twists of all unknowns. */
+MSFP_INLINE void twists(const msfp_work *w, const double *seed, double *twist)
+{
+    double tilts[PAIR * TWIST];
+    for (int k = 1; k <= NB; ++k) {
+        msfp_twists(seed, w->body[k - 1], w->body[k], tilts);
+        for (int f = 0; f < TWIST; ++f)
+            for (int i = 0; i < ND; ++i)
+                twist[f * DOF + (k - 1) * ND + i] = i < PAIR ? tilts[i * TWIST + f] : 0.0;
+    }
+}
+
+/* Columns of force and moment at the top, whose springs act along fixed axes. */
+MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                     const double *variation, columns *c)
+{
+    double body[MSFP_BODY_SIZE], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
+    msfp_transported_twist_tangent(w->body[NB], no_twist, body, c->twist, w->dbody[NB]);
+    memset(w->dx[NB], 0, sizeof w->dx[NB]);
+#if MSFP_SPIN_LOCKED
+    (void)seed;
+    (void)variation;
+#else
+    add_variation(w->dbody[NB] + MSFP_BODY_WPX * DOF, NB, variation, VARIATION_WP, MOMENT);
+    add_variation(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, variation, VARIATION_WP + MOMENT, MOMENT);
+    w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->cq;
+#endif
+    msfp_top_tangent(p, at, w, NULL);
+    msfp_transported_wrench_tangent(w->body[NB], no_twist, w->force[NB], w->moment[NB], wrench, c->twist, w->dforce[NB],
+                                    w->dmoment[NB], dwrench);
+    memcpy(c->above, dwrench, sizeof c->above);
+    memcpy(c->moment_above, dwrench + FORCE * DOF, sizeof c->moment_above);
+}
+
+/* Derivatives of the inputs of the contact of surface j with respect to the unknowns of the body above:
+ * [inputs][ND]. */
+MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_seed *seed, const double *rim, int j,
+                              const double *variation, double *inputs)
+{
+    const double factors[2] = { seed->cq, seed->cv };
+    for (int k = 0; k < INPUTS; ++k)
+        for (int i = 0; i < ND; ++i)
+            inputs[k * ND + i] = variation[i * VARIATION + (k < FORCE ? VARIATION_P + k : k - FORCE)];
+    for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
+        for (int f = 0; f < FORCE; ++f)
+            inputs[f * ND + i % PAIR] -= factors[i / PAIR] * rim[f * MSFP_RIM_LOCAL + i];
+}
+
+/* Columns of one component of the moment, or of N, of the contact of surface j, from the columns of its force. */
+MSFP_INLINE void contact_row(const double *restrict slope, const double *restrict local, int j,
+                             const double *restrict inputs, double cv, double *restrict row)
+{
+    double local_part[ND] = { 0 };
+    for (int k = 0; k < INPUTS; ++k)
+        for (int i = 0; i < ND; ++i)
+            local_part[i] += slope[k * MSFP_LANES] * inputs[k * ND + i];
+    for (int c = 0; c < DOF; ++c) {
+        double sum = 0.0;
+        for (int k = 0; k < FORCE; ++k)
+            sum += slope[k * MSFP_LANES] * local[k * DOF + c];
+        row[c] = sum;
+    }
+    for (int i = 0; i < ND; ++i)
+        row[j * ND + i] += local_part[i];
+#if MSFP_SPIN_LOCKED
+    (void)cv;
+#else
+    if (j > 0) /* spin of the body below */
+        row[j * ND - 1] -= slope[MSFP_LOCAL_DWZ * MSFP_LANES] * cv;
+#endif
+}
+
+/* Columns of the moment and of N of surface j, in the basis of the body below. */
+MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, const msfp_surface_jacobians *jacobians, int j,
+                         const double *variation, columns *c)
+{
+    double unused[FORCE], local[FORCE * DOF], inputs[ND * INPUTS];
+    const double *rim = jacobians->rim[j], factors[2] = { seed->cq, seed->cv };
+    local_inputs(w, seed, rim, j, variation, inputs);
+    msfp_force_to_local_tangent(w->body[j], w->force[j], unused, c->below, local);
+    for (int r = 0; r <= MOMENT; ++r)
+        contact_row(jacobians->contact + r * INPUTS * MSFP_LANES + j, local, j, inputs, seed->cv,
+                    r < MOMENT ? c->moment_below + r * DOF : w->dnormal[j]);
+    for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
+        for (int r = 0; r < MOMENT; ++r)
+            c->moment_below[r * DOF + j * ND + i % PAIR] += factors[i / PAIR] * rim[(FORCE + r) * MSFP_RIM_LOCAL + i];
+}
+
+/* Columns of the force below body k from those above, and the variation of its angular velocity and acceleration. */
+MSFP_INLINE void force_below(const msfp_parameters *p, const msfp_work *w, int k, const double *variation, columns *c)
+{
+    double turning[MSFP_TURNING_SIZE], force[FORCE];
+    msfp_transported_force_tangent(p->body[k], w->body[k], no_twist, w->force[k], force, c->twist, c->above, c->below);
+    msfp_variation_of_rates_tangent(w->body[k], no_twist, turning, c->twist, c->turning);
+#if MSFP_SPIN_LOCKED
+    (void)variation;
+#else
+    add_variation(c->turning, k, variation, VARIATION_WP, MSFP_TURNING_SIZE);
+#endif
+    for (int f = 0; f < TWIST; ++f)
+        memset(c->twist + f * DOF + (k - 1) * ND, 0, ND * sizeof *c->twist);
+}
+
+/* Rows of body k. They are linear in forces and moments, whose values therefore do not enter the columns. */
+MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, const double *variation, const columns *c,
+                         double *tangent)
+{
+    double turning[MSFP_TURNING_SIZE], out[MSFP_ANGULAR_SIZE], *rows = tangent + (k - 1) * ND * DOF;
+    msfp_variation_of_rates(w->body[k], no_twist, turning);
+    msfp_turning_balance_tangent(p->body[k], w->body[k], turning, w->force[k - 1], w->moment[k - 1], w->force[k],
+                                 w->moment[k], out, c->turning, c->below, c->moment_below, c->above, c->moment_above,
+                                 rows);
+    for (int i = 0; i < ND; ++i)
+        for (int r = 0; r < NA; ++r)
+            rows[r * DOF + (k - 1) * ND + i] -= variation[i * VARIATION + VARIATION_M + r];
+}
+
+MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                            const msfp_surface_jacobians *jacobians, double *tangent)
+{
+    const double factors[MSFP_SEED_SIZE] = { seed->cq, seed->cv, seed->ca };
+    double variation[NB + 1][ND * VARIATION], moment[MOMENT];
+    columns c;
+    twists(w, factors, c.twist);
+    for (int k = 1; k <= NB; ++k) {
+        msfp_surface_moment(w, k - 1, moment);
+        msfp_local_variation(factors, w->body[k - 1], w->body[k], w->x[k], w->x[k - 1], w->force[k - 1], moment,
+                             variation[k]);
+    }
+    top(p, at, seed, w, variation[NB], &c);
+    for (int k = NB; k >= 1; --k) {
+        double next[FORCE * DOF]; /* in the frame of the body below */
+        force_below(p, w, k, variation[k], &c);
+        memcpy(next, c.below, sizeof next);
+        add_variation(next, k, variation[k], VARIATION_F, FORCE);
+        surface(w, seed, jacobians, k - 1, variation[k], &c);
+        balance(p, w, k, variation[k], &c, tangent);
+        memcpy(c.above, next, sizeof c.above);
+        memcpy(c.moment_above, c.moment_below, sizeof c.moment_above);
+    }
+}
+#endif

@@ -1,0 +1,83 @@
+/* tangent_uplift.c: the tangent of the condensed equations with uplift: columns of all fields, from the base upward.
+ *
+ * Separations are along fixed axes, so that the bodies above an unknown do not move as one rigid body (tangent.c).
+ */
+#include <string.h>
+#include "equations.h"
+#include "msfp_kernels.h"
+
+#if MSFP_UPLIFT
+enum { NB = MSFP_NB, DOF = MSFP_DOF, NA = MSFP_NA, ND = MSFP_ND, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
+
+static void seed_columns(msfp_work *w, const msfp_seed *seed)
+{
+    memset(w->dx, 0, sizeof w->dx);
+    memset(w->dbody[0], 0, sizeof w->dbody[0]);
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const double factors[3] = { seed->cq, seed->cv, seed->ca };
+            for (int order = 0; order < 3; ++order)
+                w->dx[k + 1][msfp_unknown_field(order, i) * DOF + k * ND + i] = factors[order];
+        }
+}
+
+/* Columns of the forces of the unilateral contacts, and of the linear balances. The kernels are linear in forces, whose
+ * values therefore do not enter. */
+static void forces(const msfp_parameters *p, msfp_work *w, double *tangent)
+{
+    double dsum[FORCE * DOF], unused[FORCE];
+    memcpy(dsum, w->dforce[NB], sizeof dsum);
+    for (int j = NB - 1; j >= 0; --j) {
+        double *dforce = w->dforce[j];
+        msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], w->force[j + 1], unused, w->dbody[j + 1], dsum,
+                                     dforce);
+        memcpy(dsum, dforce, sizeof dsum);
+        msfp_unilateral_tangent(p, w, j);
+        for (int i = 0; i < MSFP_SPACE * DOF; ++i)
+            tangent[(j * ND + NA) * DOF + i] = dsum[i] - dforce[i];
+    }
+}
+
+/* Columns of the moments of surface j on its two bodies, and of N. */
+static void surface(msfp_work *w, const msfp_surface_jacobians *jacobians, int j)
+{
+    double dlocal[MSFP_LOCAL_SIZE * DOF], drf[FORCE * DOF], dmoment[MOMENT * DOF], local[MSFP_LOCAL_SIZE],
+        moment[MOMENT], unused[MOMENT];
+    const double share = msfp_rim_share(w, j);
+    msfp_rim_force_tangent(w, j, jacobians->rim[j], drf, dmoment);
+    for (int i = 0; i < FORCE * DOF; ++i)
+        drf[i] *= share;
+    msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], local,
+                               w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
+    memset(w->dnormal[j], 0, sizeof w->dnormal[j]);
+    for (int r = 0; r <= MOMENT; ++r) {
+        double *row = r < MOMENT ? dmoment + r * DOF : w->dnormal[j];
+        for (int k = 0; k < MSFP_LOCAL_SIZE; ++k) {
+            const double slope = jacobians->contact[(r * MSFP_LOCAL_SIZE + k) * MSFP_LANES + j];
+            for (int c = 0; c < DOF; ++c)
+                row[c] += slope * dlocal[k * DOF + c];
+        }
+    }
+    msfp_surface_moment(w, j, moment);
+    msfp_moment_to_world_tangent(w->body[j], moment, unused, w->dbody[j], dmoment, w->dmoment[j]);
+    msfp_split_moment_tangent(w, j);
+}
+
+MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                            const msfp_surface_jacobians *jacobians, double *tangent)
+{
+    double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    seed_columns(w, seed);
+    msfp_kinematics_tangent(p, at, w);
+    msfp_top_tangent(p, at, w, NULL);
+    forces(p, w, tangent);
+    for (int j = 0; j < NB; ++j)
+        surface(w, jacobians, j);
+    for (int k = 1; k <= NB; ++k) {
+        const double *above = k < NB ? w->below[k] : w->moment[k], *dabove = k < NB ? w->dbelow[k] : w->dmoment[k];
+        msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out,
+                                     w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], dabove, dout);
+        memcpy(tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
+    }
+}
+#endif

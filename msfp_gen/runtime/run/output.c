@@ -1,0 +1,181 @@
+/* output.c: rows and events of a run. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "run.h"
+
+enum { NB = MSFP_NB };
+
+void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)
+{
+    msfp_point at;
+    msfp_work w;
+    msfp_to_point(run, s, &at);
+    msfp_observe(&run->parameters, &at, &w, row);
+    row->time = s->t;
+    memcpy(row->work, s->work, sizeof row->work);
+}
+
+/* The array with room for one more item; NULL where there is no memory. */
+static void *grown(void *items, size_t count, size_t *capacity, size_t size)
+{
+    if (count < *capacity)
+        return items;
+    *capacity = *capacity ? 2 * *capacity : 256;
+    return realloc(items, *capacity * size);
+}
+
+static msfp_row *new_row(msfp_run *run)
+{
+    msfp_row *rows = grown(run->rows, run->row_count, &run->row_capacity, sizeof *rows);
+    if (!rows)
+        return NULL;
+    run->rows = rows;
+    return &rows[run->row_count++];
+}
+
+int msfp_write_row(msfp_run *run, const msfp_state *s)
+{
+    msfp_row *row = new_row(run);
+    if (!row)
+        return MSFP_E_MEMORY;
+    msfp_observe_state(run, s, row);
+    return MSFP_OK;
+}
+
+/* A row inside a step of an implicit method: the polynomial through the rows at its ends and nodes. Forces are
+ * interpolated as such; computed from interpolated angles they would carry the error of a stiff spring. */
+static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
+{
+    double *values = (double *)out;
+    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i) {
+        values[i] = 0.0;
+        for (int r = 0; r < w->count; ++r)
+            values[i] += w->of[r] * ((const double *)&rows[r])[i];
+    }
+}
+
+/* |(Y, Z)| no larger than in the rows that a row is interpolated from: at a reversal a polynomial may exceed them. */
+static void limit_friction(const msfp_row *rows, int count, msfp_row *row)
+{
+    for (int j = 0; j < NB; ++j) {
+        double most = 1.0, size = hypot(row->f[j][0], row->f[j][1]);
+        for (int r = 0; r < count; ++r)
+            most = fmax(most, hypot(rows[r].f[j][0], rows[r].f[j][1]));
+        for (int d = 0; d < 2 && size > most; ++d)
+            row->f[j][d] *= most / size;
+    }
+}
+
+/* Restore what a polynomial does not keep: the sliding displacement, which has a kink at the centre, from the angles of
+ * the row; normal forces, rim forces and energies that are not negative. */
+static void restore_bounds(const msfp_run *run, msfp_row *row)
+{
+    const msfp_row *given = row;
+    double sliding[NB][MSFP_GAP_SIZE];
+    msfp_gaps(&run->parameters, given->q, sliding);
+    row->kinetic = fmax(row->kinetic, 0.0);
+    row->rim_stored = fmax(row->rim_stored, 0.0);
+    row->seat_stored = fmax(row->seat_stored, 0.0);
+    for (int j = 0; j < NB; ++j) {
+        if (row->normal[j] < 0.0)
+            row->normal[j] = row->force[j][0] = row->force[j][1] = row->force[j][2] = 0.0;
+        row->sliding[j] = sliding[j][MSFP_GAP_S];
+        row->gap[j] = sliding[j][MSFP_GAP_G];
+        row->rim[j] = row->gap[j] > 0.0 ? 0.0 : fmax(row->rim[j], 0.0); /* a rim only pushes, and only in contact */
+    }
+}
+
+double msfp_next_output(const msfp_run *run)
+{
+    const double step = run->options.output_step;
+    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->row_count);
+}
+
+int msfp_write_now(msfp_run *run)
+{
+    if (run->row_count && run->rows[run->row_count - 1].time >= run->now.t)
+        return MSFP_OK;
+    return msfp_write_row(run, &run->now);
+}
+
+/* Rows at even times up to `last`, inside the last step. */
+static int write_between(msfp_run *run, double last)
+{
+    msfp_row rows[MSFP_NODES + 2], *row;
+    msfp_state s;
+    const double h = run->next.t - run->now.t;
+    if (run->node_count) {
+        msfp_observe_state(run, &run->now, &rows[0]);
+        for (int i = 0; i < run->node_count; ++i) {
+            msfp_interpolate(run, run->node[i].share, &s);
+            msfp_observe_state(run, &s, &rows[i + 1]);
+        }
+        msfp_observe_state(run, &run->next, &rows[run->node_count + 1]);
+    }
+    for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
+        const double share = fmin(1.0, (run->output_time - run->now.t) / h);
+        if (!(row = new_row(run)))
+            return MSFP_E_MEMORY;
+        msfp_interpolate(run, share, &s);
+        if (run->node_count) {
+            const msfp_weights w = msfp_weights_at(run, share);
+            blend(rows, &w, row);
+            limit_friction(rows, w.count, row);
+            restore_bounds(run, row);
+        } else
+            msfp_observe_state(run, &s, row);
+        row->time = run->output_time;
+        memcpy(row->work, s.work, sizeof row->work);
+    }
+    return MSFP_OK;
+}
+
+/* A row of the end of the step, from the evaluation that ended it. */
+static int write_reached(msfp_run *run, double time)
+{
+    msfp_row *row = new_row(run);
+    if (!row)
+        return MSFP_E_MEMORY;
+    msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, row);
+    row->time = time;
+    memcpy(row->work, run->next.work, sizeof row->work);
+    return MSFP_OK;
+}
+
+int msfp_write_step(msfp_run *run)
+{
+    const double last = run->next.t + msfp_smallest_step(run->next.t);
+    if (run->options.output_step <= 0.0)
+        return write_reached(run, run->next.t);
+    if (fabs(run->next.t - run->output_time) <= msfp_smallest_step(run->next.t) && msfp_is_quasistatic(run)) {
+        const int status = write_reached(run, run->output_time);
+        run->output_time = msfp_next_output(run);
+        return status;
+    }
+    return run->output_time <= last ? write_between(run, last) : MSFP_OK;
+}
+
+void msfp_displacement_across(const msfp_run *run, const msfp_row *row, double *displacement)
+{
+    for (int i = 0; i < 3; ++i)
+        displacement[i] = row->base[i] - row->top[i] - run->start[i];
+}
+
+int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind)
+{
+    msfp_row row;
+    msfp_event *events = grown(run->events, run->event_count, &run->event_capacity, sizeof *events);
+    if (!events)
+        return run->status = MSFP_E_MEMORY;
+    run->events = events;
+    msfp_event *event = &events[run->event_count++];
+    msfp_observe_state(run, s, &row);
+    event->time = s->t;
+    event->surface = surface;
+    event->kind = kind;
+    msfp_displacement_across(run, &row, event->displacement);
+    memcpy(event->top_force, row.top_force, sizeof event->top_force);
+    ++run->counts[MSFP_COUNT_EVENTS];
+    return MSFP_OK;
+}

@@ -1,0 +1,287 @@
+/* run.c: the loop of a run: step size, jumps, events, output. It returns after some steps, so that a caller may
+ * interrupt. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "run.h"
+
+enum {
+    NB = MSFP_NB,
+    STABILITY_LIMIT_STEPS =
+        500 /* consecutive steps; rim contact causes a few (Hairer and Wanner, Solving ODEs II, IV.2: 15) */
+};
+static const double smallest_step = 1e-9;     /* [s], far below any period of a bearing; closer times count as equal */
+static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
+
+/* Accelerations, friction rates and powers consistent with the present state: at the start and after a jump of the base
+ * acceleration. */
+static int consistent_initial_state(msfp_run *run)
+{
+    msfp_point at;
+    msfp_solution solution = { 0, 0, 0.0 };
+    double f[NB][2], residual[MSFP_DOF];
+    msfp_seed seed = { 0 };
+    msfp_to_point(run, &run->now, &at);
+    memset(at.a, 0, sizeof at.a);
+    if (!MSFP_MASSLESS) {
+        const int status = msfp_accelerations(&run->parameters, &at, &run->work, &solution);
+        if (status)
+            return status;
+        if (run->options.method != MSFP_METHOD_DOPRI5 && run->determinant == 0)
+            run->determinant = solution.determinant;
+    }
+    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(f, at.f, sizeof f);
+    const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, f, residual, NULL);
+    if (status)
+        return status;
+    memcpy(run->now.a, at.a, sizeof at.a);
+    msfp_friction_rates(&run->work, run->now.df);
+    msfp_heat_initial_state(run);
+    run->now.mechanical = msfp_mechanical_energy(&run->parameters, &at, &run->work);
+    msfp_powers(&run->parameters, &at, &run->work, &run->now.mechanical, run->now.power);
+    run->now.prescribed_power = msfp_prescribed_power(&run->parameters, &at, &run->work);
+    msfp_energy_balance_begin(run, &at);
+    memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
+    run->have_unknowns = 0;
+    run->restart = 1;
+    msfp_quasistatic_begin(run, &at);
+    return msfp_check_state(run, &run->work, &run->now);
+}
+
+/* Copy a history without the state of its last search. */
+static void copy_history(msfp_history *own, const msfp_history *given)
+{
+    *own = *given;
+    own->last = own->held = 0;
+}
+
+int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *motion, const msfp_history *load,
+#if MSFP_TOP_ROTATION
+                   const msfp_history *support,
+#endif
+                   const double *jumps, int jump_count, const msfp_options *options,
+                   const double *q, const double *v, const double *f)
+{
+    memset(run, 0, sizeof *run);
+    run->parameters = *p;
+    copy_history(&run->motion, motion);
+    copy_history(&run->load, load);
+#if MSFP_TOP_ROTATION
+    copy_history(&run->support, support);
+#endif
+    run->jumps = jumps;
+    run->jump_count = jump_count;
+    run->options = *options;
+    memcpy(run->now.q, q, sizeof run->now.q);
+    memcpy(run->now.v, v, sizeof run->now.v);
+    memcpy(run->now.f, f, sizeof run->now.f);
+    run->now.t = options->start_time;
+#if MSFP_HEAT
+    if (options->heat)
+        memcpy(run->now.heat, options->heat, sizeof run->now.heat);
+#endif
+    while (run->next_jump < jump_count && jumps[run->next_jump] <= run->now.t)
+        ++run->next_jump;
+    run->status = consistent_initial_state(run);
+    if (run->status)
+        return run->status;
+    msfp_row row;
+    msfp_observe_state(run, &run->now, &row);
+    for (int i = 0; i < 3; ++i)
+        run->start[i] = options->origin ? options->origin[i] : row.base[i] - row.top[i];
+    run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * (options->duration - run->now.t));
+    run->previous_error = 1.0;
+    msfp_event_values(run, &run->now, run->events_now);
+    msfp_monitor_begin(run);
+    run->status = msfp_write_row(run, &run->now);
+    if (options->output_step > 0.0)
+        run->output_time = msfp_next_output(run);
+    return run->status;
+}
+
+double msfp_smallest_step(double t) { return smallest_step * fmax(1.0, t); }
+
+/* The next time [s] at which a step must end because a prescribed history has a jump or a kink there; infinite if
+ * none. */
+static double next_stop(msfp_run *run)
+{
+    const msfp_options *o = &run->options;
+    while (run->stop < o->stop_count && o->stops[run->stop] <= run->now.t + msfp_smallest_step(run->now.t))
+        ++run->stop;
+    return run->stop < o->stop_count ? o->stops[run->stop] : INFINITY;
+}
+
+/* Whether the step ends at such a time. */
+static int at_stop(const msfp_run *run)
+{
+    const msfp_options *o = &run->options;
+    return run->stop < o->stop_count && fabs(run->next.t - o->stops[run->stop]) <= msfp_smallest_step(run->next.t);
+}
+
+/* The step h, shortened to what the prescribed histories allow: each interval of time has a longest step, and a step
+ * may enter an interval only if it is no longer than the longest step of that interval. */
+static double allowed_step(msfp_run *run, double h)
+{
+    const msfp_options *o = &run->options;
+    const double t = run->now.t;
+    while (run->span + 1 < o->span_count && o->span_ends[run->span] <= t + msfp_smallest_step(t))
+        ++run->span;
+    if (o->span_count)
+        h = fmin(h, o->span_steps[run->span]);
+    for (int i = run->span; i + 1 < o->span_count && t + h > o->span_ends[i]; ++i)
+        h = fmin(h, fmax(o->span_ends[i] - t, o->span_steps[i + 1]));
+    return o->max_step > 0.0 ? fmin(h, o->max_step) : h;
+}
+
+/* Latest time [s] at which the next step may end. */
+static double latest_end(msfp_run *run)
+{
+    double end = fmin(run->options.duration, next_stop(run));
+    if (run->next_jump < run->jump_count)
+        end = fmin(end, run->jumps[run->next_jump]);
+    if (run->options.output_step > 0.0 && msfp_is_quasistatic(run)) /* a step costs no more than a row */
+        end = fmin(end, run->output_time);
+    return end;
+}
+
+/* One step of length h of the method; it is not accepted yet. */
+static int try_step(msfp_run *run, double h, double *error)
+{
+    run->status_surface = 0;
+    run->status_value = 0.0;
+    const int status = run->options.method == MSFP_METHOD_DOPRI5 ? msfp_step_dopri5(run, h, error)
+                       : msfp_is_quasistatic(run)           ? msfp_step_quasistatic(run, h, error)
+                                                            : msfp_step_implicit(run, h, error);
+    if (status)
+        return status;
+    if (!(*error < INFINITY))
+        return MSFP_E_FINITE;
+    if (*error > 1.0)
+        return MSFP_OK;
+    return msfp_energy_consistent(run) ? msfp_check_state(run, &run->work, &run->next) : MSFP_E_STEP;
+}
+
+/* Factor of the step size after an accepted step. */
+static double step_factor(const msfp_run *run, double error)
+{
+    const double order = msfp_control_order(run->options.method);
+    const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
+    return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+}
+
+/* Shorten the step after a failure. Returns 1 where the step is already the smallest: the run ends. */
+static int shorten_step(msfp_run *run, double h, double factor, int status)
+{
+    /* The time at which a body leaves the stack is known well enough before steps are lost in roundoff. */
+    const double smallest = status == MSFP_E_PARTED ? shortest_to_event : smallest_step;
+    run->h = h * factor;
+    if (run->h >= smallest * fmax(1.0, run->now.t))
+        return 0;
+    run->status = msfp_classify_failure(run, status);
+    return 1;
+}
+
+/* Accept the step: record it and make its end the present state. */
+static int accept(msfp_run *run, const double *before, const double *after, double error, double h)
+{
+    ++run->counts[MSFP_COUNT_STEPS];
+    /* A step that was cut to end at a given time says little about the step size: the earlier proposal stands. */
+    const int cut = h < 0.9 * run->h && error < 0.5;
+    run->h = fmax(h * step_factor(run, error), cut ? run->h : 0.0);
+    run->previous_error = error;
+    run->restart = run->retry_after_newton = 0;
+    if (run->stability_limit_steps >= STABILITY_LIMIT_STEPS)
+        run->status = msfp_classify_failure(run, MSFP_E_STIFF);
+    const int stop = msfp_record_events(run, before, after);
+    if (run->status == MSFP_OK)
+        run->status = msfp_write_step(run);
+    if (run->status)
+        return 0;
+    if (run->options.sampled && at_stop(run)) /* the slope of the accelerations changes here */
+        memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
+    run->now = run->next;
+#if MSFP_CLOSED_FORM
+    run->step_history = run->next_step_history;
+#endif
+    memcpy(run->events_now, after, sizeof run->events_now);
+    if (stop) {
+        if (run->options.output_step > 0.0)
+            msfp_write_row(run, &run->now);
+        run->status = MSFP_STOPPED;
+        return 0;
+    }
+    if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] - msfp_smallest_step(run->now.t)) {
+        run->now.t = fmax(run->now.t, run->jumps[run->next_jump++]);
+        run->status = consistent_initial_state(run);
+        run->h = fmin(run->h, 1e-4);
+    }
+    return run->status == MSFP_OK;
+}
+
+/* One accepted step, or a rejected one with a shorter proposal. Returns 0 where the run ends. */
+static int one_step(msfp_run *run)
+{
+    double error = 0.0, before[MSFP_EVENTS], after[MSFP_EVENTS];
+    const double end = latest_end(run), left = end - run->now.t;
+    double h = allowed_step(run, run->h);
+    if (msfp_is_quasistatic(run))
+        h = msfp_limit_step(run, h);
+    h = h > 0.999 * left ? left : h > 0.5 * left ? 0.5 * left : h;
+    for (int relocations = 0;; ++relocations) {
+        const int status = try_step(run, h, &error);
+        if (status) {
+            run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
+            run->retry_after_newton |= status == MSFP_E_NEWTON;
+            ++run->counts[MSFP_COUNT_REJECTED_STEPS];
+            return !shorten_step(run, h, 0.25, status);
+        }
+        if (error > 1.0) {
+            ++run->counts[MSFP_COUNT_REJECTED_STEPS];
+            return !shorten_step(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_control_order(run->options.method))),
+                                 MSFP_E_STEP);
+        }
+        memcpy(before, run->events_now, sizeof before);
+        msfp_event_values(run, &run->next, after);
+        const double share = relocations < 4 ? msfp_first_event(run, before, after) : 1.0;
+        if (share >= 1.0)
+            break;
+        h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
+    }
+    if (fabs(run->next.t - end) <= msfp_smallest_step(run->next.t)) /* end exactly there */
+        run->next.t = end;
+    if (msfp_monitor_step(run, after)) {
+        run->status = MSFP_E_GUARD;
+        return 0;
+    }
+    return accept(run, before, after, error, h);
+}
+
+static int finished(const msfp_run *run)
+{
+    return run->now.t >= run->options.duration - msfp_smallest_step(run->options.duration);
+}
+
+int msfp_run_advance(msfp_run *run, long steps)
+{
+    for (long i = 0; i < steps && run->status == MSFP_OK; ++i) {
+        if (finished(run))
+            return 0;
+        if ((double)(run->counts[MSFP_COUNT_STEPS] + run->counts[MSFP_COUNT_REJECTED_STEPS]) >=
+            run->options.max_steps) {
+            run->status = MSFP_E_STEPS;
+            break;
+        }
+        if (!one_step(run))
+            return 0;
+    }
+    return run->status == MSFP_OK && !finished(run);
+}
+
+void msfp_run_free(msfp_run *run)
+{
+    free(run->rows);
+    free(run->events);
+    run->rows = NULL;
+    run->events = NULL;
+}

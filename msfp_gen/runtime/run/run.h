@@ -1,0 +1,54 @@
+/* run.h: what the files of run/ share. Private to the runtime. */
+#ifndef MSFP_RUN_H
+#define MSFP_RUN_H
+#include "steppers.h"
+
+/* ---- run.c ---- */
+
+/* The shortest step at time t, and the difference below which two times are the same [s]. */
+double msfp_smallest_step(double t);
+
+/* ---- events.c ---- */
+
+/* Event functions [MSFP_EVENTS] of a state [m]. */
+void msfp_event_values(msfp_run *run, const msfp_state *s, double *g);
+/* Share of the last step at which the first event lies; 1: none. before, after: event functions at its ends. */
+double msfp_first_event(msfp_run *run, const double *before, const double *after);
+/* Record the events of the accepted step. Returns 1 where the run is to stop. */
+int msfp_record_events(msfp_run *run, const double *before, const double *after);
+
+/* ---- monitors.c ---- */
+
+/* Whether the model is valid at a state: no tension, no singular angle. Returns MSFP_OK or a status. */
+int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s);
+/* Check the last step. Returns 1 where a monitor stops the run. gaps [MSFP_NB]: at its end [m]. */
+int msfp_monitor_step(msfp_run *run, const double *gaps);
+/* Velocities of the bodies at the start, for the monitor of inertia. */
+void msfp_monitor_begin(msfp_run *run);
+
+/* ---- energy_balance.c ---- */
+
+/* Whether the last step neither creates energy nor loses most of it. */
+int msfp_energy_consistent(msfp_run *run);
+void msfp_energy_balance_begin(msfp_run *run, const msfp_point *at);
+
+/* ---- failure.c ---- */
+
+/* Status of a run that cannot continue with a shorter step: `status`, or the cause behind it. */
+int msfp_classify_failure(msfp_run *run, int status);
+
+/* ---- output.c; writing returns MSFP_OK or MSFP_E_MEMORY ---- */
+
+/* A row of a state. */
+void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
+/* Displacement across the bearing less that at the start [3], [m]. */
+void msfp_displacement_across(const msfp_run *run, const msfp_row *row, double *displacement);
+/* Time of the next row where rows lie at even times [s]. */
+double msfp_next_output(const msfp_run *run);
+int msfp_write_row(msfp_run *run, const msfp_state *s);
+/* Rows of the accepted step. */
+int msfp_write_step(msfp_run *run);
+/* kind: enum msfp_event_kind; surface counted from 1, 0: none. */
+int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
+
+#endif

@@ -1,0 +1,241 @@
+/* quasistatic.c: steps of a planar model without masses, which solve the force balance and integrate nothing.
+ *
+ * Where no force depends on a rate, the new positions follow from the old ones and from the slip of each surface: in
+ * the plane (3.18) is an equation in slip, not in time, with a solution in closed form while the slip does not reverse
+ * within a step. A step is therefore one set of moment balances, exact for any length. Rates are those of the parabola
+ * through three states; only small damping forces depend on them.
+ */
+#include <math.h>
+#include <string.h>
+#include "steppers.h"
+
+int msfp_is_quasistatic(const msfp_run *run)
+{
+    return MSFP_CLOSED_FORM && run->options.quasistatic;
+}
+
+#if MSFP_CLOSED_FORM
+enum { NB = MSFP_NB, ANGLE = 1 }; /* theta, the unknown of a planar body */
+
+/* What the next step uses of a state. */
+static void store_state(msfp_step_history *to, const msfp_point *at, const msfp_work *w)
+{
+    double C[3];
+    msfp_body_C_get(w->body[NB], C);
+    memcpy(to->load, at->load, sizeof to->load);
+    to->tilt = at->base[0][3 + ANGLE];
+    for (int i = 0; i < 3; ++i)
+        to->top[i] = C[i] - at->base[0][i];
+    for (int k = 0; k < NB; ++k) {
+        to->tilt += at->q[k][ANGLE];
+        to->normal[k] = w->contact[k][MSFP_CONTACT_N];
+    }
+}
+
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
+{
+    run->step_history.h = run->step_history.span = 0.0;
+    memset(run->step_history.jerk, 0, sizeof run->step_history.jerk);
+    store_state(&run->step_history, at, &run->work);
+    if (msfp_is_quasistatic(run)) /* the work of the load is summed separately */
+        run->now.power[MSFP_WORK_INPUT] -= msfp_load_power(at, &run->work);
+}
+
+/* Q and beta with which q = Q + beta v is the end of the parabola through the last two states whose end slope is v. */
+static void parabola(const msfp_run *run, msfp_stage *s, double h)
+{
+    const double r = run->step_history.h > 0.0 ? h / run->step_history.h : 0.0;
+    s->beta = h * (1.0 + r) / (1.0 + 2.0 * r);
+    for (int k = 0; k < NB; ++k) {
+        const double now = run->now.q[k][ANGLE];
+        s->Q[k][ANGLE] = now + r * r / (1.0 + 2.0 * r) * (now - run->step_history.q[k]);
+        s->seed.turn[k] = s->Q[k][ANGLE] - now;
+        s->seed.fp[k][0] = run->now.f[k][0];
+    }
+    s->seed.cq = s->seed.beta = s->beta;
+    s->seed.cv = 1.0;
+    s->seed.closed_form = 1;
+}
+
+/* The term that a cubic through the last four states adds to the parabola; 0 where it is large and unreliable. */
+static double cubic_term(const msfp_run *run, int k, double h)
+{
+    const double c = run->step_history.jerk[k] * h * (h + run->step_history.h) * (h + run->step_history.span);
+    const double b = 0.5 * run->now.a[k][ANGLE] * h * (h + run->step_history.h);
+    return fabs(c) < 0.5 * fabs(b) + 0.02 * fabs(h * run->now.v[k][ANGLE]) ? c : 0.0;
+}
+
+/* First guess of Newton's method: rates of the extrapolated motion, or of bodies at rest. */
+static void guess(const msfp_run *run, msfp_stage *s, double h, int extrapolate)
+{
+    for (int k = 0; k < NB; ++k) {
+        const double turn =
+            extrapolate ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) + cubic_term(run, k, h) : 0.0;
+        s->at.v[k][ANGLE] = (turn - s->seed.turn[k]) / s->beta;
+        s->f[k][0] = run->now.f[k][0];
+    }
+}
+
+static int solve(msfp_run *run, msfp_stage *s, double h)
+{
+    int status = MSFP_E_NEWTON;
+    for (int extrapolate = 1; extrapolate >= 0 && status == MSFP_E_NEWTON; --extrapolate) {
+        run->counts[MSFP_COUNT_OTHER_STARTS] += !extrapolate;
+        guess(run, s, h, extrapolate);
+        status = msfp_solve_stage(run, s);
+    }
+    return status;
+}
+
+/* Error of Y of a surface whose slip reverses within the step: the slip of the parabola after its turning point. It
+ * grows with the square of the step, where slip reverses sharply with the step itself; it is squared because the step
+ * control takes the cube root. */
+static double reversal_error(const msfp_run *run, double h)
+{
+    double worst = 0.0;
+    for (int k = 0; k < NB; ++k) {
+        const double *par = run->parameters.surface[k], bend = run->next.a[k][ANGLE];
+        const double mean = (run->next.q[k][ANGLE] - run->now.q[k][ANGLE]) / h;
+        const double first = mean - 0.5 * h * bend, last = mean + 0.5 * h * bend;
+        if (first * last < 0.0) {
+            const double v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE];
+            double back = 0.5 * fmin(first * first, last * last) / fabs(bend);
+            if (v * a < 0.0) /* the reversal was extrapolated already */
+                back = fmin(back, 0.5 * v * v / fabs(a));
+            worst = fmax(worst, back * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY]);
+        }
+    }
+    worst /= 10.0 * run->options.rtol;
+    return worst * worst;
+}
+
+double msfp_limit_step(const msfp_run *run, double h)
+{
+    for (int k = 0; k < NB; ++k) {
+        const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE];
+        const double per_turn = par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
+        if (v * (v + a * h) < 0.0 && 0.5 * v * v / fabs(a) * per_turn > 5.0 * run->options.rtol)
+            h = fmax(-v / a, 0.02 * h);
+    }
+    for (int k = 0; k < NB; ++k) {
+        const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE],
+                     Y = run->now.f[k][0];
+        for (int i = 0; i < 20; ++i) {
+            const double slip = msfp_slip_per_turn(par) * h * (v + 0.5 * h * a);
+            if (fabs(slip) <= 0.4 ||
+                fabs(msfp_friction_after_slip(Y, slip) - Y) <= 0.4) /* Y never changes by more than the slip */
+                break;
+            h *= 0.7;
+        }
+    }
+    return h;
+}
+
+/* Second divided difference of the last three values of power e, for the integral of the parabola through them. */
+static double second_difference(const msfp_run *run, double h, const double *power, int e)
+{
+    const double last = run->step_history.h;
+    if (last <= 0.0)
+        return 0.0;
+    return ((power[e] - run->now.power[e]) / h - (run->now.power[e] - run->step_history.power[e]) / last) / (h + last);
+}
+
+/* Work stored and dissipated by friction in the step, in closed form with the mean of mu N. */
+static void friction_work(const msfp_run *run, double work[MSFP_WORKS])
+{
+    for (int k = 0; k < NB; ++k) {
+        const double *par = run->parameters.surface[k], Y = run->now.f[k][0], end = run->next.f[k][0];
+        const double turn = run->next.q[k][ANGLE] - run->now.q[k][ANGLE];
+        const double scale = 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k]) *
+                             par[MSFP_SURFACE_PARAMETERS_MU] * par[MSFP_SURFACE_PARAMETERS_DY];
+        work[MSFP_WORK_FRICTION_STORED] += scale * 0.5 * (end * end - Y * Y);
+        work[MSFP_WORK_FRICTION_DISSIPATED] += scale * msfp_friction_loss(Y, msfp_slip_per_turn(par) * turn);
+    }
+}
+
+/* Work of the load, from the displacement and rotation of the top. */
+static double load_work(const msfp_run *run)
+{
+    const msfp_step_history *from = &run->step_history, *to = &run->next_step_history;
+    double work = 0.5 * (from->load[3 + ANGLE] + to->load[3 + ANGLE]) * (to->tilt - from->tilt);
+    for (int i = 0; i < 3; ++i)
+        work += 0.5 * (from->load[i] + to->load[i]) * (to->top[i] - from->top[i]);
+    return work;
+}
+
+/* Work of the step: of friction and load from slip and displacement, exact for any length; of the remaining input and
+ * of small dampers from the parabola through three powers. */
+static void count_work(msfp_run *run, const msfp_stage *s, double h)
+{
+    msfp_state *next = &run->next;
+    next->mechanical = msfp_mechanical_energy(&run->parameters, &s->at, &run->work);
+    msfp_powers_without_friction(&run->parameters, &s->at, &run->work, &next->mechanical, next->power);
+    next->power[MSFP_WORK_INPUT] -= msfp_load_power(&s->at, &run->work);
+    for (int e = 0; e < MSFP_WORKS; ++e)
+        if (e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED)
+            next->work[e] += 0.5 * h * (run->now.power[e] + next->power[e]) -
+                             second_difference(run, h, next->power, e) * h * h * h / 6.0;
+    friction_work(run, next->work);
+    next->work[MSFP_WORK_INPUT] += load_work(run);
+}
+
+static void finish(msfp_run *run, msfp_stage *s, double h)
+{
+    const msfp_state *now = &run->now;
+    msfp_state *next = &run->next;
+    *next = *now;
+    next->t = now->t + h;
+    memcpy(s->at.f, s->f, sizeof s->f);
+    run->reached = s->at;
+    memcpy(next->q, s->at.q, sizeof next->q);
+    memcpy(next->v, s->at.v, sizeof next->v);
+    memcpy(next->f, s->f, sizeof next->f);
+    msfp_friction_rates(&run->work, next->df);
+    for (int k = 0; k < NB; ++k) {
+        const double mean = (next->q[k][ANGLE] - now->q[k][ANGLE]) / h;
+        next->a[k][ANGLE] = 2.0 * (next->v[k][ANGLE] - mean) / h;
+        run->next_step_history.q[k] = now->q[k][ANGLE];
+        run->next_step_history.jerk[k] =
+            run->step_history.span > 0.0 ? 0.5 * (next->a[k][ANGLE] - now->a[k][ANGLE]) / (h + run->step_history.span)
+                                         : 0.0;
+    }
+    run->next_step_history.h = h;
+    run->next_step_history.span = run->step_history.h > 0 ? h + run->step_history.h : 0.0;
+    memcpy(run->next_step_history.power, now->power, sizeof now->power);
+    store_state(&run->next_step_history, &s->at, &run->work);
+}
+
+int msfp_step_quasistatic(msfp_run *run, double h, double *error)
+{
+    msfp_stage s;
+    memset(&s, 0, sizeof s);
+    parabola(run, &s, h);
+    msfp_point_at(run, run->now.t + h, &s.at);
+    run->node_count = 0;
+    const int status = solve(run, &s, h);
+    if (status)
+        return status;
+    finish(run, &s, h);
+    *error = fmax(msfp_friction_jump_error(&run->now, &run->next), reversal_error(run, h));
+    if (*error <= 1.0)
+        count_work(run, &s, h);
+    return MSFP_OK;
+}
+#else
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
+{
+    (void)run;
+    (void)at;
+}
+
+double msfp_limit_step(const msfp_run *run, double h)
+{
+    (void)run;
+    return h;
+}
+
+int msfp_step_quasistatic(msfp_run *run, double h, double *error)
+{
+    return msfp_step_implicit(run, h, error);
+}
+#endif

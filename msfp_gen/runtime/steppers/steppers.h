@@ -1,0 +1,89 @@
+/* steppers.h: one step of each method, and what the methods share. Private to the runtime.
+ *
+ * A step goes from run->now to run->next; h is its length [s]. Functions that return an int return MSFP_OK or a status.
+ */
+#ifndef MSFP_STEPPERS_H
+#define MSFP_STEPPERS_H
+#include "equations.h"
+
+/* ---- tableaux.c: stiffly accurate ESDIRK methods as data ---- */
+
+typedef struct {
+    int stages;
+    double gamma;                       /* diagonal entry of every stage but the explicit first one */
+    double a[MSFP_STAGES][MSFP_STAGES]; /* strictly lower part */
+    double c[MSFP_STAGES];
+    double e[MSFP_STAGES]; /* weights less embedded weights */
+    double order;          /* order of the error estimate + 1, the exponent of the step control */
+    int nodes[MSFP_NODES]; /* stages that are interpolation nodes of the dense output; 0: no more */
+} msfp_tableau;
+
+const msfp_tableau *msfp_tableau_of(int method);
+/* Order of the error estimate of a method + 1, the exponent of its step control. */
+double msfp_control_order(int method);
+
+/* ---- state.c: states, points and errors ---- */
+
+/* Base motion, load and rotation of the support at time t [s], into `at`. */
+void msfp_point_at(msfp_run *run, double t, msfp_point *at);
+/* The point of a state. */
+void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at);
+/* Weights of the start of the last step, its interpolation nodes and its end in the polynomial through all of them. */
+typedef struct {
+    double of[MSFP_NODES + 2];
+    int count;
+} msfp_weights;
+msfp_weights msfp_weights_at(const msfp_run *run, double share);
+/* The state at a share of the last step, 0 to 1. */
+void msfp_interpolate(const msfp_run *run, double share, msfp_state *out);
+/* Absolute tolerance of coordinate d of body j + 1: of an angle [rad], or of a separation (d >= 3) [m]. */
+double msfp_absolute_tolerance(const msfp_run *run, int j, int d);
+/* A change of a state, such as the estimated error of a step: of q, v and of Y, Z. */
+typedef struct {
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
+} msfp_increment;
+/* Largest error of a step over its tolerance [-]: of q, of Y, Z, and if `rates` of v. */
+double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates);
+/* Error of a step in which Y, Z change by more than 1/2, 0 otherwise. Such a step may span a reversal, its estimate is
+ * not reliable and its interpolation meaningless. Cubed, because the step control takes the cube root. */
+double msfp_friction_jump_error(const msfp_state *now, const msfp_state *next);
+
+/* ---- newton.c: the equations of one stage ---- */
+
+/* Unknowns are the rates at.v; q = Q + beta v and a = inertia (v - V)/beta follow, Y and Z from the seed. */
+typedef struct {
+    double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
+    double beta;    /* [s] */
+    double inertia; /* 1; 0 leaves out all inertia */
+    msfp_seed seed;
+    msfp_point at;
+    double f[MSFP_NB][2];
+} msfp_stage;
+
+/* First guesses of Newton's method, in the order in which they are tried. */
+enum msfp_start { MSFP_START_PREDICTED, MSFP_START_PLAIN, MSFP_START_QUASISTATIC, MSFP_STARTS };
+
+/* Residual [MSFP_DOF] over N at the present rates. Returns its largest entry relative to its natural size, infinite
+ * where it cannot be formed. The evaluation is left in `w`. */
+double msfp_stage_residual(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual);
+/* Subtract factor * step [MSFP_DOF] from the rates. */
+void msfp_stage_move(msfp_stage *s, const double *step, double factor);
+/* Rates that balance all forces but inertia: a first guess where extrapolated rates fail. */
+void msfp_quasistatic_start(msfp_run *run, msfp_stage *s);
+/* Newton's method on a stage, from the rates in it. */
+int msfp_solve_stage(msfp_run *run, msfp_stage *s);
+
+/* ---- the methods; error: of the step over its tolerance [-] ---- */
+
+int msfp_step_implicit(msfp_run *run, double h, double *error);
+int msfp_step_dopri5(msfp_run *run, double h, double *error);
+int msfp_step_quasistatic(msfp_run *run, double h, double *error);
+/* Whether the run takes quasi-static steps. */
+int msfp_is_quasistatic(const msfp_run *run);
+/* The step h, shortened so that no Y changes by more than 0.4 and no surface reverses, as far as can be
+ * extrapolated. */
+double msfp_limit_step(const msfp_run *run, double h);
+/* Prepare quasi-static steps from a state without a step before it. */
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
+
+#endif

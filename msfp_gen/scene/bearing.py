@@ -1,0 +1,245 @@
+"""The data of one bearing: lengths, masses, friction. They are values: changing them never recompiles a model.
+
+Everything is in SI units. Paths in messages count surfaces and bodies from zero, as the lists do; the number of
+PEER 2017/07 follows in brackets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
+from dataclasses import replace as dataclass_replace
+from math import asin, pi
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
+from msfp_gen.errors import InputError
+from msfp_gen.specification.layout import Layout
+
+_LENGTH = Quantity("m", above=0.0)
+_OFFSET = Quantity("m", least=0.0)
+_INERTIA = Quantity("kg m^2", above=0.0, shape=(2,), pair=True)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One sliding surface gamma; all values are finite.
+
+    radius: R of the sphere [m]. capacity: s_c, the sliding displacement at which the slider meets the rim (2.101) [m].
+    friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
+    with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
+    seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
+    k s (1 + c ds/dt) at compression s (docs/uplift.md). The remaining fields are parameters of friction laws
+    (docs/friction.md): each is given if, and only if, the law of `Effects.friction` has it. Raises InputError.
+    """
+
+    radius: Annotated[float, _LENGTH]
+    capacity: Annotated[float, _LENGTH]
+    friction: Annotated[float, Quantity("", least=0.0)]
+    yield_displacement: Annotated[float, _LENGTH]
+    rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
+    rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+    seat_stiffness: Annotated[float, Quantity("N/m", above=0.0)] = 5e9
+    seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 1.0
+    friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
+    velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None
+    velocity_drop: Annotated[float | None, Quantity("", least=0.0)] = None
+    reference_pressure: Annotated[float | None, Quantity("Pa", least=0.0)] = None
+    pressure_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
+    temperature_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
+    patch_radius: Annotated[float | None, _LENGTH] = None
+    conductivity: Annotated[float | None, Quantity("W/(m K)", above=0.0)] = None
+    diffusivity: Annotated[float | None, Quantity("m^2/s", above=0.0)] = None
+    start_temperature: Annotated[float | None, Quantity("degC")] = None
+    c1: Annotated[float | None, Quantity("")] = None
+    c2: Annotated[float | None, Quantity("")] = None
+    c3: Annotated[float | None, Quantity("")] = None
+    c4: Annotated[float | None, Quantity("")] = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, "surface")
+
+
+@dataclass(frozen=True)
+class Body:
+    """One moving body k = 2..n, axisymmetric; all values are finite.
+
+    height: l, between the centres of its faces [m]. centroid: z, position of the centre of mass on the axis, from the
+    bottom where the lower face is concave up (3.6) and from the top where it is concave down (3.10) [m]. mass [kg].
+    inertia: J, (transverse, axial) about the centre of mass, or one value for both [kg m^2].
+    rim_radius, rim_offset: r and p, radius and height of the edge that meets the rim of a surface (3.25) [m].
+    Raises InputError.
+    """
+
+    height: Annotated[float, _LENGTH]
+    centroid: Annotated[float, _OFFSET]
+    mass: Annotated[float, Quantity("kg", above=0.0)]
+    inertia: Annotated[tuple[float, float] | float, _INERTIA]
+    rim_radius: Annotated[float, _OFFSET] = 0.0
+    rim_offset: Annotated[float, _OFFSET] = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, "body")
+        if self.centroid > self.height:
+            raise InputError(f"body.centroid = {self.centroid}: give at most the height of the body, {self.height} [m]")
+        if self.rim_offset > self.height:
+            raise InputError(
+                f"body.rim_offset = {self.rim_offset}: give at most the height of the body, {self.height} [m]"
+            )
+        transverse, axial = self.moments
+        if axial > 2 * transverse:
+            raise InputError(
+                f"body.inertia = {self.inertia}: the axial moment of a rigid body is at most twice its transverse one; "
+                "give (transverse, axial) [kg m^2]"
+            )
+
+    @property
+    def moments(self) -> tuple[float, float]:
+        """(transverse, axial) moments of inertia [kg m^2]."""
+        assert isinstance(self.inertia, tuple)  # check_fields has expanded a single number to a pair
+        return self.inertia
+
+
+_LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
+_SURFACE_ARRAYS = (
+    "radius",
+    "capacity",
+    "friction",
+    "yield_displacement",
+    "rim_stiffness",
+    "rim_damping",
+    "seat_stiffness",
+    "seat_damping",
+)
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A stack of bodies with `layout`: n - 1 surfaces, and the bodies 2..n above the base (body 1), bottom first.
+
+    base_height: l_1 [m]. gravity: g [m/s^2]. base_rim_radius, base_rim_offset: r_1, p_1, used where the first surface
+    is concave down [m]. base_centroid: z_1, which only defines the named point r_1 (3.2); None: half the height [m].
+    Raises InputError: a wrong number of entries, a value out of range, or a geometry that cannot be built.
+    """
+
+    layout: Layout
+    base_height: Annotated[float, _LENGTH]
+    surfaces: Sequence[Surface]
+    bodies: Sequence[Body]
+    gravity: Annotated[float, Quantity("m/s^2", least=0.0)] = 9.8
+    base_rim_radius: Annotated[float, _OFFSET] = 0.0
+    base_rim_offset: Annotated[float, _OFFSET] = 0.0
+    base_centroid: Annotated[float | None, _OFFSET] = None
+
+    def __post_init__(self) -> None:
+        require_type(self.layout, Layout, "bearing.layout")
+        check_fields(self, "bearing")
+        for name, kind in _LISTS.items():
+            self._check_list(name, kind)
+        for name in ("base_centroid", "base_rim_offset"):
+            value = getattr(self, name)
+            if value is not None and value > self.base_height:
+                raise InputError(f"bearing.{name} = {value}: give at most base_height = {self.base_height} [m]")
+        for index in range(self.layout.surfaces):
+            self._check_geometry(index)
+
+    def _check_list(self, name: str, kind: type) -> None:
+        items = getattr(self, name)
+        path = f"bearing.{name}"
+        if isinstance(items, str) or not isinstance(items, Iterable):
+            raise InputError(f"{path} = {items!r}: give a list of {kind.__name__}")
+        items = tuple(items)
+        for index, item in enumerate(items):
+            require_type(item, kind, f"{path}[{index}]")
+        count = self.layout.surfaces
+        if len(items) != count:
+            meaning = "one per sliding surface" if kind is Surface else "bodies 2..n; the base is base_height"
+            raise InputError(f"{path} has {len(items)} entries: layout {self.layout.name} needs {count}, {meaning}")
+        object.__setattr__(self, name, items)
+
+    def slider(self, surface: int) -> int:
+        """Index 0..n-1, base first, of the slider of a surface (index from 0): the body that meets its rim.
+
+        It is the body above a concave-up surface and the body below a concave-down one (3.25).
+        """
+        return surface + 1 if self.layout.signs[surface] > 0 else surface
+
+    def slider_rim_radius(self, surface: int) -> float:
+        """Rim radius r [m] of the slider of a surface (index from 0)."""
+        body = self.slider(surface)
+        return self.bodies[body - 1].rim_radius if body else self.base_rim_radius
+
+    def _check_geometry(self, index: int) -> None:
+        surface, rim, body = self.surfaces[index], self.slider_rim_radius(index), self.slider(index)
+        radius, path = surface.radius, f"bearing.surfaces[{index}]"
+        if surface.capacity >= pi / 2 * radius:
+            raise InputError(
+                f"{path}.capacity = {surface.capacity} (surface {index + 1}): a sphere of radius {radius} m allows "
+                f"less than a quarter turn; give less than {pi / 2 * radius:.6g} [m]"
+            )
+        if rim >= radius:
+            field = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
+            raise InputError(
+                f"{field} = {rim} (body {body + 1}): give less than the radius of the surface it slides in, "
+                f"{path}.radius = {radius} [m]"
+            )
+        if asin(rim / radius) + surface.capacity / radius >= pi / 2:
+            raise InputError(
+                f"{path}.capacity = {surface.capacity} (surface {index + 1}): the rim of body {body + 1}, of radius "
+                f"{rim} m, would leave the hemisphere; give less than {radius * (pi / 2 - asin(rim / radius)):.6g} [m]"
+            )
+
+    def replace(self, **changes: Any) -> Bearing:
+        """A copy with some values changed: fields of the bearing, or one field of all its surfaces or bodies.
+
+        A field of surfaces or bodies takes a list, bottom first (`friction=[0.064, 0.168, 0.168, 0.064]`), or one value
+        for all. Raises InputError: an unknown name, a list of the wrong length, or an invalid value.
+        """
+        list_of = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
+        own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
+        base = dataclass_replace(self, **own)
+        rows = {name: list(getattr(base, name)) for name in _LISTS}
+        for column, given in changes.items():
+            if column not in list_of:
+                known = ", ".join([*_names(Bearing), *list_of])
+                raise InputError(f"bearing.{column}: unknown name; give one of {known}")
+            items = rows[list_of[column]]
+            values = _expanded(column, given, len(items))
+            for index, value in enumerate(values):
+                with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
+                    items[index] = dataclass_replace(items[index], **{column: value})
+        return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """All values as float64 arrays.
+
+        Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
+        seat_stiffness, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height, centroid, mass,
+        inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
+        """
+        base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
+        base = (self.base_height, base_centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
+        rows = [(b.height, b.centroid, b.mass, *b.moments, b.rim_radius, b.rim_offset) for b in self.bodies]
+        names = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
+        arrays = dict(zip(names, np.array([base, *rows]).T.copy(), strict=True))
+        for name in _SURFACE_ARRAYS:
+            arrays[name] = np.array([getattr(surface, name) for surface in self.surfaces])
+        return {**arrays, "gravity": np.array(self.gravity)}
+
+
+def _names(kind: type) -> list[str]:
+    return [field.name for field in dataclass_fields(kind)]
+
+
+def _expanded(column: str, value: Any, count: int) -> list[Any]:
+    """A list with one entry per row; one number, or one (transverse, axial) pair, is repeated for all rows."""
+    is_list = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    if not is_list or (column == "inertia" and isinstance(value[0], int | float)):
+        return [value] * count
+    if len(value) != count:
+        raise InputError(f"bearing.{column} has {len(value)} entries: give {count}, or one value for all")
+    return list(value)

@@ -1,0 +1,250 @@
+"""Selection of the effects at the start of a run (docs/effects.md), with the quantity that decides each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.top import MassTop, RigTop, load_values
+from msfp_gen.specification.layout import Auto, Effects
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.parts import SceneParts
+
+MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run
+UPLIFT_MONITOR_SHARE = 0.05  # share of the load at rest below which the monitor of uplift trips
+MAX_PERIOD_RATIO = 0.05  # massless sliders: period of a slider over the time scale of the motion, at most
+MIN_PLANAR_SHARE = 0.5  # a run starts planar if its scene stays in one vertical plane for this share of the duration
+GIVEN = "given in the scene"  # reason of an effect that `Auto` fixes
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Selection of one effect: the value selected, the quantity that decides it, and the work that it saves."""
+
+    effect: str
+    chosen: object
+    because: str
+    saves: str = ""
+
+
+@dataclass(frozen=True)
+class EffectSelection:
+    """The effects at the start of a run.
+
+    reasons: one for each selected effect; none where the scene gives `Effects`. plane_until: time at which the scene
+    leaves the vertical plane of a planar model [s]. error: `Auto.error`, as a share of the friction force [-].
+    """
+
+    effects: Effects
+    reasons: tuple[Reason, ...] = ()
+    plane_until: float = inf
+    error: float = 0.005
+
+
+def select_effects(scene: SceneParts) -> EffectSelection:
+    """The effects of a scene: as given, or selected. Raises InputError where the given ones contradict each other."""
+    requested = scene.effects
+    if isinstance(requested, Effects):
+        return EffectSelection(requested)
+    uplift = _uplift(scene, requested)
+    sliders = _sliders(scene, requested, bool(uplift.chosen))
+    plane, until = _dimension(scene, requested)
+    reasons = (plane, sliders, _rims(scene, requested), uplift, _friction(scene, requested))
+    rotates = scene.top_rotation is not None
+    effects = requested.resolve(**{reason.effect: reason.chosen for reason in reasons}, top_rotation=rotates or None)
+    plane_until = until if effects.dimension == "planar" else inf
+    return EffectSelection(effects, reasons, plane_until, requested.error)
+
+
+def _given(requested: Auto, name: str) -> Reason | None:
+    value = getattr(requested, name)
+    return None if value is None else Reason(name, value, GIVEN)
+
+
+def _dimension(scene: SceneParts, requested: Auto) -> tuple[Reason, float]:
+    if (given := _given(requested, "dimension")) is not None:
+        return given, inf
+    azimuth, until, name = scene_plane(scene)
+    if until < MIN_PLANAR_SHARE * scene.end:
+        return Reason("dimension", "spatial", f"the {name} leaves every vertical plane at {until:.4g} s"), inf
+    bodies, angles = scene.bearing.layout.surfaces, 2 if requested.spin == "locked" else 3
+    saves = f"{bodies} unknown accelerations in place of {bodies * angles}"
+    if until < scene.end:
+        return Reason("dimension", "planar", f"in one vertical plane until {until:.4g} s, then spatial", saves), until
+    because = f"motion, loads and initial state lie in the vertical plane at azimuth {np.degrees(azimuth):.4g} deg"
+    return Reason("dimension", "planar", because, saves), inf
+
+
+def _rims(scene: SceneParts, requested: Auto) -> Reason:
+    if (given := _given(requested, "rims")) is not None:
+        return given
+    if scene.stop is not None and scene.stop.all_rims:
+        return Reason("rims", True, "the stop condition is contact at all rims")
+    capacity = min(surface.capacity for surface in scene.bearing.surfaces)
+    travel = float(np.ptp(_sampled_motion(scene)[:, :2], axis=0).max()) * np.sqrt(2)
+    limit = f"the smallest capacity is {1e3 * capacity:.4g} mm"
+    if not (isinstance(scene.top, RigTop) and scene.top.stiffness > 0):
+        return Reason("rims", True, f"a {scene.top.kind} top does not limit the sliding displacement; {limit}")
+    because = f"the base moves {1e3 * travel:.4g} mm, {limit}"
+    if scene.load is None and travel + _initial_sliding(scene) < capacity:
+        return Reason("rims", False, because, "the forces of the rims and their events")
+    return Reason("rims", True, because)
+
+
+def _initial_sliding(scene: SceneParts) -> float:
+    """Largest sliding displacement of a surface in the initial state [m]; an upper bound."""
+    if scene.initial_state is None:
+        return 0.0
+    tilt = np.hypot(*np.array(scene.initial_state.q, dtype=float)[:, :2].T)
+    return float(np.max(tilt * [surface.radius for surface in scene.bearing.surfaces]))
+
+
+def _sliders(scene: SceneParts, requested: Auto, uplift: bool) -> Reason:
+    if (given := _given(requested, "sliders")) is not None:
+        return given
+    required = {
+        "a separated body moves by its inertia": uplift,
+        "free spin is determined by inertia": requested.spin == "free",
+        "the explicit method integrates accelerations": scene.solver.method == "dopri5",
+    }
+    for because, holds in required.items():
+        if holds:
+            return Reason("sliders", "inertial", because)
+    share, limit = inertia_share(scene), inertia_limit(scene, requested.error)
+    because = f"inertial forces of the sliders are {share:.2g} of N; the permitted share is {limit:.2g}"
+    if share > limit:
+        return Reason("sliders", "inertial", because)
+    period, time_scale = slider_period(scene), motion_time_scale(scene)
+    if period > MAX_PERIOD_RATIO * time_scale:
+        because = f"the period of a slider is {period:.2g} s, the time scale of the motion is {time_scale:.2g} s"
+        return Reason("sliders", "inertial", because)
+    return Reason("sliders", "massless", because, "accelerations of the sliders and steps that resolve their ringing")
+
+
+def _friction(scene: SceneParts, requested: Auto) -> Reason:
+    if (given := _given(requested, "friction")) is not None:
+        return given
+    word, _ = scene.law
+    saves = "the thermal states of every surface, until the temperature rise is significant" if word == "pv" else ""
+    because = {
+        "constant": "the surfaces have no parameters of a friction law",
+        "custom": "effects.friction_law gives a formula",
+    }.get(word, "the surfaces have the parameters of this law")
+    return Reason("friction", word, because, saves)
+
+
+def _uplift(scene: SceneParts, requested: Auto) -> Reason:
+    if (given := _given(requested, "uplift")) is not None:
+        return given
+    if requested.sliders == "massless" or scene.solver.method == "dopri5":
+        because = "massless sliders and the explicit method exclude separation; normal forces are monitored"
+        return Reason("uplift", False, because)
+    rest, least = load_at_rest(scene), minimum_load(scene)
+    because = f"at least {least / rest:.0%} of the load at rest, {rest:.4g} N, remains" if rest > 0 else "no load"
+    if rest > 0 and least > MIN_LOAD_SHARE * rest:
+        return Reason("uplift", False, because, f"{3 * scene.bearing.layout.surfaces} unknown separations")
+    return Reason("uplift", True, because)
+
+
+def load_at_rest(scene: SceneParts) -> float:
+    """Vertical load on the lowest surface at the start, without accelerations; downward positive [N]."""
+    weights = scene.bearing.gravity * sum(body.mass for body in scene.bearing.bodies)
+    return float(_applied_load(scene, 0.0)) + _supported_mass(scene) * scene.bearing.gravity + weights
+
+
+def minimum_load(scene: SceneParts) -> float:
+    """Smallest vertical load on the lowest surface if all masses follow the vertical motion of the base [N]."""
+    times = _sampled_times(scene)
+    vertical = scene.motion.evaluate(times, 2)[:, 2]
+    bodies = sum(body.mass for body in scene.bearing.bodies)
+    inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + vertical)
+    return float(np.min(inertial + _applied_load(scene, times)))
+
+
+def _supported_mass(scene: SceneParts) -> float:
+    """Mass of the top [kg]."""
+    return scene.top.mass if isinstance(scene.top, MassTop) else 0.0
+
+
+def _applied_load(scene: SceneParts, time: ArrayLike) -> Array:
+    """Vertical force of the top and the load history at `time` [s], downward positive [N]."""
+    history = 0.0 if scene.load is None else scene.load.evaluate(time)[..., 2]
+    return -np.asarray(load_values(scene.top)[2] + history)
+
+
+def inertia_share(scene: SceneParts) -> float:
+    """Largest inertial force of a body over the load at rest, if the bodies follow the base [-]."""
+    peak = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 2)[:, :3], axis=1).max())
+    rest = load_at_rest(scene)
+    return max(body.mass for body in scene.bearing.bodies) * peak / rest if rest > 0 else inf
+
+
+def quasistatic(scene: SceneParts, effects: Effects) -> bool:
+    """Whether a run with these effects takes quasi-static steps: no force depends on a rate, within the tolerance.
+
+    Conditions: a planar model without masses and with closed-form friction, no supported mass, the method "implicit",
+    and damper forces small against friction. The limit of their share assumes an error of rates of one hundredth.
+    """
+    if not effects.permits_quasistatic_steps or scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
+        return False
+    return damping_share(scene) <= min(1e-3, 1e3 * scene.solver.rtol)
+
+
+def damping_share(scene: SceneParts) -> float:
+    """Force of the dampers over the friction force, if everything moves as the base does; inf without friction [-].
+
+    The rate of rotation of the top plate has two bounds: the slip velocity over a radius, and, while friction reverses
+    within d_y, the change of the friction moment over the rotational stiffness.
+    """
+    surfaces, top = scene.bearing.surfaces, scene.top
+    speed = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 1)[:, :3], axis=1).max())
+    friction = min(surface.friction for surface in surfaces) * minimum_load(scene)
+    if friction <= 0:
+        return inf
+    share = max(surface.rim_damping for surface in surfaces) * speed / friction
+    if isinstance(top, RigTop):
+        sliding = min(surface.radius for surface in surfaces) ** 2 * friction
+        reversal = top.rotational_stiffness * min(surface.yield_displacement for surface in surfaces)
+        share += top.damping * speed / friction + top.rotational_damping * speed / max(sliding, reversal)
+    return share
+
+
+def inertia_limit(scene: SceneParts, error: float) -> float:
+    """Permitted inertial force over N: `error`, a share of the friction force, times the largest coefficient [-]."""
+    return error * max(surface.friction for surface in scene.bearing.surfaces)
+
+
+def slider_period(scene: SceneParts) -> float:
+    """Longest period of a slider on its stuck surface, 2 pi sqrt(m/(mu N/d_y + N/R)) [s]."""
+    rest, longest = load_at_rest(scene), 0.0
+    for index, surface in enumerate(scene.bearing.surfaces):
+        stiffness = surface.friction * rest / surface.yield_displacement + rest / surface.radius
+        longest = max(longest, scene.bearing.bodies[index].mass / stiffness if stiffness > 0 else inf)
+    return float(2 * np.pi * np.sqrt(longest))
+
+
+def motion_time_scale(scene: SceneParts) -> float:
+    """Peak velocity of the base over its peak acceleration [s]; inf where it is at rest."""
+    times = _sampled_times(scene)
+    velocity, acceleration = (
+        np.linalg.norm(scene.motion.evaluate(times, order)[:, :3], axis=1).max() for order in (1, 2)
+    )
+    return float(velocity / acceleration) if acceleration > 0 else inf
+
+
+def _sampled_times(scene: SceneParts) -> Array:
+    """Times at which motion and load are evaluated: their knots, and 1001 evenly spaced ones."""
+    load_knots = () if scene.load is None else scene.load.knots
+    times = np.concatenate([scene.motion.knots, load_knots, np.linspace(0, scene.end, 1001)])
+    return np.unique(times[times <= scene.end])
+
+
+def _sampled_motion(scene: SceneParts) -> Array:
+    return scene.motion.evaluate(_sampled_times(scene))

@@ -1,0 +1,1 @@
+"""Scene files: validation, reading and writing; presets; parameter sweeps."""

@@ -1,0 +1,181 @@
+"""Reading and writing of scene files (TOML). A file is data: nothing in it is evaluated."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from msfp_gen.common.fields import errors_at, ruled_fields
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.file import catalogue, schema
+from msfp_gen.scene.file.motion_tables import KINDS, Pieces, is_file, resolved
+from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
+from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
+from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
+
+Table = dict[str, Any]
+_TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
+_PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
+
+
+def load_scene(source: str | Path) -> Scene:
+    """The scene in a TOML file, or the preset of that name. Paths inside a file are relative to it.
+
+    Raises InputError of one line that names the file, the path of the field, the value and the remedy.
+    """
+    return changed_scene(source, {})
+
+
+def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
+    """The scene of `load_scene(source)` with some fields changed.
+
+    changes: dotted path of a field, such as `motion.scale` -> value. Raises InputError as `load_scene` does.
+    """
+    known = catalogue.descriptions("scene")
+    if str(source) in known:
+        return scene_from_table(_changed(catalogue.scene_table(str(source)), changes))
+    path = Path(source)
+    if not is_file(path):
+        hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
+        raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
+    try:
+        return scene_from_table(_changed(_toml(path.read_text(encoding="utf-8-sig")), changes), path.parent)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
+    """A copy of a table with the fields at dotted paths set; the schema checks afterwards that they exist."""
+    table = deepcopy(table)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        inner: Any = table
+        for name in parents:
+            if name == "bearing" and isinstance(inner.get(name), str):  # the name of a preset
+                inner[name] = {"preset": inner[name]}
+            inner = inner.setdefault(name, {})
+            if not isinstance(inner, dict):
+                raise InputError(f"{path} = {value!r}: {name} is {inner!r} here, which has no fields to change")
+        inner[last] = value
+    return table
+
+
+def _toml(text: str) -> Table:
+    """The table of a TOML text; raises InputError where the text is not valid."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("no valid TOML: tables or lists are nested too deeply; a scene needs few levels") from None
+    except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
+        raise InputError(f"no valid TOML: {str(error).partition(';')[0]}") from None
+
+
+def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    """The scene of a plain table, as in a scene file.
+
+    folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
+    permitted. Raises InputError.
+    """
+    given = schema.validate_scene(table)
+    motion = dict(given["motion"])
+    if "file" in motion:
+        motion["file"] = resolved(motion["file"], folder)
+    top = dict(given["top"])
+    parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
+    if "effects" in given:
+        parts["effects"] = _effects(given.pop("effects"))
+    for name, kinds in (("load", LOADS), ("top_rotation", ROTATIONS)):
+        if name in given:
+            parts[name] = history_from(kinds, given.pop(name), name)
+    if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
+        parts["effects"] = replace(parts["effects"], top_rotation=True)
+    parts["bearing"] = _bearing(given["bearing"])
+    parts["top"] = _TOPS[top.pop("kind")](**top)
+    parts["motion"] = _motion(motion)
+    return Scene(**{**given, **parts, "motion_table": motion})
+
+
+def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
+    """The bearing of a `[bearing]` table: complete, or a preset with changes. Raises InputError."""
+    return _bearing(schema.validate_bearing(table))
+
+
+def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
+    """The scene as TOML text from which `load_scene` makes an equal scene; in SI units, with the complete bearing.
+
+    motion: table to write as `[motion]`; None: that of the scene's own motion; an empty table: `[motion]` is omitted.
+    """
+    values = {name: getattr(scene, name) for name in ("name", "duration", "output_step")}
+    tables = {name: getattr(scene, name) for name in ("effects", *_PARTS)}
+    histories = {name: getattr(scene, name) for name in ("load", "top_rotation")}
+    return dumps(
+        {
+            **values,
+            "bearing": {
+                "layout": _plain(scene.bearing.layout),
+                **_plain(scene.bearing),
+                "surfaces": [_plain(surface) for surface in scene.bearing.surfaces],
+                "bodies": [_plain(body) for body in scene.bearing.bodies],
+            },
+            **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
+            "top": {"kind": scene.top.kind, **_plain(scene.top)},
+            **{name: _plain(value) for name, value in tables.items() if value is not None},
+            **{name: table_of(value) for name, value in histories.items() if value is not None},
+        }
+    )
+
+
+def _effects(given: Mapping[str, Any]) -> Effects | Auto:
+    """`Effects` where the table gives every effect that could be selected, else `Auto`."""
+    if "error" in given or any(name not in given for name in SELECTABLE):
+        return Auto(**given)
+    return Effects(**given)
+
+
+def _bearing(given: Mapping[str, Any]) -> Bearing:
+    changes = dict(given)
+    if "preset" in changes:
+        preset = catalogue.bearing_table(changes.pop("preset"))
+        return bearing_from_table(preset).replace(**changes)
+    with errors_at("layout", "bearing.layout"):
+        changes["layout"] = Layout(**changes["layout"])
+    for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
+        changes[name] = [_row(kind, row, word, f"bearing.{name}[{index}]") for index, row in enumerate(changes[name])]
+    return Bearing(**changes)
+
+
+def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:
+    with errors_at(word, path):
+        return kind(**row)
+
+
+def _motion(table: Mapping[str, Any]) -> Motion:
+    values = dict(table)
+    return KINDS[values.pop("kind")](**values).build()
+
+
+def _motion_table(scene: Scene) -> Table:
+    """The `[motion]` table of the scene file if it still makes the scene's motion, else its polynomials."""
+    if scene.motion_table is not None and _motion(scene.motion_table) == scene.motion:
+        return {"kind": scene.motion_table["kind"], **scene.motion_table}
+    return Pieces.of(scene.motion)
+
+
+def _plain(value: Top | Bearing | Layout | Surface | Body | Effects | Auto | Solver | InitialState | Stop) -> Table:
+    """Fields of a part as a table. `top_rotation` is omitted: it follows from the table `[top_rotation]`."""
+    names = [name for name, _, _ in ruled_fields(type(value)) if name != "top_rotation"]
+    return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}

@@ -1,0 +1,234 @@
+"""The kinds of `[motion]` in a scene file.
+
+Each class is the table of one kind: its annotations are the rules of the scene reader, `build` makes the motion.
+"""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from msfp_gen.common.fields import Notes, Quantity, Text
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.file.prescribed_tables import ROTATIONS, history_from
+
+RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
+_LENGTH = Quantity("m", above=0.0)
+_TIME = Quantity("s", above=0.0)
+_COUNT = Quantity("", above=0.0)
+_ANGULAR = Quantity("rad/s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Paths(Text):
+    """The path of a file, or a list of them."""
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` itself, a list as a tuple; raises ValueError whose text is the remedy."""
+        several = isinstance(value, list | tuple) and value and all(isinstance(item, str) for item in value)
+        if not (isinstance(value, str) or several):
+            raise ValueError("give a text in quotes, or a list of them: one file for each component")
+        return value if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionTable(ABC):
+    """Fields of every kind: name, time at rest after the end of the motion [s], and the table of a base rotation."""
+
+    kind: ClassVar[str]
+    name: str = ""
+    hold: Annotated[float | None, _TIME] = None
+    rotation: Mapping[str, Any] | None = None
+
+    def build(self) -> Motion:
+        """The motion; raises InputError whose message starts with `motion`."""
+        try:
+            motion = self._motion()
+            motion = motion if self.hold is None else motion.held(self.hold)
+            if self.rotation is None:
+                return motion
+            return motion.rocking(history_from(ROTATIONS, self.rotation, "motion.rotation"))
+        except InputError as error:
+            text = str(error)
+            raise InputError(text if text.startswith("motion") else f"motion.{text}") from None
+
+    @abstractmethod
+    def _motion(self) -> Motion:
+        """The motion without the time at rest and without rotation."""
+
+    def _values(self, *omitted: str) -> dict[str, Any]:
+        """Fields by name, less `hold`, `rotation` and the omitted ones."""
+        left_out = {"hold", "rotation", *omitted}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in left_out}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Harmonic(MotionTable):
+    """`Motion.harmonic`: A sin(2 pi f t) after a smooth lead-in."""
+
+    kind: ClassVar[str] = "harmonic"
+    amplitude: Annotated[float, _LENGTH]
+    frequency: Annotated[float, Quantity("Hz", above=0.0)]
+    direction: Annotated[float, Quantity("rad")] = 0.0
+    cycles: Annotated[float, _COUNT] = 2.0
+    lead_in: Annotated[float | None, _TIME] = None
+
+    def _motion(self) -> Motion:
+        return Motion.harmonic(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle(MotionTable):
+    """`Motion.circle`: a circular path."""
+
+    kind: ClassVar[str] = "circle"
+    amplitude: Annotated[float, _LENGTH]
+    angular_frequency: Annotated[float, _ANGULAR]
+    cycles: Annotated[float, _COUNT] = 2.0
+    lead_in: Annotated[float, _TIME] = 20.0
+
+    def _motion(self) -> Motion:
+        return Motion.circle(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureEight(Circle):
+    """`Motion.figure_eight`: a path in the form of an eight."""
+
+    kind: ClassVar[str] = "figure-eight"
+
+    def _motion(self) -> Motion:
+        return Motion.figure_eight(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(MotionTable):
+    """`Motion.ramp`: constant acceleration."""
+
+    kind: ClassVar[str] = "ramp"
+    acceleration: Annotated[float, Quantity("m/s^2", above=0.0)]
+    duration: Annotated[float, _TIME]
+    direction: Annotated[float, Quantity("rad")] = 0.0
+
+    def _motion(self) -> Motion:
+        return Motion.ramp(**self._values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordMotion(MotionTable):
+    """`Motion.from_record`: one file, one file for each component, or a record bundled with the package.
+
+    `scale_to` is a table of the fields of `records.ScaleTo`.
+    """
+
+    kind: ClassVar[str] = "record"
+    file: Annotated[str | tuple[str, ...] | None, Paths()] = None
+    bundled: str | None = None
+    scale: Annotated[float, Quantity("")] = 1.0
+    scale_to: Mapping[str, Any] | None = None
+    start: Annotated[float | None, Quantity("s", least=0.0)] = None
+    duration: Annotated[float | None, _TIME] = None
+    correct: bool = True
+    corner: Annotated[float, Quantity("Hz", above=0.0)] = 0.05
+    taper: Annotated[float, _TIME] = 1.0
+
+    def _motion(self) -> Motion:
+        from msfp_gen.motions import records
+
+        if (self.file is None) == (self.bundled is None):
+            found = "neither is" if self.file is None else "both are"
+            raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
+        if self.bundled is not None:
+            record = records.bundled(self.bundled)
+        else:
+            files = [self.file] if isinstance(self.file, str) else self.file or ()
+            record = records.read_record(*map(_existing, files))
+        target = None if self.scale_to is None else records.ScaleTo(**self.scale_to)
+        values = self._values("file", "bundled", "scale_to")
+        return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrays(MotionTable):
+    """`Motion.from_csv`: a file with columns of time and displacement or acceleration, units in its header."""
+
+    kind: ClassVar[str] = "arrays"
+    file: str
+
+    def _motion(self) -> Motion:
+        return Motion.from_csv(_existing(self.file), name=self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces(MotionTable):
+    """The polynomials of a `Motion`: the exact form in which a motion made in Python is written."""
+
+    kind: ClassVar[str] = "pieces"
+    knots: Annotated[tuple[float, ...], Quantity("s", shape=(None,))]
+    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6))]
+    jumps: Annotated[tuple[float, ...], Quantity("s", shape=(None,))] = ()
+    max_step: Annotated[float | None, _TIME] = None
+    metadata: Annotated[Mapping[str, str | float] | None, Notes()] = None
+
+    def _motion(self) -> Motion:
+        return Motion(**self._values() | {"metadata": self.metadata or {}})
+
+    @classmethod
+    def of(cls, motion: Motion) -> dict[str, Any]:
+        """The `[motion]` table of any motion, `kind` included."""
+        names = ("knots", "coefficients", "jumps")
+        table = {"kind": cls.kind, **{name: getattr(motion, name).tolist() for name in names}}
+        rest = {"max_step": motion.max_step, "name": motion.name, "metadata": dict(motion.metadata)}
+        return table | {name: value for name, value in rest.items() if value is not None}
+
+
+def resolved(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:
+    """The path or paths of a `file` key as absolute paths; relative ones start from the folder of the scene file.
+
+    Security: a scene file can only read files in or below its own folder and the folders in `MSFP_GEN_RECORDS`. For a
+    table made in Python (`folder` None) there is no restriction. Raises InputError.
+    """
+    if isinstance(file, str):
+        return _resolved(file, folder)
+    return tuple(_resolved(each, folder) for each in file)
+
+
+def _resolved(file: str, folder: Path | None) -> str:
+    try:
+        path = ((folder or Path()) / file).resolve()
+    except (OSError, ValueError, RuntimeError) as error:  # such as a null character, or a loop of symbolic links
+        raise InputError(f"motion.file = {file!r}: this is no path ({error}); give that of a record") from None
+    records = os.environ.get(RECORDS, "").split(os.pathsep)
+    permitted = [folder, *(Path(each).expanduser() for each in records if each)] if folder is not None else []
+    if permitted and not any(path.is_relative_to(each.resolve()) for each in permitted):
+        raise InputError(
+            f"motion.file = {file!r}: outside the folder of the scene file; put the record there, or name its folder "
+            f"in the environment variable {RECORDS}"
+        )
+    return str(path)
+
+
+def is_file(path: Path) -> bool:
+    """Whether `path` is a regular file; False for devices, pipes and invalid names."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _existing(file: str | None) -> Path:
+    """The path of an existing file; raises InputError for any other."""
+    path = Path(str(file))
+    if not is_file(path):
+        raise InputError(f"motion.file = {str(path)!r}: no such file; paths are relative to the scene file")
+    return path
+
+
+KINDS: dict[str, type[MotionTable]] = {
+    kind.kind: kind for kind in (Harmonic, Circle, FigureEight, Ramp, RecordMotion, Arrays, Pieces)
+}

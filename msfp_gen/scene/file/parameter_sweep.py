@@ -1,0 +1,59 @@
+"""Parameter sweeps: a scene in every combination of the given values of some fields."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.loader import changed_scene
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+
+MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
+
+
+def varied_field(text: str) -> tuple[str, list[Any]]:
+    """Path and values of a field from a text such as `motion.scale=0.5,1,2`; values as in TOML. Raises InputError."""
+    path, equals, values = text.partition("=")
+    path = path.strip()
+    if not equals or not path or not all(path.split(".")):
+        raise InputError(f"--vary = {text!r}: give a field of the scene and its values: motion.scale=0.5,1,2")
+    try:
+        found = tomllib.loads(f"values = [{values}]")["values"]
+    except (ValueError, RecursionError):
+        raise InputError(
+            f"--vary = {text!r}: the values are no TOML; texts need quotes, numbers do not: top.kind='rig','mass'"
+        ) from None
+    if not found:
+        raise InputError(f"--vary = {text!r}: there are no values; give some: motion.scale=0.5,1,2")
+    return path, found
+
+
+def varied_scenes(source: str | Path, fields: Sequence[tuple[str, list[Any]]]) -> list[Scene]:
+    """The scenes of all combinations of values, the last field varying fastest; their names state the values.
+
+    source: scene file or preset. fields: path and values of each. Raises InputError: a field is given twice, does not
+    exist, or does not accept a value.
+    """
+    paths = [path for path, _ in fields]
+    if repeated := [path for path in paths if paths.count(path) > 1]:
+        raise InputError(f"--vary {repeated[0]}: given twice; give all its values at once")
+    combinations = list(product(*(values for _, values in fields)))
+    if len(combinations) > MAX_SCENES:
+        raise InputError(f"--vary: {len(combinations)} combinations; give at most {MAX_SCENES}")
+    return [
+        _named(changed_scene(source, dict(zip(paths, values, strict=True))), source, paths, values)
+        for values in combinations
+    ]
+
+
+def _named(scene: Scene, source: str | Path, paths: Sequence[str], values: Sequence[Any]) -> Scene:
+    values_text = ", ".join(f"{path} = {value}" for path, value in zip(paths, values, strict=True))
+    name = scene.name or Path(source).stem
+    return replace(scene, name=f"{name}, {values_text}" if values_text else name)

@@ -1,0 +1,31 @@
+"""Presets: bearings and scenes of PEER 2017/07, and others, by name. Their data are TOML files in this folder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msfp_gen.scene.file import catalogue
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.scene import Scene
+
+
+def names(kind: str | None = None) -> dict[str, str]:
+    """Name -> one line of description, of the presets of a `kind` ("bearing" or "scene"), or of all."""
+    kinds = ("bearing", "scene") if kind is None else (kind,)
+    return {name: line for each in kinds for name, line in catalogue.descriptions(each).items()}
+
+
+def bearing(name: str) -> Bearing:
+    """The bearing `name`, such as "fenz-tfp". Raises InputError for an unknown name."""
+    from msfp_gen.scene.file.loader import bearing_from_table
+
+    return bearing_from_table({"preset": name})
+
+
+def scene(name: str) -> Scene:
+    """The scene `name`, such as "fenz-test2". Raises InputError for an unknown name."""
+    from msfp_gen.scene.file.loader import scene_from_table
+
+    return scene_from_table(catalogue.scene_table(name))

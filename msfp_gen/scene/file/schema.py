@@ -1,0 +1,236 @@
+"""The schema of scene files: pydantic models made from the field rules of the package's dataclasses.
+
+Pydantic walks the nested tables and locates errors; `common.fields` holds the rules. The `validate_` functions return
+plain tables in SI units with only the keys that the file gives, or raise one InputError of one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING
+from functools import partial, reduce
+from operator import or_
+from types import GenericAlias
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    ValidationError,
+    create_model,
+)
+
+from msfp_gen.common.fields import Quantity, Rule, Text, ruled_fields
+from msfp_gen.errors import InputError
+from msfp_gen.motions.records.scaling import ScaleTo
+from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.file import motion_tables
+from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.specification.layout import Auto, Layout
+
+Table = dict[str, Any]
+Model = type[BaseModel]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+def _model(kind: type, /, **more: Any) -> Model:
+    """A pydantic model of the fields of a dataclass that have a rule, and of `more` fields as (annotation, default)."""
+    given = {
+        name: (_read(rule.parse), ... if default is MISSING else default) for name, rule, default in ruled_fields(kind)
+    }
+    return create_model(kind.__name__, __base__=_Strict, **{**given, **more})
+
+
+def _read(parse: Callable[..., Any]) -> Any:
+    """The annotation of a field that `parse` validates, texts with units included."""
+    return Annotated[Any, PlainValidator(partial(parse, text=True))]
+
+
+def _column(rule: Rule, value: object, *, text: bool) -> Any:
+    """A value for all surfaces or bodies, or a list with one value for each."""
+    pairs = isinstance(rule, Quantity) and bool(rule.shape)
+    if isinstance(value, list) and (not pairs or any(isinstance(item, list) for item in value)):
+        return [rule.parse(item, text=text) for item in value]
+    return rule.parse(value, text=text)
+
+
+def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
+    """The union of the tables that their key `kind` distinguishes, and the model of each kind."""
+    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds}
+    return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
+
+
+_SCALE_TO = _model(ScaleTo)
+
+
+def _inner(kind: type) -> Table:
+    """Fields of a kind that are tables themselves."""
+    scaled = {"scale_to": (_SCALE_TO, None)} if kind is motion_tables.RecordMotion else {}
+    return scaled | ({"rotation": (_ROTATION, None)} if issubclass(kind, motion_tables.MotionTable) else {})
+
+
+def _preset_table(value: Any) -> Any:
+    """The name of a preset as a table; other values unchanged."""
+    return {"preset": value} if isinstance(value, str) else value
+
+
+def _bearing_kind(value: Any) -> str:
+    return "preset" if isinstance(value, Mapping) and "preset" in value else "full"
+
+
+def _rows(model: Model) -> Any:
+    return GenericAlias(list, (model,))
+
+
+def _bearing_union(full: Model, preset: Model) -> Any:
+    """A complete bearing or a preset with changes; a text alone is the name of a preset."""
+    union = reduce(or_, (Annotated[full, Tag("full")], Annotated[preset, Tag("preset")]))
+    return Annotated[union, Discriminator(_bearing_kind), BeforeValidator(_preset_table)]
+
+
+def _auto(model: Model) -> Any:
+    """Effects as a table; the word "auto" is the empty table: all effects are selected from the scene."""
+    return Annotated[model, BeforeValidator(lambda value: {} if value == "auto" else value)]
+
+
+_SURFACE, _BODY, _LAYOUT = _model(Surface), _model(Body), _model(Layout)
+_BEARING = _model(Bearing, layout=(_LAYOUT, ...), surfaces=(_rows(_SURFACE), ...), bodies=(_rows(_BODY), ...))
+_CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fields(Bearing)} | {
+    name: (_read(partial(_column, rule)), None) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
+}
+_PRESET: Model = create_model("PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), **_CHANGES)
+_EITHER = _bearing_union(_BEARING, _PRESET)
+_ROTATION, _ROTATIONS = _union(ROTATIONS.values())
+_LOAD, _LOADS = _union(LOADS.values())
+_MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
+_TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
+_PARTS: dict[str, Model] = {
+    name: _model(kind)
+    for name, kind in (("effects", Auto), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
+}
+_SCENE = _model(
+    Scene,
+    bearing=(_EITHER, ...),
+    motion=(_MOTION, ...),
+    top=(_TOP, ...),
+    load=(_LOAD, None),
+    top_rotation=(_ROTATION, None),
+    **{name: (_auto(model) if name == "effects" else model, None) for name, model in _PARTS.items()},
+)
+# Every table by its path, union tags included: the known keys for messages about a misspelt or missing key.
+_TABLES: dict[str, Model] = {
+    "": _SCENE,
+    "bearing.full": _BEARING,
+    "bearing.full.layout": _LAYOUT,
+    "bearing.full.surfaces": _SURFACE,
+    "bearing.full.bodies": _BODY,
+    "bearing.preset": _PRESET,
+    **{f"motion.{kind}": model for kind, model in _MOTIONS.items()},
+    "motion.record.scale_to": _SCALE_TO,
+    **{f"top.{kind}": model for kind, model in _TOPS.items()},
+    **{f"load.{kind}": model for kind, model in _LOADS.items()},
+    **{f"top_rotation.{kind}": model for kind, model in _ROTATIONS.items()},
+    **{f"motion.{kind}.rotation.{turn}": model for kind in _MOTIONS for turn, model in _ROTATIONS.items()},
+    **_PARTS,
+}
+_TAGGED = ("bearing", "motion", "top", "load", "top_rotation")
+_REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
+
+
+def validate_scene(table: Mapping[str, Any]) -> Table:
+    """The table of a scene with its quantities in SI units and only the given keys; raises InputError of one line."""
+    return _validate(_SCENE, table)
+
+
+def validate_bearing(table: Mapping[str, Any]) -> Table:
+    """The same for a `[bearing]` table."""
+    return _validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
+
+
+_ONLY_BEARING = create_model("OnlyBearing", __base__=_Strict, bearing=(_EITHER, ...))
+
+
+def _validate(model: Model, table: Mapping[str, Any]) -> Table:
+    try:
+        return _plain(model.model_validate(table))  # type: ignore[no-any-return]
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    # A misspelt key is reported twice, as unknown and as missing: the report of the unknown key is more helpful.
+    detail = min(details, key=lambda each: each["type"] != "extra_forbidden")
+    raise InputError(_one_line(detail["type"], detail["loc"], detail["input"], detail.get("ctx", {})))
+
+
+def _plain(value: Any) -> Any:
+    """Pydantic models as dicts of the given keys."""
+    if isinstance(value, BaseModel):
+        return {name: _plain(getattr(value, name)) for name in sorted(value.model_fields_set)}
+    return [_plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
+    path, note = _path(location)
+    table = _TABLES.get(".".join(part for part in location[:-1] if isinstance(part, str)), _Strict)
+    if kind == "extra_forbidden":
+        known = list(table.model_fields)
+        hint = suggestion(str(location[-1]), known) or f"; the keys here are {', '.join(known)}"
+        return f"{path}{note}: unknown key{hint}"
+    if kind == "missing":
+        return f"{path}{note} is missing: {_remedy(table, str(location[-1]))}"
+    if kind.startswith("union_tag") and isinstance(value, Mapping):
+        fact = f"{path}.kind = {value['kind']!r}" if "kind" in value else f"{path}.kind is missing"
+        return f"{fact}: give one of {context.get('expected_tags') or _kinds(path)}"
+    remedy = str(context["error"]) if "error" in context else _REMEDIES.get(kind, "give a table")
+    remedy += " or the name of a preset" if path == "bearing" else ""
+    return f"{path} = {_short(value)}{note}: {remedy}"
+
+
+def _path(location: tuple[int | str, ...]) -> tuple[str, str]:
+    """Path as in `bearing.surfaces[2].radius`, and the number of PEER 2017/07 as in ` (surface 3)`."""
+    parts = location[:1] + location[2:] if location[0] in _TAGGED else location
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{_key(part)}" for part in parts).lstrip(".")
+    for name, word, first in (("surfaces", "surface", 1), ("bodies", "body", 2)):
+        if parts[1:2] == (name,) and len(parts) > 2:
+            return path, f" ({word} {int(parts[2]) + first})"
+    return path, ""
+
+
+def _key(name: str) -> str:
+    """A key for a message: in quotes where it is not a plain word."""
+    return name if name.replace("-", "_").isidentifier() and len(name) <= 60 else _short(name)
+
+
+def _kinds(path: str) -> str:
+    return ", ".join(repr(kind) for kind in (_MOTIONS if path == "motion" else _TOPS))
+
+
+def _remedy(table: Model, name: str) -> str:
+    """The remedy for a missing key: the text of its rule for the value None."""
+    for item in table.model_fields[name].metadata if name in table.model_fields else ():
+        if isinstance(item, PlainValidator):
+            try:
+                item.func(None)  # type: ignore[call-arg]
+            except ValueError as error:
+                return str(error)
+    return "give this table"
+
+
+def _short(value: Any) -> str:
+    """`repr` of a value, at most 60 characters."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to write out whole numbers of thousands of digits
+        text = "a number of thousands of digits"
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,95 @@
+"""The motion in a result file: its `[motion]` table, or its polynomials.
+
+A result file must be readable without any other file. A motion that was read from a file or made in Python is
+therefore stored as polynomials; its table is kept for information only, with file names instead of paths.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.trajectory import CHANNELS
+from msfp_gen.scene.file.loader import scene_text
+from msfp_gen.scene.file.motion_tables import KINDS, Pieces
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.scene.scene import Scene
+
+GROUP = "motion"  # group of the netCDF file with the polynomials
+PIECES, RECIPE = "pieces", "recipe"  # values of the attribute `motion`: polynomials in `GROUP`, or the table alone
+COMPRESSED = {"coefficients": {"zlib": True, "complevel": 1}}
+UNITS = "m or rad, over s^power"
+
+
+def scene_attribute(scene: Scene) -> str:
+    """The scene as TOML text without the polynomials of its motion and without folders of this machine."""
+    table = scene.motion_table
+    if not needs_pieces(scene):
+        return scene_text(scene, table)
+    informative = table is not None and "file" in table and _makes(table, scene.motion)
+    return scene_text(scene, {**table, **_file_names(table)} if table is not None and informative else {})
+
+
+def needs_pieces(scene: Scene) -> bool:
+    """Whether the table alone cannot make the motion again: it names files, or Python code made the motion."""
+    table = scene.motion_table
+    if table is None or table["kind"] == Pieces.kind or table.get("file") is not None:
+        return True
+    return not _makes(table, scene.motion)
+
+
+def to_pieces(motion: Motion) -> xr.Dataset:
+    """A motion as a dataset: knots [s], coefficients by piece, channel and power of time, jumps [s]."""
+    import xarray as xr
+
+    attributes: dict[str, str | float] = {"name": motion.name, "metadata": json.dumps(dict(motion.metadata))}
+    if motion.max_step is not None:
+        attributes["max_step"] = motion.max_step
+    variables = {
+        "knots": ("knot", motion.knots, {"units": "s", "long_name": "ends of the pieces"}),
+        "coefficients": (
+            ("piece", "channel", "power"),
+            motion.coefficients,
+            {"units": UNITS, "long_name": "coefficients of rising powers of time"},
+        ),
+        "jumps": ("jump", motion.jumps, {"units": "s", "long_name": "where the acceleration may jump"}),
+    }
+    return xr.Dataset(variables, {"channel": ("channel", np.array(CHANNELS))}, attributes)
+
+
+def from_pieces(dataset: xr.Dataset) -> dict[str, Any]:
+    """The inverse of `to_pieces`, as the `[motion]` table of a scene."""
+    attributes = dataset.attrs
+    step = attributes.get("max_step")
+    arrays = {name: dataset[name].to_numpy() for name in ("knots", "coefficients", "jumps")}
+    return Pieces.of(
+        Motion(
+            **arrays,
+            max_step=None if step is None else float(step),
+            name=str(attributes["name"]),
+            metadata=json.loads(attributes["metadata"]),
+        )
+    )
+
+
+def _makes(table: Mapping[str, Any], motion: Motion) -> bool:
+    """Whether a `[motion]` table makes this motion; not so where `dataclasses.replace` changed the scene's motion."""
+    try:
+        return KINDS[table["kind"]](**{key: value for key, value in table.items() if key != "kind"}).build() == motion
+    except InputError:  # its file no longer exists
+        return False
+
+
+def _file_names(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The key `file` of a `[motion]` table without folders."""
+    file = table["file"]
+    return {"file": PurePath(file).name if isinstance(file, str) else [PurePath(each).name for each in file]}

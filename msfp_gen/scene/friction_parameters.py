@@ -1,0 +1,212 @@
+"""Parameters of a friction law on one surface, and the check that the law is valid with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from msfp_gen.errors import InputError
+from msfp_gen.specification.formula import Operations, fold, names_in
+from msfp_gen.specification.friction_laws import BUILT_IN, VARIABLES, Law, law_parameter_names
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.bearing import Bearing
+
+# Range of every variable over which a law is checked: v [m/s], p [Pa], T [degC], N [N].
+RANGES: dict[str, NDArray[np.float64]] = {
+    "v": np.r_[0.0, np.geomspace(1e-6, 2.0, 20)],
+    "p": np.geomspace(1e3, 2e8, 16),
+    "T": np.linspace(-40.0, 600.0, 17),
+    "N": np.geomspace(1.0, 1e8, 9),
+}
+Dual = tuple[Any, Any]  # a value and its derivative with respect to one variable (forward-mode differentiation)
+
+
+def _chain(factor: Any, rate: Any) -> Any:
+    """A term `factor * rate` of the chain rule; 0 where the rate is 0, even if the factor is not finite."""
+    return np.where(rate == 0.0, 0.0, factor * rate)
+
+
+def _exp(a: Dual) -> Dual:
+    return np.exp(a[0]), _chain(np.exp(a[0]), a[1])
+
+
+def _log(a: Dual) -> Dual:
+    return np.log(a[0]), _chain(1 / a[0], a[1])
+
+
+def _mul(a: Dual, b: Dual) -> Dual:
+    return a[0] * b[0], _chain(b[0], a[1]) + _chain(a[0], b[1])
+
+
+def _select(a: Dual, b: Dual, first: Any) -> Dual:
+    """`a` where `first` is true, else `b`."""
+    return np.where(first, a[0], b[0]), np.where(first, a[1], b[1])
+
+
+OPERATIONS: Operations = {
+    "number": lambda x: (np.float64(x), 0.0),
+    "neg": lambda a: (-a[0], -a[1]),
+    "add": lambda a, b: (a[0] + b[0], a[1] + b[1]),
+    "sub": lambda a, b: (a[0] - b[0], a[1] - b[1]),
+    "mul": _mul,
+    "div": lambda a, b: (a[0] / b[0], _chain(1 / b[0], a[1]) - _chain(a[0] / b[0] ** 2, b[1])),
+    "pow": lambda a, b: (a[0] ** b[0], _chain(b[0] * a[0] ** (b[0] - 1.0), a[1])),
+    "power": lambda a, b: _exp(_mul(_log(a), b)),
+    "exp": _exp,
+    "log": _log,
+    "sqrt": lambda a: (np.sqrt(a[0]), _chain(0.5 / np.sqrt(a[0]), a[1])),
+    "tanh": lambda a: (np.tanh(a[0]), _chain(1 - np.tanh(a[0]) ** 2, a[1])),
+    "Abs": lambda a: (np.abs(a[0]), _chain(np.sign(a[0]), a[1])),
+    "Min": lambda a, b: _select(a, b, a[0] < b[0]),
+    "Max": lambda a, b: _select(a, b, a[0] > b[0]),
+}
+
+
+def coefficient(law: Law, values: Mapping[str, Any], by: str = "") -> Dual:
+    """Friction coefficient of a law, and its derivative with respect to one of its names.
+
+    values: a number or an array for every name in the formula. by: the name for the derivative; "": none. Returns two
+    arrays of the broadcast shape.
+    """
+    pairs = {name: (np.asarray(value, float), float(name == by)) for name, value in values.items()}
+    with np.errstate(all="ignore"):
+        mu, slope = fold(law.tree, pairs, OPERATIONS)
+    shape = np.broadcast_shapes(*(pair[0].shape for pair in pairs.values()))
+    return np.broadcast_to(mu, shape), np.broadcast_to(slope, shape)
+
+
+def check_bearing(law: Law | None, word: str, bearing: Bearing) -> None:
+    """Check the friction parameters of a bearing.
+
+    Raises InputError where a surface lacks a parameter of the law, has one of another law, or where the law is not
+    valid with its parameters. law: None for constant friction. word: that of `Effects.friction`.
+    """
+    takes = set() if law is None else {*law.parameters, *law.also_accepted}
+    for index, surface in enumerate(bearing.surfaces):
+        for name in law_parameter_names():
+            if name not in takes and getattr(surface, name) is not None:
+                words = [other.word for other in BUILT_IN.values() if name in {*other.parameters, *other.also_accepted}]
+                users = " or ".join(map(repr, words)) or "'custom'"
+                raise InputError(
+                    f"bearing.surfaces[{index}].{name} = {getattr(surface, name)} (surface {index + 1}): "
+                    f"effects.friction = {word!r} has no such parameter; leave it out or give {users}"
+                )
+        if law is not None:
+            defect = _defect(law, (("mu", surface.friction), *law_parameters(law, bearing, index).items()))
+            if defect is not None:
+                raise InputError(
+                    f"bearing.surfaces[{index}] (surface {index + 1}): the law of effects.friction = "
+                    f"{law.word!r} {defect}"
+                )
+
+
+def law_parameters(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
+    """Parameters of a law on one surface (index from 0), defaults and derived ones included, by their names.
+
+    Raises InputError where a parameter without a default is missing.
+    """
+    surface, found = bearing.surfaces[index], dict[str, float | None]()
+    defaults = {**law.parameters, "patch_radius": bearing.slider_rim_radius(index) or None}
+    for name in law.parameters:
+        value = getattr(surface, name)
+        found[name] = defaults[name] if value is None else value
+        if found[name] is None:
+            more = ", or the slider's rim_radius" if name == "patch_radius" else ""
+            raise InputError(
+                f"bearing.surfaces[{index}].{name} is missing (surface {index + 1}): "
+                f"effects.friction = {law.word!r} needs it{more}"
+            )
+    return {name: float(value) for name, value in {**found, **derived_parameters(found)}.items() if value is not None}
+
+
+def derived_parameters(found: Mapping[str, float | None]) -> dict[str, float]:
+    """Parameters that follow from others.
+
+    area: of the contact patch, pi r^2 [m^2]. reach: half the side of the square of that area; the patch covers the
+    centre of the surface while the sliding displacement is smaller (Kumar et al. 2015) [m]. heating: sqrt(D/pi)/k
+    [K s^1/2 m^2/J]. Each is given where its inputs are.
+    """
+    out: dict[str, float] = {}
+    if (radius := found.get("patch_radius")) is not None:
+        out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
+    if (k := found.get("conductivity")) is not None and (d := found.get("diffusivity")) is not None:
+        out["heating"] = sqrt(d / pi) / k
+    return out
+
+
+def proportional(law: Law, bearing: Bearing) -> bool:
+    """Whether the coefficient of a law is proportional to the reference coefficient mu of every surface.
+
+    A law with `friction_slow` must be proportional to both coefficients together.
+    """
+    factor, found = 1.25, []
+    for index, surface in enumerate(bearing.surfaces):
+        values, points = law_parameters(law, bearing, index), _grid(law)
+        scaled = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
+        base, raised = (
+            coefficient(law, {**each, **points, "mu": mu})[0]
+            for each, mu in ((values, surface.friction), (scaled, factor * surface.friction))
+        )
+        found.append(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
+    return all(found)
+
+
+def _grid(law: Law) -> dict[str, NDArray[np.float64]]:
+    """A grid over the `RANGES` of the variables of a law: an array of all points for each variable."""
+    used = [name for name in RANGES if name in names_in(law.tree)]
+    return dict(zip(used, np.meshgrid(*(RANGES[name] for name in used), indexing="ij"), strict=True))
+
+
+def checked_range(law: Law | None, bearing: Bearing, lower_load_limit: bool = True) -> dict[str, Any]:
+    """Range over which the law was checked, as arguments of a compiled run; empty for constant friction.
+
+    law_speed: largest slip velocity [m/s]. law_load: smallest and largest normal force of each surface, shape (n-1, 2)
+    [N]; the smallest is 0 unless `lower_load_limit`. law_temperature: lowest and highest, shape (2,) [degC]. Each is
+    given if the law depends on that variable.
+    """
+    used, found = frozenset() if law is None else names_in(law.tree), dict[str, Any]()
+    if "v" in used:
+        found["law_speed"] = float(RANGES["v"][-1])
+    if law is not None and used & {"p", "N"}:
+        limits = np.tile([0.0, np.inf], (len(bearing.surfaces), 1))
+        for index in range(len(bearing.surfaces)):
+            area = law_parameters(law, bearing, index).get("area", np.nan)
+            sides = [RANGES[name][[0, -1]] * (area if name == "p" else 1.0) for name in ("p", "N") if name in used]
+            limits[index] = max(side[0] for side in sides) if lower_load_limit else 0.0, min(side[1] for side in sides)
+        found["law_load"] = limits
+    if "T" in used:
+        found["law_temperature"] = RANGES["T"][[0, -1]]
+    return found
+
+
+@lru_cache(maxsize=256)
+def _defect(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
+    """Why a law is not valid with the parameters of one surface, `mu` included; None where it is valid.
+
+    Over the `RANGES`, mu must be finite, positive where the reference coefficient is, and of finite slope. Results are
+    cached, since the surfaces of a bearing often have equal parameters.
+    """
+    points = _grid(law)
+    at: dict[str, Any] = {**dict(values), **points}
+    mu = coefficient(law, at)[0]
+    slopes = {f"d mu/d{name}": coefficient(law, at, name)[1] for name in points}
+    invalid = ~np.isfinite(mu) | (mu < 0) | ((mu == 0) & (at["mu"] > 0))
+    checks = [
+        ("mu", mu, invalid, "finite and positive"),
+        *((name, slope, ~np.isfinite(slope), "of finite slope") for name, slope in slopes.items()),
+    ]
+    for quantity, found, failed, remedy in checks:
+        if failed.any():
+            where = np.unravel_index(int(np.argmax(failed)), failed.shape)
+            place = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in points)
+            return (
+                f"gives {quantity} = {found[where]:.4g} at {place or 'every point'}; give a law and parameters with "
+                f"which it is {remedy}"
+            )
+    return None

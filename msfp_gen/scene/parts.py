@@ -1,0 +1,93 @@
+"""The fields of a scene: the input of effect selection and of the search for a vertical plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated, Any
+
+from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Load, Rotation
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import Top
+from msfp_gen.specification.friction_laws import Law, law_of
+from msfp_gen.specification.layout import Auto, Effects
+
+_TIME = Quantity("s", above=0.0)
+Triples = tuple[tuple[float, float, float], ...]
+Pairs = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """Initial state of a run, as nested tuples; arrays and lists are accepted too.
+
+    q: angles psi, theta, phi of bodies 2..n, shape (n-1, 3) [rad]. v: their rates, same shape [rad/s].
+    h: friction state Y, Z of each surface, shape (n-1, 2) [-], within the unit disc (2.94). Raises InputError.
+    """
+
+    q: Annotated[Triples, Quantity("rad", shape=(None, 3))]
+    v: Annotated[Triples, Quantity("rad/s", shape=(None, 3))]
+    h: Annotated[Pairs, Quantity("", shape=(None, 2))]
+
+    def __post_init__(self) -> None:
+        check_fields(self, "initial_state")
+        for index, (first, second) in enumerate(self.h):
+            if first**2 + second**2 > 1 + 1e-9:
+                raise InputError(
+                    f"initial_state.h[{index}] = {(first, second)}: friction cannot exceed mu N; give Y^2 + Z^2 <= 1"
+                )
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Conditions that end a run before its duration; the first that is met counts.
+
+    displacement: horizontal displacement across the bearing [m]. all_rims: every rim is in contact. Raises InputError.
+    """
+
+    displacement: Annotated[float | None, Quantity("m", above=0.0)] = None
+    all_rims: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(self, "stop")
+        if self.displacement is None and not self.all_rims:
+            raise InputError("stop: nothing to stop at; give displacement [m] or all_rims = true")
+
+
+@dataclass(frozen=True)
+class SceneParts:
+    """The fields of a `Scene`, without the checks that they are consistent."""
+
+    bearing: Bearing
+    motion: Motion
+    top: Top
+    effects: Effects | Auto = field(default_factory=Auto)
+    solver: Solver = field(default_factory=Solver)
+    duration: Annotated[float | None, _TIME] = None
+    initial_state: InitialState | None = None
+    output_step: Annotated[float | None, _TIME] = None
+    stop: Stop | None = None
+    load: Load | None = None
+    top_rotation: Rotation | None = None
+    name: str = ""
+    motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Nothing here; the constructor, which `Scene` shares, calls the checks of `Scene` by this name."""
+
+    @cached_property
+    def law(self) -> tuple[str, Law | None]:
+        """Friction law at the start of a run: the word of `Effects.friction`, and the law (None: constant friction)."""
+        word = self.effects.friction or select_friction(self.bearing, self.effects.friction_law)
+        return word, law_of(word, self.effects.friction_law)
+
+    @cached_property
+    def end(self) -> float:
+        """Latest time at which the run ends [s]."""
+        return self.motion.duration if self.duration is None else min(self.duration, self.motion.duration)

@@ -1,0 +1,121 @@
+"""The vertical plane in which a scene stays: base motion, loads, rotations and initial state.
+
+Each input is described by horizontal vectors that lie in its plane of motion: a displacement, a force, or, for a
+rotation or moment about a horizontal axis a, the horizontal direction of tilting a x E3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.motions import piecewise
+from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.scene.top import PrescribedTop
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.parts import SceneParts
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneInput:
+    """One input of a scene as a piecewise polynomial over time.
+
+    name: as in messages. knots: shape (k+1,) [s]. coefficients: shape (k, 2, 6) of a horizontal vector, or (k, 1, 6) of
+    an axial component, which must vanish in any planar motion. euler_angles: the vector consists of Euler angles, whose
+    planar motion the equations describe in the E1-E3 and E2-E3 planes only.
+    """
+
+    name: str
+    knots: Array
+    coefficients: Array
+    euler_angles: bool = False
+
+    def onset(self) -> float:
+        """Time from which the input is not zero [s]; inf where it always is."""
+        nonzero = np.any(self.coefficients, axis=(1, 2))
+        return float(self.knots[int(np.argmax(nonzero))]) if nonzero.any() else inf
+
+    def plane(self) -> tuple[float | None, float]:
+        """Azimuth of the plane in which the input starts [rad], and the time at which it leaves that plane [s].
+
+        The azimuth is None where the input is zero or axial; the time is inf where it stays.
+        """
+        if self.onset() == inf:
+            return None, inf
+        if self.coefficients.shape[1] == 1:
+            return None, self.onset()
+        found = piecewise.azimuth(self.knots, self.coefficients)
+        if found is not None:
+            return found, inf
+        first, last = int(np.argmax(np.any(self.coefficients, axis=(1, 2)))), len(self.knots) - 1
+        plane, low = None, first
+        while last - low > 1:  # bisection for the largest number of leading pieces that lie in one plane
+            middle = (low + last) // 2
+            azimuth = piecewise.azimuth(self.knots[: middle + 1], self.coefficients[:middle])
+            low, last, plane = (low, middle, plane) if azimuth is None else (middle, last, azimuth)
+        return plane, float(self.knots[low])
+
+
+def scene_plane(scene: SceneParts) -> tuple[float, float, str]:
+    """Vertical plane of a scene: azimuth [rad], in (-pi/2, pi/2]; time at which it is left [s]; name of that input."""
+    scene_azimuth: float | None = None
+    until, name = inf, "motion"
+    for part in plane_inputs(scene):
+        azimuth, leaves = part.plane()
+        if azimuth is not None and scene_azimuth is None:
+            scene_azimuth = azimuth
+        other_plane = azimuth is not None and scene_azimuth is not None and abs(azimuth - scene_azimuth) > 1e-9
+        oblique = part.euler_angles and azimuth is not None and min(abs(azimuth), abs(azimuth - pi / 2)) > 1e-9
+        end = part.onset() if other_plane or oblique else leaves
+        if end < until:
+            until, name = end, part.name
+    return scene_azimuth or 0.0, until, name
+
+
+def plane_inputs(scene: SceneParts) -> Iterator[PlaneInput]:
+    """All inputs of a scene that may leave a vertical plane, the base motion first."""
+    motion = scene.motion
+    moving = motion.coefficients.copy()
+    moving[:, :, 0] -= moving[0, :, 0]
+    yield PlaneInput("motion", motion.knots, moving[:, :2])
+    yield _tilt("rotation of the base", motion.knots, motion.coefficients[:, 3:5])
+    yield PlaneInput("rotation of the base", motion.knots, motion.coefficients[:, 5:])
+    if isinstance(scene.top, PrescribedTop):
+        values = np.zeros((1, 6, ORDER))
+        values[0, :, 0] = [*scene.top.force, *scene.top.moment]
+        yield from _wrench("top.force, top.moment", np.array([0.0, 1.0]), values)
+    if scene.load is not None:
+        yield from _wrench("load", scene.load.knots, scene.load.coefficients)
+    if scene.top_rotation is not None:
+        yield _tilt("top_rotation", scene.top_rotation.knots, scene.top_rotation.coefficients)
+    state = scene.initial_state
+    if state is not None:
+        for row in (*state.q, *state.v):
+            yield _constant("initial_state", (row[1], -row[0]), euler_angles=True)
+            yield _constant("initial_state", row[2:])
+        for pair in state.h:
+            yield _constant("initial_state", pair)
+
+
+def _constant(name: str, values: tuple[float, ...], euler_angles: bool = False) -> PlaneInput:
+    pieces = np.zeros((1, len(values), ORDER))
+    pieces[0, :, 0] = values
+    return PlaneInput(name, np.array([0.0, 1.0]), pieces, euler_angles)
+
+
+def _tilt(name: str, knots: Array, angles: Array) -> PlaneInput:
+    """Euler angles psi, theta, shape (k, 2, 6), as the direction of tilting (theta, -psi)."""
+    return PlaneInput(name, knots, np.stack([angles[:, 1], -angles[:, 0]], axis=1), euler_angles=True)
+
+
+def _wrench(name: str, knots: Array, wrench: Array) -> Iterator[PlaneInput]:
+    """Horizontal force, direction of tilting of the horizontal moment, and axial moment."""
+    yield PlaneInput(name, knots, wrench[:, :2])
+    yield PlaneInput(name, knots, np.stack([wrench[:, 4], -wrench[:, 3]], axis=1))
+    yield PlaneInput(name, knots, wrench[:, 5:])

@@ -1,0 +1,159 @@
+"""`Scene`: the complete input of a run, and the checks that its parts are consistent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from msfp_gen.common.fields import check_fields, require_type
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Load, Rotation
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.effect_selection import EffectSelection, select_effects
+from msfp_gen.scene.friction_parameters import check_bearing
+from msfp_gen.scene.parts import InitialState, SceneParts, Stop
+from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import Top
+from msfp_gen.specification.friction_laws import HEAT_TIMES
+from msfp_gen.specification.layout import Auto, Effects, ModelSpec
+
+MAX_ROWS = 1e8  # output rows of a run; about 100 GB
+
+
+@dataclass(frozen=True, init=False)
+class Scene(SceneParts):
+    """The complete input of `simulate`.
+
+    bearing, motion (of the base), top, solver: see their classes. duration [s]; None: that of the motion.
+    initial_state; None: centred and at rest. output_step: distance of rows [s]; None: the steps of the solver.
+    stop: condition that ends the run early. load: load history on the top plate, in addition to that of the top.
+    top_rotation: rotation history of the support to which the rotational springs of the top are fixed. effects: the
+    effects that are modelled, or `Auto`: selected from the scene. motion_table: the `[motion]` table of a scene file,
+    from which the scene can be written back. Raises InputError: a part of the wrong type, or inconsistent parts.
+    """
+
+    def __post_init__(self) -> None:
+        for name, kind in _PART_TYPES.items():
+            require_type(getattr(self, name), kind, f"scene.{name}")
+        check_fields(self, "scene")
+        self._check_times()
+        self._check_sizes()
+        word, law = self.law
+        check_bearing(law, word, self.bearing)
+        if self.effects.rims is not False:
+            self._check_rims()
+        elif self.stop is not None and self.stop.all_rims:
+            raise InputError("stop.all_rims = True: effects.rims = False models no rims; give rims = true")
+        self._check_rotation()
+        if self.effects.dimension == "planar":
+            self._check_plane()
+
+    def __repr__(self) -> str:
+        """The parts of the scene in seven lines."""
+        layout, motion, effects = self.bearing.layout, self.motion, self.effects
+        names = [f"{name} = {value}" for name, value in vars(effects).items() if value is not None]
+        selected = isinstance(effects, Auto)
+        extras = [name for name in ("load", "top_rotation", "initial_state", "stop") if getattr(self, name) is not None]
+        radii, friction = ([getattr(s, name) for s in self.bearing.surfaces] for name in ("radius", "friction"))
+        rows = {
+            "bearing": f"(n, m, p) = {layout.name}, R = {radii} m, mu = {friction}",
+            "motion": f"{motion.name or 'unnamed'}, {motion.duration:.6g} s",
+            "top": " ".join(repr(self.top).split()),
+            "effects": ("selected from the scene, " if selected else "") + ", ".join(names),
+            "solver": f"{self.solver.method}, rtol {self.solver.rtol:g}, until {self.end:.6g} s",
+            **({"also": ", ".join(extras)} if extras else {}),
+        }
+        return "\n".join([f"Scene {self.name or 'without a name'}", *(f"  {k:<9}{v}" for k, v in rows.items())])
+
+    @property
+    def spec(self) -> ModelSpec:
+        """Layout and effects of the model with which the run starts."""
+        return ModelSpec(self.bearing.layout, self.modelled)
+
+    @property
+    def modelled(self) -> Effects:
+        """The effects at the start of the run: as given, or selected from the scene."""
+        return self.effect_selection.effects
+
+    @cached_property
+    def effect_selection(self) -> EffectSelection:
+        """The effects at the start of the run, with the reason for each selection."""
+        return select_effects(self)
+
+    def _check_times(self) -> None:
+        if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):  # tolerance for rounding
+            raise InputError(
+                f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
+                "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
+            )
+        word, law = self.law
+        if law is not None and law.depends_on_temperature and self.end > HEAT_TIMES[1]:
+            raise InputError(
+                f"duration = {self.end:.12g}: effects.friction = {word!r} computes frictional "
+                f"heating for {HEAT_TIMES[1]:g} s; give at most that, or a law without temperature"
+            )
+        if self.output_step is not None and self.output_step > self.end:
+            raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")
+        if self.output_step is not None and self.end / self.output_step > MAX_ROWS:
+            raise InputError(
+                f"output_step = {self.output_step}: {self.end / self.output_step:.1e} rows exceed the limit of "
+                f"{MAX_ROWS:g}; give at least {self.end / MAX_ROWS:.2g} [s]"
+            )
+
+    def _check_sizes(self) -> None:
+        state, count = self.initial_state, self.bearing.layout.surfaces
+        for name in ("q", "v", "h") if state is not None else ():
+            rows = len(getattr(state, name))
+            if rows != count:
+                layout = self.bearing.layout.name
+                raise InputError(f"initial_state.{name} has {rows} rows: layout {layout} needs {count}")
+
+    def _check_rims(self) -> None:
+        for index, surface in enumerate(self.bearing.surfaces):
+            body = self.bearing.slider(index)
+            if self.bearing.slider_rim_radius(index) == 0:
+                path = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
+                raise InputError(
+                    f"{path} = 0 (body {body + 1}): this body meets the rim of surface {index + 1}; give the radius "
+                    "of its rim [m], or effects.rims = false"
+                )
+            if surface.rim_stiffness == 0:
+                raise InputError(
+                    f"bearing.surfaces[{index}].rim_stiffness = 0 (surface {index + 1}): this rim exerts no force; "
+                    "give a stiffness [N/m], or effects.rims = false"
+                )
+
+    def _check_rotation(self) -> None:
+        stiff = getattr(self.top, "rotational_stiffness", 0.0) or getattr(self.top, "rotational_damping", 0.0)
+        if self.top_rotation is not None and not stiff:
+            raise InputError(
+                f"top_rotation: it acts through rotational springs, and this {self.top.kind} top has none; give it a "
+                "rotational_stiffness [N m/rad]"
+            )
+        if isinstance(self.effects, Effects) and self.effects.top_rotation != (self.top_rotation is not None):
+            fact = "the scene has no top_rotation" if self.effects.top_rotation else "the scene has a top_rotation"
+            remedy = "give one, or leave the effect out" if self.effects.top_rotation else "set the effect to True"
+            raise InputError(f"effects.top_rotation = {self.effects.top_rotation}: {fact}; {remedy}")
+
+    def _check_plane(self) -> None:
+        plane, until, name = scene_plane(self)
+        if until < self.end:
+            where = f"leaves the vertical plane at azimuth {plane:.6g} rad at {until:.6g} s"
+            if name == "motion" and until == 0:
+                where = "lies in no vertical plane"
+            raise InputError(f"effects.dimension = 'planar': the {name} {where}; give effects.dimension = 'spatial'")
+
+
+_PART_TYPES: dict[str, type | tuple[type, ...]] = {
+    "bearing": Bearing,
+    "motion": Motion,
+    "top": Top,
+    "effects": (Effects, Auto),
+    "solver": Solver,
+    "initial_state": (InitialState, type(None)),
+    "stop": (Stop, type(None)),
+    "load": (Load, type(None)),
+    "top_rotation": (Rotation, type(None)),
+}

@@ -1,0 +1,42 @@
+"""Solver options of a run: the method and its tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.errors import InputError
+
+_TIME = Quantity("s", above=0.0)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Settings of the integrator.
+
+    method: "implicit" (TR-BDF2, L-stable, order 2), "esdirk4" (L-stable, order 4, for tight tolerances) or "dopri5"
+    (explicit Dormand-Prince, the method of PEER 2017/07).
+    rtol: relative tolerance, below 1. atol_angle: absolute tolerance of angles [rad]; None: a hundredth of rtol.
+    max_step [s]; None: limited by the resolution of the motion. first_step [s]; None: determined by the method.
+    max_steps: the run ends with the status `steps` beyond this number. Raises InputError.
+    """
+
+    method: Literal["implicit", "esdirk4", "dopri5"] = "implicit"
+    rtol: Annotated[float, Quantity("", above=0.0)] = 1e-4
+    atol_angle: Annotated[float | None, Quantity("rad", above=0.0)] = None
+    max_step: Annotated[float | None, _TIME] = None
+    first_step: Annotated[float | None, _TIME] = None
+    max_steps: Annotated[int, Quantity("", above=0, whole=True)] = 10_000_000
+
+    def __post_init__(self) -> None:
+        check_fields(self, "solver")
+        if self.rtol >= 1:
+            raise InputError(f"solver.rtol = {self.rtol}: give a number below 1, such as 1e-4")
+        if self.max_step is not None and self.first_step is not None and self.first_step > self.max_step:
+            raise InputError(f"solver.first_step = {self.first_step}: give at most max_step = {self.max_step} [s]")
+
+    @property
+    def angle_tolerance(self) -> float:
+        """Absolute tolerance of angles [rad]: `atol_angle` or its default."""
+        return 1e-2 * self.rtol if self.atol_angle is None else self.atol_angle

@@ -1,0 +1,112 @@
+"""The structure on the top plate: a rig, a prescribed load or a supported mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.errors import InputError
+
+_ROTATIONAL_STIFFNESS = Quantity("N m/rad", least=0.0)
+_ROTATIONAL_DAMPING = Quantity("N m s/rad", least=0.0)
+
+
+@dataclass(frozen=True)
+class Top:
+    """Base class of the three kinds of top, which `Top.rig`, `Top.prescribed` and `Top.mass` make.
+
+    kind: "rig", "prescribed" or "mass", as in scene files.
+    """
+
+    kind: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        if not self.kind:
+            raise InputError("top = Top(): give Top.rig(...), Top.prescribed(...) or Top.mass(...)")
+        check_fields(self, "top")
+
+    @staticmethod
+    def rig(
+        axial_load: float,
+        stiffness: float,
+        damping: float = 0.0,
+        rotational_stiffness: float = 0.0,
+        rotational_damping: float = 0.0,
+    ) -> RigTop:
+        """A test rig as in chapter 4 of PEER 2017/07; see `RigTop`."""
+        return RigTop(axial_load, stiffness, damping, rotational_stiffness, rotational_damping)
+
+    @staticmethod
+    def prescribed(
+        force: tuple[float, float, float], moment: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> PrescribedTop:
+        """A constant force and moment on the top plate; see `PrescribedTop`."""
+        return PrescribedTop(force, moment)
+
+    @staticmethod
+    def mass(
+        mass: float,
+        inertia: tuple[float, float] | float,
+        height: float,
+        rotational_stiffness: float = 0.0,
+        rotational_damping: float = 0.0,
+    ) -> MassTop:
+        """A rigid supported mass; see `MassTop`."""
+        return MassTop(mass, inertia, height, rotational_stiffness, rotational_damping)
+
+
+@dataclass(frozen=True)
+class RigTop(Top):
+    """A test rig: constant axial load, springs and dampers at the centre of the top plate (PEER 2017/07, chapter 4).
+
+    axial_load: downward [N]. stiffness, damping: k_top, c_top along E1 and E2 [N/m], [N s/m].
+    rotational_stiffness, rotational_damping: against tilt and spin [N m/rad], [N m s/rad]. Raises InputError.
+    """
+
+    kind: ClassVar[str] = "rig"
+    axial_load: Annotated[float, Quantity("N", least=0.0)]
+    stiffness: Annotated[float, Quantity("N/m", least=0.0)]
+    damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+    rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
+    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
+
+
+@dataclass(frozen=True)
+class PrescribedTop(Top):
+    """Constant F_top [N] and M_top [N m] on the top plate at r_nn, along E1, E2, E3 (3.28), (3.29)."""
+
+    kind: ClassVar[str] = "prescribed"
+    force: Annotated[tuple[float, float, float], Quantity("N", shape=(3,))]
+    moment: Annotated[tuple[float, float, float], Quantity("N m", shape=(3,))] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class MassTop(Top):
+    """A rigid supported mass fixed to the top plate.
+
+    mass [kg]. inertia: (transverse, axial) about its centre of mass, or one value for both [kg m^2].
+    height: of its centre of mass above the top of the top plate, r_nn [m].
+    rotational_stiffness, rotational_damping: restraint against tilt, such as that of the remaining structure
+    [N m/rad], [N m s/rad]. Raises InputError.
+    """
+
+    kind: ClassVar[str] = "mass"
+    # Without field(), the inherited static method Top.mass would be taken as the default value.
+    mass: Annotated[float, Quantity("kg", above=0.0)] = field()  # type: ignore[assignment]
+    inertia: Annotated[tuple[float, float] | float, Quantity("kg m^2", above=0.0, shape=(2,), pair=True)]
+    height: Annotated[float, Quantity("m", least=0.0)]
+    rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
+    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
+
+
+def load_values(top: Top) -> Array:
+    """Constant force [N] and moment [N m] of the top on the top plate at r_nn, ndarray, shape (6,)."""
+    if isinstance(top, RigTop):
+        return np.array([0.0, 0.0, -top.axial_load, 0.0, 0.0, 0.0])
+    if isinstance(top, PrescribedTop):
+        return np.array([*top.force, *top.moment], dtype=float)
+    return np.zeros(6)

@@ -1,0 +1,227 @@
+"""Checkpoints: files from which a run of the same scene and the same build of the model continues.
+
+A file consists of a magic line, the sha256 of everything after it, one line of JSON, and a snapshot of the run. A new
+file replaces the old one by one rename, so that there is a complete file whenever the process is killed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+import tomllib
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Run
+    from msfp_gen.model.model import Model
+    from msfp_gen.scene.scene import Scene
+
+MAGIC = b"msfp-gen checkpoint 2\n"
+EVERY = 60.0  # wall time between two checkpoints [s]
+WRITE_INTERVAL = 20  # least time between two checkpoints, over the time to write one: limits the cost of writing
+_HEADER = {"build": str, "scene": str, "digest": str, "time": float, "wall": float}
+MAX_SEGMENTS = 8  # of a run: each switch adds an effect
+
+
+def segment_file(path: str | Path, index: int) -> Path:
+    """The checkpoint file of segment `index` (from 0). Separate files let a resumed run switch alike."""
+    path = Path(path)
+    return path.with_name(f"{path.name}.{index + 1}") if index else path
+
+
+def checkpoint_files(path: str | Path) -> list[Path]:
+    """The existing checkpoint files of a run."""
+    return [file for file in (segment_file(path, index) for index in range(MAX_SEGMENTS)) if file.is_file()]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The run to which a checkpoint belongs: cache key of the build, scene as TOML text, and digest of the scene."""
+
+    build: str
+    scene: str
+    digest: str
+
+    @classmethod
+    def of(cls, scene: Scene, model: Model) -> Identity:
+        """The identity of a run of `scene` with `model`."""
+        from msfp_gen.scene.file.loader import scene_text
+
+        return cls(model.info.key, scene_text(scene), fingerprint(scene))
+
+
+class Checkpoint:
+    """The checkpoint file of one segment of a run.
+
+    Parameters
+    ----------
+    path
+        The file; its folder must exist.
+    identity
+        Scene and build of the run.
+    every
+        Wall time between two checkpoints [s]; 0: as often as possible.
+    resume
+        Continue from the state in the file. Without `resume` the file must not exist.
+
+    Raises
+    ------
+    InputError
+        The file does not exist, is damaged, or belongs to another scene or build; or it would be overwritten.
+
+    """
+
+    def __init__(self, path: str | Path, identity: Identity, every: float = EVERY, resume: bool = False) -> None:
+        self.path = Path(path)
+        self.wall = 0.0  # wall time of the run in earlier processes [s]
+        self._identity, self._every = identity, every
+        self._snapshot: bytes | None = None
+        if not every >= 0:
+            raise InputError(f"every = {every}: give the seconds between two checkpoints, 0 or more")
+        check_folder(self.path.parent, "checkpoint")
+        clear_leftovers(self.path, age=0.0)  # incomplete files of a killed process
+        if resume:
+            self._load()
+        elif self.path.exists():
+            raise InputError(
+                f"checkpoint = {str(self.path)!r}: this file exists; resume it, or remove it to start anew"
+            )
+        self._start = time.monotonic()
+        self._due = self._start + every
+
+    def restore(self, run: Run) -> None:
+        """Set a new run to the saved state, if there is one. Raises InputError where that is damaged."""
+        if self._snapshot is not None:
+            try:
+                run.restore(self._snapshot)
+            except ValueError as error:
+                raise self._refused(f"damaged ({error})") from None
+            self._snapshot = None
+
+    def save_if_due(self, run: Run) -> None:
+        """Save the run if enough time has passed since the last checkpoint."""
+        if time.monotonic() >= self._due:
+            self.save(run)
+
+    def save(self, run: Run) -> None:
+        """Save the run now. If writing fails, a warning is given and the last checkpoint remains."""
+        start = time.monotonic()
+        about = {**vars(self._identity), "time": run.time, "wall": self.wall + start - self._start}
+        try:
+            write(self.path, about, run.snapshot())
+        except OSError as error:
+            reason = error.strerror or error
+            warnings.warn(f"checkpoint {self.path} not written ({reason}); the run continues", RuntimeWarning, 2)
+        now = time.monotonic()
+        self._due = now + max(self._every, WRITE_INTERVAL * (now - start))
+
+    def _load(self) -> None:
+        try:
+            about, snapshot = read(self.path)
+        except OSError as error:
+            raise self._refused(f"cannot be read ({error.strerror or error})") from None
+        except ValueError:
+            raise self._refused("damaged, or no checkpoint of msfp-gen") from None
+        if about["digest"] != self._identity.digest:
+            raise self._refused(f"made for another scene: {_difference(about['scene'], self._identity.scene)}")
+        if about["build"] != self._identity.build:
+            raise self._refused("made by another build of the model (another msfp-gen, compiler or flags)")
+        self.wall, self._snapshot = about["wall"], snapshot
+
+    def _refused(self, reason: str) -> InputError:
+        remedy = "give the checkpoint of this run, or start from the beginning"
+        return InputError(f"checkpoint = {str(self.path)!r}: {reason}; {remedy}")
+
+
+def write(path: Path, about: Mapping[str, Any], snapshot: bytes) -> None:
+    """Write a checkpoint file, completely or not at all. about: the header."""
+    header = json.dumps(about).encode() + b"\n"
+    digest = hashlib.sha256(header)
+    digest.update(snapshot)
+    write_bytes(path, (MAGIC, digest.hexdigest().encode(), b"\n", header, snapshot))
+
+
+def read(path: Path) -> tuple[dict[str, Any], bytes]:
+    """Header and snapshot of a checkpoint file. Raises ValueError where it is incomplete or altered, and OSError."""
+    with path.open("rb") as file:
+        magic, expected = file.readline(len(MAGIC)), file.readline(65).strip()
+        rest = file.read() if magic == MAGIC else b""
+    if not rest or hashlib.sha256(rest).hexdigest().encode() != expected:
+        raise ValueError("damaged")
+    header, _, snapshot = rest.partition(b"\n")
+    about = json.loads(header)
+    if not isinstance(about, dict) or any(type(about.get(name)) is not kind for name, kind in _HEADER.items()):
+        raise ValueError("no header of a checkpoint")
+    tomllib.loads(about["scene"])  # raises a ValueError
+    if not 0 <= about["wall"] < float("inf"):
+        raise ValueError("no wall time")
+    return about, snapshot
+
+
+def fingerprint(value: object) -> str:
+    """The sha256 of all values in a scene; of its motion the polynomials, whatever their source."""
+    digest = hashlib.sha256()
+    for item in _leaves(value):
+        digest.update(b"%d:" % len(item) + item)
+    return digest.hexdigest()
+
+
+def _leaves(value: Any) -> Iterator[bytes]:
+    """The values in nested dataclasses, mappings and lists as bytes, with types and lengths; equal for equal scenes."""
+    if isinstance(value, np.ndarray):
+        yield f"{value.dtype}{value.shape}".encode()
+        yield (value + 0 if value.dtype.kind == "f" else value).tobytes()  # -0.0 equals 0.0
+    elif is_dataclass(value) and not isinstance(value, type):
+        yield type(value).__name__.encode()
+        for field in fields(value):
+            if field.compare:
+                yield field.name.encode()
+                yield from _leaves(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        yield from _leaves(sorted(value.items()))
+    elif isinstance(value, list | tuple):
+        yield b"%d" % len(value)
+        for item in value:
+            yield from _leaves(item)
+    else:
+        yield repr(value).encode()
+
+
+def _difference(then: str, now: str) -> str:
+    """Description of the first entry in which two scenes, given as TOML texts, differ."""
+    before, after = (dict(_entries(tomllib.loads(text))) for text in (then, now))
+    for name in [*before, *after]:
+        if before.get(name) != after.get(name):
+            return f"{name} was {_short(before.get(name))}, now it is {_short(after.get(name))}"
+    return "the content of a file that it names has changed"
+
+
+def _entries(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value in a nested table with its path, such as `bearing.surfaces[2].radius`."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _entries(item, f"{path}.{key}" if path else key)
+    elif _is_rows(value):
+        for index, item in enumerate(value):
+            yield from _entries(item, f"{path}[{index}]")
+    else:
+        yield path, value
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
+
+
+def _short(value: Any) -> str:
+    text = "not given" if value is None else repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

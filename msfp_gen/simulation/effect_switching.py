@@ -1,0 +1,71 @@
+"""Switching of effects during a run: the monitors that end a segment, and the effects of the next one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from msfp_gen.specification.layout import Auto, Effects
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.segment import Segment
+
+# The effects that a model needs after a monitor has tripped.
+REQUIRED_EFFECTS: dict[str, dict[str, object]] = {
+    "rims": {"rims": True},
+    "uplift": {"uplift": True, "sliders": "inertial"},
+    "inertia": {"sliders": "inertial"},
+    "heat": {"friction": "pvt"},
+    "plane": {"dimension": "spatial"},
+}
+JAM_STATUSES = ("newton", "step", "irregular")
+"""Failures that another model may avoid: inertia and compliant contacts make the equations regular."""
+MONITORS = ("rims", "uplift", "inertia", "heat")
+
+
+def stopping_monitors(scene: Scene, effects: Effects, strict: bool) -> tuple[str, ...]:
+    """The monitors that stop a run with these effects; the others only write notes.
+
+    strict: all monitors, except that of uplift where the scene gives `Effects`. Otherwise those after which the run can
+    continue with a model that includes the effect.
+    """
+    if strict:
+        return MONITORS if isinstance(scene.effects, Auto) else tuple(name for name in MONITORS if name != "uplift")
+    return tuple(name for name in MONITORS if _extended(scene, effects, name) is not None)
+
+
+def next_effects(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
+    """The effects with which a run continues after a segment with `effects`; None where the run has ended."""
+    run, status = segment.run, segment.status
+    if not run.row_count:
+        return None
+    if status == "ok" and run.time < scene.end:
+        return _extended(scene, effects, "plane")
+    if status == "uplift":
+        return _extended(scene, effects, "uplift")
+    if status in JAM_STATUSES:
+        return _extended(scene, effects, "inertia") or _extended(scene, effects, "uplift")
+    if status != "guard":
+        return None
+    extended = effects
+    for name in stopping_monitors(scene, effects, strict=False):  # several may have tripped in the same step
+        if name in run.trips:
+            extended = _extended(scene, extended, name) or extended
+    return extended
+
+
+def _extended(scene: Scene, effects: Effects, name: str) -> Effects | None:
+    """Effects extended by those that the monitor `name` requires.
+
+    None where the scene fixes one of them, the method does not support it, or the model has them already.
+    """
+    requested = scene.effects
+    if not isinstance(requested, Auto) or (name == "uplift" and scene.solver.method == "dopri5"):
+        return None
+    if name == "heat" and effects.friction != "pv":  # the surfaces have no thermal parameters
+        return None
+    needed = {key: value for key, value in REQUIRED_EFFECTS[name].items() if getattr(effects, key) != value}
+    if not needed or any(getattr(requested, key) is not None for key in needed):
+        return None
+    return replace(effects, **needed)  # type: ignore[arg-type]

@@ -1,0 +1,42 @@
+"""Messages about runs that failed: time, surface, meaning of the status, remedy, and last state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.specification.contract import STATUSES
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Run
+    from msfp_gen.model.model import Model
+    from msfp_gen.scene.scene import Scene
+
+_STATUSES = {status.name: status for status in STATUSES}
+OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]
+
+
+def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None = None) -> str:
+    """One line with time, surface, cause, remedy and last state. cause: None for the meaning of the status."""
+    _, surface, value = run.status
+    where = f", surface {surface}" if surface else ""
+    found = _STATUSES[status]
+    if surface and found.quantity:
+        where += f", {found.quantity} = {value:.4g}"
+    text = f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {cause or found.failure}"
+    return text + (_state(scene, model, run) if found.motion and run.row_count else "")
+
+
+def _state(scene: Scene, model: Model, run: Run) -> str:
+    """Summary of the last row, with a remedy where the top plate has overturned."""
+    row = model.unpack(run.rows[-1])
+    angles = row["q"][:, :2]
+    tilt, top = float(np.abs(angles).max()), float(np.abs(angles.sum(axis=0)).max())
+    low, high = float(row["normal"].min()), float(row["normal"].max())
+    text = (
+        f" (last state: tilts up to {tilt:.3g} rad, N {low:.3g} to {high:.3g} N, rims up to {row['rim'].max():.3g} N)"
+    )
+    if top > OVERTURNED and not getattr(scene.top, "rotational_stiffness", 0.0):
+        text += f"; the top plate has tilted by {top:.2g} rad: give it a rotational_stiffness [N m/rad]"
+    return text

@@ -1,0 +1,273 @@
+"""One segment of a run, computed by one model: initial state, frame and monitors of the compiled run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.model.marshalling import separations_at_rest
+from msfp_gen.model.plane import (
+    motion_in_plane,
+    out_of_plane,
+    rotated_pairs,
+    tilt_pieces,
+    tilts_into_plane,
+    wrench_in_plane,
+)
+from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.scene.effect_selection import (
+    UPLIFT_MONITOR_SHARE,
+    EffectSelection,
+    inertia_limit,
+    load_at_rest,
+    quasistatic,
+    slider_period,
+)
+from msfp_gen.scene.friction_parameters import checked_range
+from msfp_gen.scene.friction_selection import heating_factors, thermal_softening
+from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.top import load_values
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Run
+    from msfp_gen.model.model import Model
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.specification.layout import Effects
+
+NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
+
+
+@dataclass(frozen=True, eq=False)
+class RestartState:
+    """The state in which a segment ended, from which the next one starts with another model.
+
+    time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
+    separations, their rates, and its friction state. force: interface forces, shape (n-1, 3) [N]. origin: displacement
+    across the bearing at the start of the run, shape (3,) [m]. guard_heat, heat: states of the monitor of heat and
+    of the temperature. All but azimuth and planar come from a snapshot of the run.
+    """
+
+    time: float
+    azimuth: float
+    planar: bool
+    q: Array
+    v: Array
+    f: Array
+    force: Array
+    origin: Array
+    guard_heat: Array
+    heat: Array | None = None
+
+    @classmethod
+    def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
+        """The current state of `run`; a row of it is recorded."""
+        run.record_now()
+        return cls(azimuth=azimuth, planar=model.planar, **model.extension.read_state(run.snapshot(rows=1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A compiled run that has ended, with its model.
+
+    azimuth: of the frame of the model [rad]. status: how the run ended. wall, setup: wall time of the integration, and
+    of build and preparation before it [s].
+    """
+
+    model: Model
+    run: Run
+    azimuth: float
+    status: str
+    wall: float
+    setup: float
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Base motion, load and top rotation of a scene in the frame of a model.
+
+    azimuth: of the E1 axis of the frame [rad]. wrench, rotation: coefficients of polynomials.
+    """
+
+    azimuth: float
+    motion: Motion
+    wrench: Array
+    rotation: Array | None
+
+    @classmethod
+    def of(cls, scene: Scene, model: Model, wrench: Array) -> Frame:
+        """The frame of a model: E1 of a planar model lies in the vertical plane of the scene."""
+        rotation = None if scene.top_rotation is None else scene.top_rotation.coefficients
+        azimuth = scene_plane(scene)[0] if model.planar else 0.0
+        if not azimuth:
+            return cls(0.0, scene.motion, wrench, rotation)
+        planar_rotation = None if rotation is None else tilt_pieces(rotation, azimuth)
+        return cls(azimuth, motion_in_plane(scene.motion, azimuth), wrench_in_plane(wrench, azimuth), planar_rotation)
+
+
+def start_run(
+    scene: Scene, model: Model, selection: EffectSelection, end: float, at: RestartState | None, stops: tuple[str, ...]
+) -> tuple[Run, float]:
+    """A compiled run before its first step, and the azimuth of its frame [rad].
+
+    end: time at which the run ends [s]. at: state of the segment before; None: the initial state of the scene. stops:
+    the monitors that stop the run; the others only write notes.
+    """
+    solver, stop = scene.solver, scene.stop
+    load_knots, wrench = _wrench(scene)
+    frame = Frame.of(scene, model, wrench)
+    q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else _transferred_state(scene, model, at)
+    stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
+    grid = time_grid(scene)
+    options: dict[str, Any] = {}
+    if frame.rotation is not None and scene.top_rotation is not None:
+        support = snapped(*_support_rotation(scene, frame.rotation), grid.stops)
+        options["support_knots"], options["support_coefficients"] = support
+    if at is not None:
+        becomes_spatial = at.planar and not model.planar
+        origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
+        options |= {"origin": np.ascontiguousarray(origin), "guard_heat": at.guard_heat, "start_time": at.time}
+        if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
+            options["heat"] = at.heat
+    run: Run = model.extension.Run(
+        stack,
+        *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),
+        *snapped(load_knots, frame.wrench, grid.stops),
+        grid.jumps,
+        q,
+        v,
+        f,
+        method=solver.method,
+        rtol=solver.rtol,
+        atol_angle=solver.angle_tolerance,
+        stops=grid.stops,
+        span_ends=grid.ends,
+        span_steps=grid.steps,
+        first_step=(solver.first_step or 0.0) if at is None else 0.0,
+        max_steps=float(solver.max_steps),
+        duration=end,
+        output_step=scene.output_step or 0.0,
+        stop_displacement=(stop.displacement or 0.0) if stop else 0.0,
+        stop_all_rims=bool(stop and stop.all_rims),
+        sampled=scene.motion.sampled,
+        quasistatic=quasistatic(scene, model.effects),
+        **_monitor_options(scene, model.effects, selection, stops),
+        **options,
+    )
+    return run, frame.azimuth
+
+
+def _wrench(scene: Scene) -> tuple[Array, Array]:
+    """Knots and polynomials of force and moment on the top plate: those of the top and of the load history."""
+    knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
+    if scene.load is not None:
+        load = scene.load.until(scene.end)
+        knots, pieces = np.array(load.knots), np.array(load.coefficients)
+    pieces[:, :, 0] += load_values(scene.top)
+    return knots, pieces
+
+
+def _support_rotation(scene: Scene, coefficients: Array) -> tuple[Array, Array]:
+    """Knots and polynomials, shape (k, 6, 6), of psi, theta of the support of the top plate."""
+    assert scene.top_rotation is not None
+    rotation = replace(scene.top_rotation, coefficients=coefficients).until(scene.end)
+    pieces = np.zeros((len(rotation.knots) - 1, 6, ORDER))
+    pieces[:, :2] = rotation.coefficients
+    return np.array(rotation.knots), pieces
+
+
+def time_grid(scene: Scene) -> TimeGrid:
+    """Times at which steps of a run of `scene` must end, and limits of the step."""
+    histories = [each for each in (scene.motion, scene.load, scene.top_rotation) if each is not None]
+    steps = [step for step in (scene.solver.max_step, scene.motion.max_step) if step is not None]
+    jumps = [scene.motion.jumps, *([] if scene.load is None else [scene.load.jumps])]
+    jumps += [short_pieces(each.knots) for each in histories]
+    parts = [each.resolution for each in histories]
+    return TimeGrid.of(parts, np.concatenate(jumps), scene.end, min(steps, default=np.inf))
+
+
+def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, Array, Array]:
+    """The initial state q, v, f of a scene in the frame of a model."""
+    count, state = scene.bearing.layout.surfaces, scene.initial_state
+    q, v, f = (
+        np.zeros((count, k)) if state is None else np.array(value, dtype=float)
+        for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
+    )
+    if model.planar:
+        q, v, f = _state_in_plane(q, v, f, azimuth)
+    if model.effects.uplift:
+        load = 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
+        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, load)])
+        v = np.hstack([v, np.zeros((count, 3))])
+    return q, v, f
+
+
+def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
+    """An initial state in the frame of a planar model; raises InputError where it leaves the plane."""
+    q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
+    f = np.ascontiguousarray(rotated_pairs(f, azimuth))
+    if np.any(np.abs(f[:, 1]) > 1e-12):
+        raise InputError("initial_state.h leaves the vertical plane of the motion: use dimension = 'spatial'")
+    return q, v, f
+
+
+def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
+    """The state q, v, f of the earlier model for the next one (docs/effects.md).
+
+    Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
+    interface forces: the unilateral contacts are compressed by them.
+    """
+    q, v, f, force = at.q, at.v, at.f, at.force
+    separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
+    q, v = q[:, :3], v[:, :3]
+    if at.planar and not model.planar:
+        q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
+        f = out_of_plane(f, at.azimuth, "pair")
+        force = out_of_plane(force, at.azimuth, "vector")
+        if separations is not None:
+            separations = (
+                out_of_plane(separations[0], at.azimuth, "vector"),
+                out_of_plane(separations[1], at.azimuth, "vector"),
+            )
+    if model.effects.uplift:
+        stiffness = np.array([surface.seat_stiffness for surface in scene.bearing.surfaces])
+        if separations is None:
+            separations = (-force / stiffness[:, None], np.zeros_like(force))
+        q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
+    return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _significant_rise(scene: Scene, effects: Effects, selection: EffectSelection) -> float:
+    """Temperature rise at which the monitor of heat trips [K]; see `thermal_softening`."""
+    softening = thermal_softening(effects.law, scene.bearing)
+    change = selection.error if effects.friction == "pv" else NOTED_SOFTENING
+    return change / softening if softening > 0 else 0.0
+
+
+def _monitor_options(
+    scene: Scene, effects: Effects, selection: EffectSelection, stops: tuple[str, ...]
+) -> dict[str, Any]:
+    """Monitors of everything that the model leaves out, and their limits, as arguments of the compiled run."""
+    heats = effects.law is not None and effects.law.depends_on_temperature
+    left_out = {
+        "rims": not effects.rims,
+        "uplift": "uplift" in stops and not effects.uplift,
+        "inertia": effects.sliders == "massless",
+        "heat": not heats,
+    }
+    checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
+    left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}
+    return checked | {
+        "guards": tuple(name for name, out in left_out.items() if out),
+        "guard_stop": tuple(stops),
+        "guard_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "guard_inertia": inertia_limit(scene, selection.error),
+        "guard_time": slider_period(scene),
+        "guard_rise": _significant_rise(scene, effects, selection),
+        "guard_heating": np.array(heating_factors(scene.bearing)),
+    }

@@ -1,0 +1,256 @@
+"""`simulate`: runs a scene and returns its result. The time integration is compiled C.
+
+A run consists of one segment, or of several: where a monitor trips, the next segment continues with a model that
+includes the effect.
+"""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.model.model import build_model
+from msfp_gen.result import Result
+from msfp_gen.results.history import Counters
+from msfp_gen.results.note import Note
+from msfp_gen.results.row_unpacking import events_of, history_of, joined
+from msfp_gen.simulation import failures
+from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
+from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
+from msfp_gen.simulation.notes import energy_notes, notes_of
+from msfp_gen.simulation.segment import RestartState, Segment, start_run
+from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
+from msfp_gen.version import __version__
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Run
+    from msfp_gen.model.model import Model
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.specification.layout import Effects
+
+Progress = Callable[[float, float], None]
+STEPS_PER_CALL = 4000  # of the compiled run, without the GIL; Ctrl-C, progress and checkpoints are handled in between
+CheckpointOptions = tuple[Path | None, float, bool]  # file, seconds between checkpoints, whether to resume
+NO_CHECKPOINT: CheckpointOptions = (None, EVERY, False)
+
+
+def simulate(
+    scene: Scene,
+    *,
+    progress: Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = EVERY,
+    resume: bool = False,
+    strict: bool = False,
+) -> Result:
+    """Integrate a scene.
+
+    Parameters
+    ----------
+    scene
+        Bearing, motion, top, effects, solver; see `Scene`.
+    progress
+        Called repeatedly with the time reached and the end of the run [s]. An exception in it ends the run.
+    checkpoint
+        File of the checkpoint, written at intervals, when the run is interrupted and when it ends. It must not exist
+        unless `resume` is given. It is not removed after the run.
+    every
+        Wall time between two checkpoints [s].
+    resume
+        Continue from the state in `checkpoint`; the rows are bit by bit those of an uninterrupted run.
+    strict
+        Stop where a monitor trips (status `guard`), instead of continuing with a model that includes the effect
+        (`Auto`) or with a note in the result (`Effects`): docs/effects.md.
+
+    Returns
+    -------
+    Result
+        Rows, events, counters and notes of the run.
+
+    Raises
+    ------
+    InputError
+        The method does not support the effects; the checkpoint is damaged, or of another scene or build.
+    RunError
+        The run failed: the message gives time, surface and cause, `.result` has the rows until then.
+
+    """
+    if checkpoint is not None and not resume:
+        _require_no_checkpoint(checkpoint)
+    sequence = RunSequence.of(scene, strict)
+    while sequence.effects is not None:
+        segments = sequence.segments
+        file = None if checkpoint is None else segment_file(checkpoint, len(segments))
+        # Later segments have no file yet where the earlier process ended in a previous one.
+        resumed = resume and file is not None and (file.exists() or not (segments or checkpoint_files(file)))
+        sequence.run_segment(progress, (file, every, resumed))
+    result = sequence.result()
+    if not result.succeeded:
+        raise RunError(result.message, status=result.status, result=result)
+    return result
+
+
+@dataclass(eq=False)
+class RunSequence:
+    """The segments of a run that have ended, and the effects of the next one.
+
+    given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
+    None: the run has ended. notes: those of the segments that have ended.
+    """
+
+    given: Scene
+    scene: Scene
+    strict: bool
+    effects: Effects | None
+    segments: list[Segment]
+    notes: list[Note]
+
+    @classmethod
+    def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
+        """The sequence before its first segment. settled: the result of `settle(scene)`; None: it is computed here."""
+        settled = settle(scene) if settled is None else settled
+        return cls(scene, settled, strict, settled.effect_selection.effects, [], [])
+
+    def start_segment(self, model: Model) -> tuple[Run, float]:
+        """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
+        scene, last, selection = self.scene, self.segments[-1:], self.scene.effect_selection
+        at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
+        end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
+        return start_run(scene, model, selection, end, at, stopping_monitors(scene, model.effects, self.strict))
+
+    def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
+        """Run the next segment to its end, add its notes, and determine the effects of the segment after it."""
+        assert self.effects is not None
+        segment = _segment(self, progress, options)
+        self.segments.append(segment)
+        following = None if self.strict else next_effects(self.scene, self.effects, segment)
+        known_kinds = {note.kind for note in self.notes if not note.action}
+        notes = notes_of(segment, following)
+        self.notes += [note for note in notes if note.action or note.kind not in known_kinds]
+        self.effects = following
+
+    def result(self, with_initial_row: bool = False) -> Result:
+        """The result of all segments; raises RunError where there is no row.
+
+        with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
+        """
+        last = self.segments[-1]
+        if not last.run.row_count and not (with_initial_row and _recorded_finite(last.run)):
+            raise RunError(_message(self.scene, last), status=last.status)
+        return _result(self)
+
+
+def settle(scene: Scene) -> Scene:
+    """A scene whose plates are tilted at the start, with the initial state after a slow tilting; others unchanged.
+
+    Raises RunError where that tilting fails.
+    """
+    if not needs_settling(scene):
+        return scene
+    try:
+        end = simulate(settling_scene(scene)).history
+    except RunError as error:
+        raise RunError(f"before the start, while the plates are tilted: {error}", status=error.status) from error
+    return replace(scene, initial_state=state_at_rest(end.tilt_angles[-1], end.friction_state[-1]))
+
+
+def _require_no_checkpoint(checkpoint: str | Path) -> None:
+    """Raise InputError where a later segment has a checkpoint file: it would conflict in the middle of the run."""
+    if found := [file for file in checkpoint_files(checkpoint) if file != Path(checkpoint)]:
+        raise InputError(
+            f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
+        )
+
+
+def _segment(sequence: RunSequence, progress: Progress | None, options: CheckpointOptions) -> Segment:
+    """Build the model of the next segment and run it to its end."""
+    scene, effects = sequence.scene, sequence.effects
+    assert effects is not None
+    check(scene, effects)
+    start = time.perf_counter()
+    model = build_model(scene.bearing.layout, effects)
+    path, every, resume = options
+    checkpoint = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
+    run, azimuth = sequence.start_segment(model)
+    if checkpoint is not None:
+        checkpoint.restore(run)
+    ready = time.perf_counter()
+    status = _advance(run, scene.end, progress, checkpoint) or run.status[0]
+    wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
+    return Segment(model, run, azimuth, status, wall, ready - start)
+
+
+def check(scene: Scene, effects: Effects) -> None:
+    """Raise InputError where the method of the scene does not support these effects."""
+    if effects.sliders == "massless" and scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
+        )
+    if effects.uplift and scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': the equations of PEER 2017/07 have no separation; use 'implicit' with uplift"
+        )
+
+
+def _advance(run: Run, end: float, progress: Progress | None, checkpoint: Checkpoint | None) -> str | None:
+    """Take all steps; "interrupted" after Ctrl-C, else None."""
+    status = None
+    try:
+        while run.advance(STEPS_PER_CALL):
+            if checkpoint is not None:
+                checkpoint.save_if_due(run)
+            if progress is not None:
+                progress(run.time, end)
+    except KeyboardInterrupt:
+        status = "interrupted"
+    # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
+    if checkpoint is not None and run.status[0] in ("ok", "stopped"):
+        checkpoint.save(run)
+    return status
+
+
+def _recorded_finite(run: Run) -> bool:
+    """Record a row of the current state; whether all of its values are finite."""
+    run.record_now()
+    return bool(np.isfinite(run.rows).all())
+
+
+def _message(scene: Scene, segment: Segment) -> str:
+    """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
+    stopped = segment.status == "guard"
+    cause = "; ".join(note.text for note in notes_of(segment, None)) if stopped else None
+    return failures.message(scene, segment.model, segment.run, segment.status, cause)
+
+
+def _result(sequence: RunSequence) -> Result:
+    scene, segments = sequence.given, sequence.segments
+    last = segments[-1]
+    counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
+    total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
+    provenance = {
+        "msfp_gen": __version__,
+        "model": ", then ".join(segment.model.spec.key for segment in segments),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "method": scene.solver.method,
+        "rtol": f"{scene.solver.rtol:g}",
+        "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
+    }
+    history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
+    return Result(
+        scene=scene,
+        history=history,
+        events=tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth)),
+        counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
+        status=last.status,
+        message="" if last.status in ("ok", "stopped") else _message(scene, last),
+        provenance=provenance,
+        notes=tuple(sequence.notes) + energy_notes(scene, history),
+    )

@@ -1,0 +1,1 @@
+"""Inputs that determine the equations: layout, effects, friction laws and hysteresis laws."""

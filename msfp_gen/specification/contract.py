@@ -1,0 +1,283 @@
+"""The contract between Python and the compiled C: what crosses, in which order, in which unit, written once.
+
+The C header, the Cython wrapper, the unpacking of rows, the messages of failed runs and the table of statuses in
+docs/glossary.md are made from these tables, or a test holds them against them. SI units throughout.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from msfp_gen.specification.layout import Effects
+
+
+@dataclass(frozen=True)
+class Value:
+    """One number that a run takes for a body, a surface or the top."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+BODY = (  # of each body, the base first
+    Value("height", "m", "height l"),
+    Value("centroid", "m", "distance z of the centre of mass from the bottom; not used for the base"),
+    Value("mass", "kg", "mass m; not used for the base"),
+    Value("inertia_transverse", "kg m^2", "moments of inertia lambda_1 = lambda_2; not used for the base"),
+    Value("inertia_axial", "kg m^2", "moment of inertia lambda_3; not used for the base"),
+    Value("rim_radius", "m", "radius r of the edge that meets a rim"),
+    Value("rim_offset", "m", "height p of that edge above the face"),
+)
+SURFACE = (  # of each surface, the lowest first
+    Value("radius", "m", "radius R"),
+    Value("capacity", "m", "sliding capacity s_c"),
+    Value("friction", "-", "friction coefficient mu"),
+    Value("yield_displacement", "m", "yield displacement d_y"),
+    Value("rim_stiffness", "N/m", "stiffness k_c of the rim"),
+    Value("rim_damping", "N s/m", "damping c_c of the rim"),
+)
+SURFACE_UPLIFT = (  # after those, in models with uplift
+    Value("seat_stiffness", "N/m", "stiffness of the unilateral contact"),
+    Value("seat_damping", "s/m", "damping of the unilateral contact, over its stiffness and compression"),
+)
+TOP = (
+    Value("stiffness", "N/m", "horizontal stiffness of the rig"),
+    Value("damping", "N s/m", "horizontal damping of the rig"),
+    Value("rotational_stiffness", "N m/rad", "rotational stiffness"),
+    Value("rotational_damping", "N m s/rad", "rotational damping"),
+    Value("mass", "kg", "supported mass"),
+    Value("inertia_transverse", "kg m^2", "its moment of inertia about a horizontal axis"),
+    Value("inertia_axial", "kg m^2", "its moment of inertia about the vertical axis"),
+    Value("height", "m", "height of its centre above r_nn"),
+    Value("anchor_x", "m", "anchor of the horizontal springs, along E1"),
+    Value("anchor_y", "m", "anchor of the horizontal springs, along E2"),
+)
+
+
+def surface_values(effects: Effects) -> tuple[str, ...]:
+    """Names of the values of a surface in order: the numbers of a friction law come last."""
+    uplift = SURFACE_UPLIFT if effects.uplift else ()
+    return (*(value.name for value in SURFACE + uplift), *(() if effects.law is None else effects.law.columns))
+
+
+class Extent(StrEnum):
+    """Length of a dimension of a row's field that the model decides: the macro of the C header."""
+
+    SURFACES = "MSFP_NB"  # n - 1: moving bodies, or surfaces
+    COORDINATES = "MSFP_NQ"  # psi, theta, phi; in models with uplift then the separation along E1, E2, E3
+    WORKS = "MSFP_WORKS"  # integrals over the run, `WORKS`
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One field of a row of output. needs: the feature of a model without which it is absent ("" for none)."""
+
+    name: str
+    shape: tuple[Extent | int, ...]
+    unit: str
+    meaning: str
+    needs: str = ""
+
+
+_N = Extent.SURFACES
+_MOTION = (_N, Extent.COORDINATES)
+_ROW = (
+    Quantity("time", (), "s", "time"),
+    Quantity("q", _MOTION, "rad, m", "coordinates of the moving bodies: psi, theta, phi, then the separation"),
+    Quantity("v", _MOTION, "rad/s, m/s", "their rates"),
+    Quantity("a", _MOTION, "rad/s^2, m/s^2", "their second derivatives"),
+    Quantity("f", (_N, 2), "-", "friction state Y, Z"),
+    Quantity("normal", (_N,), "N", "normal force"),
+    Quantity("angles", (_N, 2), "rad", "contact position psi~, theta~"),
+    Quantity("sliding", (_N,), "m", "sliding displacement (3.20)"),
+    Quantity("gap", (_N,), "m", "gap to the rim (3.21)"),
+    Quantity("rim", (_N,), "N", "rim force, compression positive"),
+    Quantity("force", (_N, 3), "N", "interface force on the body above"),
+    Quantity("slip", (_N, 2), "m/s", "slip velocity u~, v~ (2.98)"),
+    Quantity("compression", (_N,), "m", "compression of the unilateral contact; negative: open", "uplift"),
+    Quantity("base", (3,), "m", "displacement of the base"),
+    Quantity("top", (3,), "m", "position of r_nn at the top plate"),
+    Quantity("top_force", (3,), "N", "force of the bearing on the top support"),
+    Quantity("top_moment", (3,), "N m", "moment of the bearing on the top support at r_nn"),
+    Quantity("kinetic", (), "J", "kinetic energy relative to the base"),
+    Quantity("potential", (), "J", "potential energy"),
+    Quantity("restraint", (), "J", "energy of the springs of the top"),
+    Quantity("rim_stored", (), "J", "energy of the springs of the rims"),
+    Quantity("seat_stored", (), "J", "energy of the springs of the unilateral contacts"),
+    Quantity("work", (Extent.WORKS,), "J", "integrals over the run"),
+    Quantity("mu", (_N,), "-", "friction coefficient", "law"),
+    Quantity("temperature", (_N,), "degC", "temperature of the surface", "heat"),
+)
+
+
+def row(effects: Effects) -> tuple[Quantity, ...]:
+    """Fields of a row of a model with these effects, in order."""
+    law = effects.law
+    has = {
+        "": True,
+        "uplift": effects.uplift,
+        "law": law is not None,
+        "heat": law is not None and law.depends_on_temperature,
+    }
+    return tuple(quantity for quantity in _ROW if has[quantity.needs])
+
+
+@dataclass(frozen=True)
+class Word:
+    """One entry of an enumeration: its name in Python, and what it is."""
+
+    name: str
+    meaning: str
+
+
+WORKS = (  # [J]; what each is called in `History.energy`
+    Word("input", "work done on the bearing and its top by the base motion and the loads"),
+    Word("friction_stored", "recoverable energy stored in friction while stuck"),
+    Word("friction_dissipated", "energy dissipated by friction"),
+    Word("rim_dissipated", "energy dissipated at the rims"),
+    Word("top_dissipated", "energy dissipated by the dampers of the top"),
+    Word("seat_dissipated", "energy dissipated in the unilateral contacts"),
+)
+EVENT_KINDS = (
+    Word("rim_contact", "a slider meets its rim"),
+    Word("rim_release", "a slider leaves its rim"),
+    Word("stop", "the stop condition of the scene is met"),
+    Word("lift_off", "the faces of a surface separate"),
+    Word("landing", "the faces of a surface meet again"),
+)
+COUNTERS = (
+    Word("steps", "accepted steps"),
+    Word("rejected_steps", "steps that failed or whose error was too large"),
+    Word("newton_iterations", "iterations of Newton's method"),
+    Word("evaluations", "evaluations of the equations"),
+    Word("factorisations", "factorisations of a tangent"),
+    Word("newton_failures", "steps in which Newton's method did not converge"),
+    Word("events", "recorded events"),
+    Word("halved_newton_steps", "halvings of a Newton step that did not reduce the residual"),
+    Word("fresh_tangents", "tangents evaluated again because old factors converged slowly"),
+    Word("other_starts", "stages solved again from the rates of the present state"),
+    Word("quasistatic_starts", "stages solved again from rates that balance all forces but inertia"),
+)
+METHODS = (
+    Word("implicit", "TR-BDF2"),
+    Word("dopri5", "Dormand-Prince 5(4), explicit"),
+    Word("esdirk4", "ESDIRK of order 4"),
+)
+MONITORS = (
+    Word("rims", "a slider is beyond the capacity of its surface [m]"),
+    Word("uplift", "a normal force is below its least value [N]"),
+    Word("inertia", "inertial force of a slider over the normal force below it"),
+    Word("heat", "bound of the temperature rise of a surface [K]"),
+    Word("law_speed", "slip velocity outside the range in which the friction law was checked [m/s]"),
+    Word("law_load", "normal force outside that range [N]"),
+    Word("law_temperature", "temperature outside that range [degC]"),
+)
+
+
+@dataclass(frozen=True)
+class Status:
+    """How a run or an evaluation ended.
+
+    name: the public word. meaning: the row of docs/glossary.md. failure: what a failed run says, with the remedy.
+    evaluation: the same of a single evaluation, None where it cannot end so. quantity: what the number beside a failure
+    is. motion: the bearing did it, so that the message shows the last state. compiled: the C knows it.
+    """
+
+    name: str
+    meaning: str
+    failure: str = ""
+    evaluation: str | None = None
+    quantity: str | None = None
+    motion: bool = False
+    compiled: bool = True
+
+
+STATUSES = (
+    Status("ok", "the run reached its end"),
+    Status("stopped", "the run met the scene's stop condition"),
+    Status(
+        "newton",
+        "Newton's method did not converge at the smallest step; the bearing may have jammed",
+        "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
+        "lower the friction or the motion",
+        "Newton's method found no accelerations; the state may be beyond what the bearing can carry",
+        quantity="residual",
+        motion=True,
+    ),
+    Status(
+        "step",
+        "the error control asks for a step below the smallest",
+        "the error control asks for a step below the smallest; loosen solver.rtol or check the motion for spikes",
+        motion=True,
+    ),
+    Status(
+        "irregular",
+        "loss of regularity: the determinant changed sign, or a normal force grew without bound",
+        "the equations lost regularity (the determinant changed sign, or a normal force has no bound): "
+        "tilts and friction are too high for a unique motion here; lower the friction or the motion",
+        "the equations have lost regularity: friction and inertia admit no unique acceleration",
+        motion=True,
+    ),
+    Status(
+        "uplift",
+        "an interface would have to transmit tension, and the model has no separation",
+        "the interface would have to pull; uplift is not modelled: increase the axial load or reduce the motion, "
+        "or give effects.uplift = true",
+        "an interface would have to pull; uplift is not modelled: increase the load on the top",
+        quantity="P.t3 [N]",
+        motion=True,
+    ),
+    Status(
+        "angle",
+        "a tilt exceeds 1.5 rad, next to the singularity of the Euler angles",
+        "a tilt nears 90 degrees, where the Euler angles are singular; check the capacity and the rims",
+        quantity="angle [rad]",
+        motion=True,
+    ),
+    Status(
+        "steps",
+        "the permitted number of steps is used up",
+        "the allowed number of steps is used up; raise solver.max_steps",
+    ),
+    Status(
+        "finite",
+        "a value is not finite",
+        "a value is not finite",
+        "a value is not finite; check the state and the load",
+    ),
+    Status("memory", "no memory for more rows", "no memory for more rows; give output_step"),
+    Status("guard", "a monitor stopped the run (`strict`)", "what the model leaves out would matter from here on"),
+    Status(
+        "parted",
+        "a separated body lies farther from its place than the radius of its slider: the stack has come apart",
+        "a body is beside its place by more than the radius of its slider: the stack has come apart; reduce the "
+        "motion or raise the load",
+        quantity="aside [m]",
+        motion=True,
+    ),
+    Status(
+        "stiff",
+        "the explicit method runs at its limit of stability, where its error estimate has no meaning",
+        "the explicit method has reached its limit of stability, where its error estimate means nothing; "
+        "use solver.method = 'implicit'",
+    ),
+    Status(
+        "law",
+        "the friction law gives a coefficient below zero",
+        "the friction law gives a coefficient below zero here; give a law that holds at the velocity, pressure, "
+        "temperature and normal force that the run reaches, or reduce the motion",
+        "the friction law gives a coefficient below zero; check the law, its numbers and the rates",
+        quantity="friction coefficient",
+        motion=True,
+    ),
+    Status("interrupted", "the user or the system stopped the run", "interrupted", compiled=False),
+)
+
+
+def names(entries: tuple[Value | Word | Status, ...]) -> tuple[str, ...]:
+    """Names of the entries of a table, in order."""
+    return tuple(entry.name for entry in entries)

@@ -1,0 +1,156 @@
+"""Friction laws: the friction coefficient as a formula of sliding velocity, pressure, temperature or normal force.
+
+The names in a formula are those of `VARIABLES` and of fields of `Surface`; `mu` is the reference coefficient
+`Surface.friction`. The formula determines which parameters a surface must define and whether the law needs the pressure
+or the temperature. The generator derives the equations from the same formula, and `scene/friction_parameters.py`
+evaluates it.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from msfp_gen.errors import InputError
+from msfp_gen.specification.formula import names_in, parse, units_of
+
+COEFFICIENTS = ("c1", "c2", "c3", "c4")
+# Variables of a law and their units: sliding velocity, pressure, temperature, normal force.
+VARIABLES = {"v": "m/s", "p": "Pa", "T": "degC", "N": "N"}
+# Surface parameters that a law of pressure (PATCH) or temperature (HEAT) needs besides its own, with their defaults.
+# The default of `patch_radius` is the rim radius of the slider.
+PATCH: dict[str, float | None] = {"patch_radius": None}
+HEAT_TIMES = (1e-3, 1e3)  # range of times over which heat conduction is represented [s] (generator/heat.py)
+HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
+
+NUMBERS: dict[str, tuple[str, str]] = {
+    "friction_slow": ("-", "friction coefficient at rest"),
+    "velocity_rate": ("s/m", "rate a of the exponential increase of friction with the slip velocity"),
+    "velocity_drop": ("-", "relative reduction of friction at rest"),
+    "reference_pressure": ("Pa", "pressure at which mu is given"),
+    "pressure_ratio": ("-", "factor on friction for a pressure increase of 50 MPa"),
+    "temperature_ratio": ("-", "0.7 in Kumar et al. (2015); 1: no influence of temperature"),
+    "area": ("m^2", "area of the contact patch"),
+    "reach": ("m", "distance from the centre of the surface within which the patch covers that centre"),
+    "heating": ("K s^1/2 m^2/J", "sqrt(D/pi)/k of the heated half-space"),
+    "start_temperature": ("degC", "temperature at the start"),
+    **dict.fromkeys(COEFFICIENTS, ("SI", "parameter of the law")),
+}
+"""Unit and meaning of every parameter of a law, and of every value derived from parameters for the compiled model."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """One friction law.
+
+    Attributes:
+        word: its name, a value of `Effects.friction`.
+        meaning: text for help and explanations.
+        text: the formula.
+        values: (name, default) of the surface parameters in the formula; default None: must be given.
+        also_accepted: further parameters that a surface may define without effect. They serve a more general law to
+            which effect selection may switch (docs/effects.md).
+    """
+
+    word: str
+    meaning: str
+    text: str
+    values: tuple[tuple[str, float | None], ...]
+    also_accepted: tuple[str, ...] = ()
+
+    @cached_property
+    def tree(self) -> ast.expr:
+        """Syntax tree of the formula."""
+        return parse(self.text, {"mu", *VARIABLES, *(name for name, _ in self.values)})
+
+    @cached_property
+    def depends_on_temperature(self) -> bool:
+        """Whether the formula contains the temperature T."""
+        return "T" in names_in(self.tree)
+
+    @cached_property
+    def parameters(self) -> dict[str, float | None]:
+        """Surface parameters that the law needs -> default; None: must be given."""
+        needs_patch = self.depends_on_temperature or "p" in names_in(self.tree)
+        heat = HEAT if self.depends_on_temperature else {}
+        return {**dict(self.values), **(PATCH if needs_patch else {}), **heat}
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the values of one surface in the order in which the compiled model stores them."""
+        patch = ("area",) if "patch_radius" in self.parameters else ()
+        heat = ("reach", "heating", "start_temperature") if self.depends_on_temperature else ()
+        return (*(name for name, _ in self.values), *patch, *heat)
+
+
+_VELOCITY = "mu - (mu - friction_slow) * exp(-velocity_rate * v)"
+_PVT = (
+    "mu * pressure_ratio ** ((p - reference_pressure) / 50e6) * (1 - velocity_drop * exp(-velocity_rate * v))"
+    " * (temperature_ratio ** (T / 50) + 0.4) / (temperature_ratio ** (20 / 50) + 0.4)"
+)
+_PV = _PVT.replace("T /", "start_temperature /")
+_KUMAR_PARAMETERS: tuple[tuple[str, float | None], ...] = (
+    ("reference_pressure", None),
+    ("pressure_ratio", 0.7),
+    ("velocity_drop", 0.5),
+    ("velocity_rate", 100.0),
+    ("temperature_ratio", 0.7),
+)
+_LAWS = (
+    Law(
+        "velocity",
+        "it increases exponentially with the sliding velocity, from friction_slow to friction",
+        _VELOCITY,
+        (("friction_slow", None), ("velocity_rate", None)),
+    ),
+    Law(
+        "pv",
+        "it depends on pressure and velocity (Kumar et al. 2015), at the start temperature",
+        _PV,
+        (*_KUMAR_PARAMETERS, ("start_temperature", HEAT["start_temperature"])),
+        tuple(HEAT),
+    ),
+    Law("pvt", "it depends on pressure, velocity and temperature (Kumar et al. 2015)", _PVT, _KUMAR_PARAMETERS),
+)
+BUILT_IN = {law.word: law for law in _LAWS}
+FRICTION = {
+    "constant": "the friction coefficient is constant",
+    **{law.word: law.meaning for law in _LAWS},
+    "custom": "it is given by the formula friction_law",
+}
+"""Values of `Effects.friction` and their meaning."""
+
+
+@lru_cache(maxsize=32)
+def law_of(word: str, text: str | None = None) -> Law | None:
+    """Friction law that `Effects.friction` (word) and `Effects.friction_law` (text) define; None for constant friction.
+
+    Raises:
+        InputError: a custom law has no formula, a built-in one has a formula, or the formula is invalid.
+    """
+    if word != "custom":
+        if text is not None:
+            raise InputError(
+                f"effects.friction_law = {text!r}: friction = {word!r} has a formula of its own; "
+                "give friction = 'custom', or leave it out"
+            )
+        return BUILT_IN.get(word)
+    if text is None:
+        raise InputError(
+            "effects.friction_law is missing: friction = 'custom' needs a formula, "
+            "such as 'mu * (1 - c1 * exp(-c2 * v))'"
+        )
+    try:
+        tree = parse(text, {"mu", *VARIABLES, *COEFFICIENTS})
+        units_of(tree, COEFFICIENTS)
+    except ValueError as error:
+        raise InputError(f"effects.friction_law = {text!r}: {error}") from None
+    values = tuple((name, None) for name in COEFFICIENTS if name in names_in(tree))
+    return Law("custom", FRICTION["custom"], ast.unparse(tree), values)
+
+
+def law_parameter_names() -> tuple[str, ...]:
+    """Fields of `Surface` that are parameters of any friction law; they are None on a surface of constant friction."""
+    names = dict.fromkeys(name for law in BUILT_IN.values() for name in law.parameters)
+    return (*names, *COEFFICIENTS)

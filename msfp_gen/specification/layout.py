@@ -1,0 +1,237 @@
+"""Inputs that determine the equations: the layout of a stack and the modelled effects.
+
+`ModelSpec = Layout + Effects` identifies one set of equations and so one compiled model. Radii, friction coefficients,
+motions and loads are values of other classes: changing them never recompiles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal
+
+from msfp_gen.common.fields import Choice, Quantity, check_fields
+from msfp_gen.errors import InputError
+from msfp_gen.specification.friction_laws import FRICTION, Law, law_of
+from msfp_gen.specification.hysteresis import HYSTERESIS, integrates_to_tanh
+
+_COUNT = Quantity("", least=0, whole=True)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout (n, m, p) of a stack, after PEER 2017/07 section 3.
+
+    Attributes:
+        n: number of bodies, base and top plate included.
+        m: number of concave-up surfaces, the lower ones.
+        p: number of concave-down surfaces, above them.
+
+    Raises:
+        InputError: n is not m + p + 1, or is below 2.
+    """
+
+    n: Annotated[int, _COUNT]
+    m: Annotated[int, _COUNT]
+    p: Annotated[int, _COUNT]
+
+    def __post_init__(self) -> None:
+        check_fields(self, "layout")
+        if self.n < 2:
+            raise InputError(f"layout.n = {self.n}: a bearing needs at least 2 bodies, a base and a top plate")
+        if self.n != self.m + self.p + 1:
+            raise InputError(
+                f"layout.n = {self.n}: {self.m} concave-up and {self.p} concave-down surfaces lie between "
+                f"{self.m + self.p + 1} bodies; give n = m + p + 1"
+            )
+
+    @classmethod
+    def tfp(cls) -> Layout:
+        """Triple friction pendulum, PEER 2017/07 chapter 2: five bodies, two surfaces concave up and two down."""
+        return cls(5, 2, 2)
+
+    @classmethod
+    def dfp(cls) -> Layout:
+        """Double friction pendulum: three bodies, one surface concave up and one concave down."""
+        return cls(3, 1, 1)
+
+    @property
+    def surfaces(self) -> int:
+        """Number of sliding surfaces, n - 1."""
+        return self.n - 1
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """For each surface, bottom first: +1 where it is concave up, -1 where it is concave down."""
+        return (1,) * self.m + (-1,) * self.p
+
+    @property
+    def name(self) -> str:
+        """`n_m_p`, part of the name of a generated module."""
+        return f"{self.n}_{self.m}_{self.p}"
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Physical effects that the equations include. Every field takes one of the listed values, each with its meaning.
+
+    Options of the command line, their help, scene files and names of models are generated from these fields. For
+    friction, uplift and top_rotation see docs/friction.md, docs/uplift.md and docs/loads.md.
+
+    Raises:
+        InputError: a value is not permitted, the values exclude each other, or `friction_law` is not a valid formula.
+    """
+
+    dimension: Annotated[
+        Literal["spatial", "planar"],
+        Choice(
+            {
+                "spatial": "every body translates and rotates in three directions",
+                "planar": "motion in one vertical plane",
+            }
+        ),
+    ] = "spatial"
+    spin: Annotated[
+        Literal["locked", "patch", "free"],
+        Choice(
+            {
+                "locked": "bodies do not turn about their own axis",
+                "patch": "a drilling moment over the contact patch resists spin",
+                "free": "no moment resists spin, as in PEER 2017/07",
+            }
+        ),
+    ] = "locked"
+    sliders: Annotated[
+        Literal["inertial", "massless"],
+        Choice(
+            {
+                "inertial": "mass and rotary inertia of every body are included",
+                "massless": "quasi-static: weights are included, inertia of the bodies is not",
+            }
+        ),
+    ] = "inertial"
+    rims: Annotated[
+        bool,
+        Choice(
+            {
+                True: "sliders are stopped by the rims of the dishes (2.99)-(2.109)",
+                False: "no rims: the sliding displacement may exceed the capacity",
+            }
+        ),
+    ] = True
+    bouc_wen: Annotated[str, Choice({word: law.meaning for word, law in HYSTERESIS.items()})] = "report"
+    friction: Annotated[str, Choice(FRICTION)] = "constant"
+    friction_law: str | None = None
+    uplift: Annotated[
+        bool,
+        Choice(
+            {
+                False: "surfaces stay closed; a run in which one would open stops with status uplift",
+                True: "every surface may open and close (unilateral contact)",
+            }
+        ),
+    ] = False
+    top_rotation: Annotated[
+        bool,
+        Choice(
+            {
+                False: "the support of the top plate does not rotate",
+                True: "the support of the top plate rotates as prescribed",
+            }
+        ),
+    ] = False
+
+    def __post_init__(self) -> None:
+        check_fields(self, "effects")
+        if self.friction == "custom" and self.law is not None:
+            # A canonical spelling of the formula, so that equal laws share one compiled model.
+            object.__setattr__(self, "friction_law", self.law.text)
+        else:
+            law_of(self.friction, self.friction_law)
+        if self.sliders == "massless" and self.spin == "free":
+            raise InputError(
+                "effects.spin = 'free' with effects.sliders = 'massless': nothing determines the spin of a body "
+                "without inertia; give spin = 'locked' or 'patch'"
+            )
+        if self.sliders == "massless" and self.uplift:
+            raise InputError(
+                "effects.uplift = True with effects.sliders = 'massless': a separated body moves by its inertia; "
+                "give sliders = 'inertial'"
+            )
+
+    @property
+    def law(self) -> Law | None:
+        """Friction law of the model; None for a constant friction coefficient."""
+        return law_of(self.friction, self.friction_law)
+
+    @property
+    def permits_quasistatic_steps(self) -> bool:
+        """Whether a run needs no integration: a planar model without inertia, uplift and friction law, whose friction
+        state Y is a closed-form function of the slip.
+        """
+        quasistatic = self.dimension == "planar" and self.sliders == "massless" and not self.uplift
+        return quasistatic and self.law is None and integrates_to_tanh(self.bouc_wen)
+
+
+@dataclass(frozen=True)
+class Auto:
+    """Effects of which those that are None are selected from the scene by stated criteria (docs/effects.md).
+
+    Attributes:
+        dimension, sliders, rims, uplift: a value of `Effects` to prescribe, or None to select it.
+        friction: a value of `Effects`; None: the law whose parameters the surfaces define.
+        spin, bouc_wen, friction_law: as in `Effects`.
+        error: permitted change of the result by all effects left out, as a share of the friction force.
+
+    Raises:
+        InputError: a value is not permitted, or the prescribed effects exclude each other.
+    """
+
+    dimension: Annotated[str | None, Choice(("spatial", "planar"))] = None
+    sliders: Annotated[str | None, Choice(("inertial", "massless"))] = None
+    rims: Annotated[bool | None, Choice((True, False))] = None
+    uplift: Annotated[bool | None, Choice((True, False))] = None
+    spin: Literal["locked", "patch", "free"] = "locked"
+    bouc_wen: Annotated[str, Choice(HYSTERESIS)] = "report"
+    friction: Annotated[str | None, Choice(FRICTION)] = None
+    friction_law: str | None = None
+    error: Annotated[float, Quantity("", above=0.0)] = 0.005
+
+    def __post_init__(self) -> None:
+        check_fields(self, "effects")
+        if self.error >= 1:
+            raise InputError(f"effects.error = {self.error}: a share of the friction force; give less than 1: 0.005")
+        self.resolve(friction=self.friction or ("custom" if self.friction_law else None))
+
+    def resolve(self, **choices: object) -> Effects:
+        """The prescribed effects with `choices` (field of `Effects` -> value) put in; other fields have defaults.
+
+        Raises InputError if the values exclude each other.
+        """
+        given = {field.name: getattr(self, field.name) for field in fields(Effects) if hasattr(self, field.name)}
+        return Effects(**{name: value for name, value in {**given, **choices}.items() if value is not None})
+
+
+SELECTABLE = ("dimension", "sliders", "rims", "uplift")
+"""Fields of `Auto` that are selected from the scene where they are None."""
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """Layout and effects: all inputs that determine one set of equations and so one compiled model."""
+
+    layout: Layout
+    effects: Effects = Effects()
+
+    @property
+    def key(self) -> str:
+        """Unique name of the model, such as `5_2_2-spatial-locked-inertial-rims-report-constant`."""
+        name = self.layout.name
+        for field in fields(Effects):
+            value = getattr(self.effects, field.name)
+            if isinstance(value, bool):  # named where it is on, or where it is off and the default is on
+                name += f"-{field.name}" if value else f"-no{field.name}" if field.default else ""
+            elif field.name != "friction_law":
+                name += f"-{value}"
+            elif value is not None:
+                name += f"[{value.replace(' ', '')}]"
+        return name

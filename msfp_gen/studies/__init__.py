@@ -1,0 +1,1 @@
+"""Studies that take several runs: accuracy and bounding analysis."""

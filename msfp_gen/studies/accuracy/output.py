@@ -1,0 +1,188 @@
+"""Output of a study: tables, CSV, JSON, Markdown and a figure."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import fields
+from math import isfinite, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.common.output import make_folder, replacing
+from msfp_gen.common.tables import Table
+from msfp_gen.studies.accuracy.machine import machine
+from msfp_gen.studies.accuracy.measure import ERRORS, Errors
+from msfp_gen.studies.accuracy.trial import CUT_OFF, REFUSED
+
+if TYPE_CHECKING:
+    from msfp_gen.studies.accuracy.study import Point, Study
+
+NAMES = tuple(field.name for field in fields(Errors))
+COLUMNS = (
+    "series",
+    "method",
+    "rtol",
+    "status",
+    "seconds",
+    "expected_seconds",
+    "newton",
+    "evaluations",
+    "steps",
+    "reached",
+    *NAMES,
+    "wrong",
+    "message",
+)
+HEADS = (
+    "",
+    "tolerance",
+    "outcome",
+    "seconds",
+    "Newton iterations",
+    "force max",
+    "force RMS",
+    "sliding max",
+    "sliding RMS",
+)
+
+
+def rows(study: Study) -> list[dict[str, Any]]:
+    """One dict of plain values per point, keys as in `COLUMNS`; None where a value is not defined."""
+    return [_row(point) for point in study.points]
+
+
+def _row(point: Point) -> dict[str, Any]:
+    trial = point.trial
+    known = {} if point.errors is None else point.errors.as_dict()
+    found = {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
+    values = (
+        point.series,
+        trial.method,
+        trial.rtol,
+        trial.status,
+        trial.seconds,
+        trial.expected_seconds,
+        trial.newton,
+        trial.evaluations,
+        trial.steps,
+        trial.reached,
+        *found.values(),
+        point.wrong,
+        trial.message,
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def as_dict(study: Study) -> dict[str, Any]:
+    """The study as plain data, ready for JSON."""
+    reference = study.reference
+    second, floor = reference.second, reference.floor
+    return {
+        "scene": study.scene.name,
+        "kind": study.kind,
+        "end": study.scene.end,
+        "reference": {"method": reference.trial.method, "rtol": reference.trial.rtol},
+        "confirmed_by": None if second is None else {"method": second.method, "rtol": second.rtol},
+        "floor": None if floor is None else floor.as_dict(),
+        "points": rows(study),
+        "notes": list(study.notes),
+        "machine": machine(),
+    }
+
+
+def tables(study: Study) -> list[Table]:
+    """The study as tables for the console."""
+    shown = [_cells(point) for point in study.points]
+    notes = [("reference", reference_text(study)), *(("note", note) for note in study.notes)]
+    title = f"{study.kind} of {study.scene.name or 'unnamed scene'}"
+    return [Table(title, HEADS, shown), Table("reference of the errors, and notes", (), notes)]
+
+
+def _cells(point: Point) -> tuple[str, ...]:
+    trial = point.trial
+    expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
+    known = {} if point.errors is None else point.errors.as_dict()
+    found = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
+    outcome = "WRONG SUCCESS" if point.wrong else trial.status
+    return point.series, trial.setting, outcome, expected, str(trial.newton), *found
+
+
+def reference_text(study: Study) -> str:
+    """The reference and its confirming run in one line."""
+    first, second, floor = study.reference.trial, study.reference.second, study.reference.floor
+    text = f"{first.method} at {first.rtol:g}"
+    if second is None or floor is None:
+        return f"{text}, not confirmed by a second run"
+    return (
+        f"{text}, confirmed by {second.method} at {second.rtol:g}: they differ by {floor.force_rms:.1e} RMS and "
+        f"{floor.force_max:.1e} at most in force, {floor.sliding_rms:.1e} and {floor.sliding_max:.1e} in sliding"
+    )
+
+
+def markdown(study: Study) -> str:
+    """The table, the reference and the notes as Markdown."""
+    lines = [
+        " | ".join(("", *cells, "")).strip() for cells in (HEADS, ("---",) * len(HEADS), *map(_cells, study.points))
+    ]
+    return "\n".join([*lines, "", f"Reference: {reference_text(study)}.", *(f"\n{note}." for note in study.notes), ""])
+
+
+def figure_table(study: Study) -> dict[str, dict[str, list[float]]]:
+    """The table that `plot_work_precision` draws: series -> column -> values; without series that could not run."""
+    out: dict[str, dict[str, list[float]]] = {}
+    for series in study.series:
+        points = [p for p in study.of(series) if p.trial.status != REFUSED]
+        if points:
+            out[series] = _columns(points)
+    return out
+
+
+def _columns(points: list[Point]) -> dict[str, list[float]]:
+    columns: dict[str, list[float]] = {"seconds": [p.trial.expected_seconds for p in points]}
+    share = [max(p.trial.reached / p.trial.end, 1e-9) if p.trial.status == CUT_OFF else 1.0 for p in points]
+    if any(p.trial.newton for p in points):
+        columns["newton"] = [p.trial.newton / part for p, part in zip(points, share, strict=True)]
+    for name in ERRORS:
+        columns[name] = [float("nan") if p.errors is None else getattr(p.errors, name) for p in points]
+    columns["cut"] = [float(p.trial.status == CUT_OFF) for p in points]
+    columns["failed"] = [float(not p.trial.finished and p.trial.status != CUT_OFF) for p in points]
+    columns["wrong"] = [float(p.wrong) for p in points]
+    return columns
+
+
+def draw(study: Study, path: str | Path) -> None:
+    """Draw the study to `path`: .png, .svg or .pdf."""
+    from msfp_gen.figures import plot_work_precision
+
+    floor, second = study.reference.floor, study.reference.second
+    floors = {} if floor is None or second is None else {f"references differ ({second.method})": floor.as_dict()}
+    title = f"{study.kind.capitalize()}: {study.scene.name or 'unnamed scene'}"
+    plot_work_precision(figure_table(study), path, errors=ERRORS, floors=floors, title=title)
+
+
+def write(study: Study, folder: Path) -> list[Path]:
+    """Write CSV, JSON, Markdown and the figure as SVG and PNG to `folder`; returns the paths.
+
+    Raises InputError if the folder cannot be made or written to.
+    """
+    make_folder(folder, "--output")
+    base = folder / study.kind
+    written = [write_csv(study, base.with_suffix(".csv"))]
+    for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
+        with replacing(base.with_suffix(suffix)) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        written.append(base.with_suffix(suffix))
+    for suffix in (".svg", ".png"):
+        draw(study, base.with_suffix(suffix))
+        written.append(base.with_suffix(suffix))
+    return written
+
+
+def write_csv(study: Study, path: Path) -> Path:
+    """Write one row per run, columns as in `COLUMNS`; the file appears only when complete."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows(study))
+    return path

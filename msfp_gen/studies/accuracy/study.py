@@ -1,0 +1,216 @@
+"""Work-precision studies: several methods at several tolerances on one scene, against a confirmed reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from msfp_gen.errors import InputError
+from msfp_gen.simulation.simulate import simulate
+from msfp_gen.studies.accuracy.effects import with_all_effects
+from msfp_gen.studies.accuracy.measure import Errors, Reference, best_reference, errors
+from msfp_gen.studies.accuracy.methods import METHODS, Method, methods_named
+from msfp_gen.studies.accuracy.trial import CUT_OFF, REFUSED, Trial
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+
+TOLERANCES = tuple(10.0**-k for k in range(2, 10))
+LIMIT = 10.0  # [s] of wall time per run
+CONFIRMING_LIMIT = 6.0  # time limit of a rerun that may confirm the reference, over the limit of other runs
+CONFIRMING_RUNS = 2  # most of such reruns
+TIGHTEST = 1e-11  # least tolerance of a reference run
+WRONG = 30.0  # a success is wrong if its RMS error exceeds this many tolerances,
+NEVER_WRONG, ALWAYS_WRONG = 1e-3, 0.1  # but never below the first error, and always above the second
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One run of a study.
+
+    Attributes:
+        series: the method or model.
+        trial: the run.
+        errors: against the reference; None for the reference itself and for runs that did not finish.
+        wrong: whether the run reported success with a wrong result (`is_wrong`).
+    """
+
+    series: str
+    trial: Trial
+    errors: Errors | None
+    wrong: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study of one scene.
+
+    Attributes:
+        scene: the scene that was run.
+        kind: "work-precision" or "model-error".
+        points: the runs.
+        reference: the run that errors are measured against.
+        notes: what was left out, and what limits the reference, in words.
+    """
+
+    scene: Scene
+    kind: str
+    points: tuple[Point, ...]
+    reference: Reference
+    notes: tuple[str, ...]
+
+    def of(self, series: str) -> list[Point]:
+        """The points of one series, loosest tolerance first."""
+        return [point for point in self.points if point.series == series]
+
+    @property
+    def series(self) -> list[str]:
+        """Names of all series, in the order of the points."""
+        return list(dict.fromkeys(point.series for point in self.points))
+
+
+def work_precision(
+    scene: Scene,
+    *,
+    methods: Sequence[str] | None = None,
+    tolerances: Sequence[float] = TOLERANCES,
+    limit: float = LIMIT,
+    say: Say = lambda line: None,
+) -> Study:
+    """Run `scene` by every method at every tolerance and measure the error of each run.
+
+    Args:
+        scene: the scene.
+        methods: names in `METHODS`; None: all.
+        tolerances: relative tolerances [-].
+        limit: wall time of one run [s]. A longer run is cut off; after two of those in a row tighter tolerances of the
+            method are not tried.
+        say: called with one line of text after each run.
+
+    Raises:
+        InputError: an invalid tolerance, limit or method, or a bearing that does not move.
+        RunError: no run finished.
+    """
+    chosen = methods_named(None if methods is None else list(methods))
+    check_settings(tolerances, limit)
+    scene, trials, notes = without_stop(scene), [], []
+    for method in chosen:
+        found, left_out = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
+        trials += found
+        notes += left_out
+    trials = with_reruns(trials, rerun_to_end(scene, trials, limit, say))
+    reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], families())
+    points = tuple(point_of(trial.method, trial, reference) for trial in trials)
+    return Study(scene, "work-precision", points, reference, (*notes, *reference_notes(reference)))
+
+
+def check_settings(tolerances: Sequence[float], limit: float) -> None:
+    """Raise InputError for a tolerance or a limit out of range."""
+    for rtol in tolerances:
+        if not 1e-12 <= rtol < 1:
+            raise InputError(f"tolerances = {rtol:g}: give numbers from 1e-12 to below 1, such as 1e-2,1e-4")
+    if not tolerances:
+        raise InputError("tolerances: none given; give some such as 1e-2,1e-4")
+    if not 0 < limit < float("inf"):
+        raise InputError(f"limit = {limit:g}: give seconds above zero")
+
+
+def families() -> dict[str, str]:
+    """Method -> family."""
+    return {name: method.family for name, method in METHODS.items()}
+
+
+def without_stop(scene: Scene) -> Scene:
+    """The scene without its stop condition, which SciPy's integrators do not have, ending where the stop would end it.
+
+    All effects are modelled, so that no run changes them on its way and every method can run the scene.
+    """
+    scene = with_all_effects(scene)
+    if scene.stop is None:
+        return scene
+    end = float(simulate(replace(scene, output_step=None)).history.time[-1])
+    return replace(scene, stop=None, duration=end)
+
+
+def run_tolerances(
+    method: Method, scene: Scene, tolerances: Sequence[float], limit: float, say: Say
+) -> tuple[list[Trial], list[str]]:
+    """Run one method at `tolerances`, loosest first; the runs, and notes on what was left out."""
+    trials: list[Trial] = []
+    for count, rtol in enumerate(tolerances):
+        trial = method.attempt(scene, rtol, limit)
+        trials.append(trial)
+        say(trial_line(trial))
+        if trial.status == REFUSED:
+            return [], [f"{method.name} cannot run this scene: {trial.message}"]
+        if len(trials) > 1 and all(t.status == CUT_OFF for t in trials[-2:]) and count + 1 < len(tolerances):
+            return trials, [f"{method.name}: cut off twice, so tighter than {rtol:g} was not tried"]
+    return trials, []
+
+
+def trial_line(trial: Trial) -> str:
+    """One line of text about a run: method, setting, outcome and time."""
+    outcome = trial.status if trial.finished else f"{trial.status} at t = {trial.reached:.4g} of {trial.end:.4g} s"
+    return f"{trial.method} at {trial.setting}: {outcome}, {trial.seconds:.3g} s"
+
+
+def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name: str = "implicit") -> list[Trial]:
+    """Runs of one method below the tightest tolerance that finished, until one does not finish: for a reference."""
+    done = [t.rtol for t in trials if t.method == name and t.finished]
+    rtol, found = min(done, default=1e-2) / 10, []
+    while rtol > TIGHTEST:
+        trial = METHODS[name].attempt(scene, rtol, limit)
+        say(f"reference: {trial_line(trial)}")
+        if not trial.finished:
+            break
+        found.append(trial)
+        rtol /= 10
+    return found
+
+
+def rerun_to_end(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
+    """Repeat runs that were cut off with a longer limit, as candidates for the reference.
+
+    Of each method the tightest that can finish within that limit; of these the CONFIRMING_RUNS fastest.
+    """
+    longer = CONFIRMING_LIMIT * limit
+    possible = [t for t in trials if t.status == CUT_OFF and 1.3 * t.expected_seconds < longer]
+    tightest = {t.method: t for t in sorted(possible, key=lambda t: -t.rtol)}
+    found = []
+    for trial in sorted(tightest.values(), key=lambda t: t.expected_seconds)[:CONFIRMING_RUNS]:
+        found.append(METHODS[trial.method].attempt(scene, trial.rtol, longer))
+        say(f"reference: {trial_line(found[-1])}")
+    return found
+
+
+def with_reruns(trials: Sequence[Trial], reruns: Sequence[Trial]) -> list[Trial]:
+    """`trials`, each replaced by its repetition where there is one."""
+    known = {(trial.method, trial.rtol): trial for trial in reruns}
+    return [known.get((trial.method, trial.rtol), trial) for trial in trials]
+
+
+def point_of(series: str, trial: Trial, reference: Reference) -> Point:
+    """One run as a point of a series; the reference and runs that did not finish have no errors."""
+    found = errors(trial, reference.trial) if trial.finished and trial is not reference.trial else None
+    return Point(series, trial, found, found is not None and is_wrong(trial, found, reference))
+
+
+def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
+    """Whether a run reported success while its RMS error is far above its tolerance and above the reference's floor."""
+    if reference.floor is None:
+        return False
+    floor = 3 * reference.floor.worst_rms
+    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, ALWAYS_WRONG), NEVER_WRONG, floor)
+
+
+def reference_notes(reference: Reference) -> list[str]:
+    """Notes on how far the reference can be relied on."""
+    if reference.second is None or reference.floor is None:
+        return ["only one run reached the end: nothing confirms the reference"]
+    if not reference.independent:
+        return ["only one family of methods reached the end: the reference is confirmed by its own family alone"]
+    if reference.floor.worst_rms > 1e-2:
+        return [f"the two references differ by {reference.floor.worst_rms:.1%} RMS: errors below that are not known"]
+    return []

@@ -1,0 +1,178 @@
+"""One run of a study: its cost, the time it reached, and the histories that are compared."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.results.history import Counters
+from msfp_gen.simulation.simulate import simulate
+
+if TYPE_CHECKING:
+    from msfp_gen.result import Result
+    from msfp_gen.scene.scene import Scene
+
+ROWS = 2000  # intervals between the instants at which runs are compared
+QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
+CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One run by one method at one tolerance.
+
+    Attributes:
+        method: name of the method or model.
+        rtol: relative tolerance [-]; the step [s] if `stepped`.
+        status: "ok", "cut off" (by the time limit), "refused" (the method cannot run this scene), or how the run
+            failed.
+        seconds: wall time of the integration [s], up to the cut for a run that was cut off.
+        reached, end: simulated time, and the end of the scene [s].
+        newton: Newton iterations on the equations of motion, in all loops.
+        evaluations, steps: evaluations of the equations; accepted steps.
+        force: horizontal force on the top support at the first K of `comparison_times(end)`, shape (K, 2) [N].
+        sliding: sliding of every surface at the same times, shape (K, n-1) [m].
+        message: one line about a failure.
+        stepped: whether the method has no error control.
+    """
+
+    method: str
+    rtol: float
+    status: str
+    seconds: float
+    reached: float
+    end: float
+    newton: int
+    evaluations: int
+    steps: int
+    force: Array
+    sliding: Array
+    message: str = ""
+    stepped: bool = False
+
+    @property
+    def setting(self) -> str:
+        """The tolerance, or the step with its unit, as text."""
+        return f"{self.rtol:.3g} s" if self.stepped else f"{self.rtol:g}"
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run reached its end."""
+        return self.status == OK
+
+    @property
+    def expected_seconds(self) -> float:
+        """Wall time of the whole run [s]; for a run that was cut off, extrapolated from the simulated time reached."""
+        if self.status != CUT_OFF or not self.reached:
+            return self.seconds
+        return self.seconds * self.end / self.reached
+
+
+def comparison_times(end: float) -> Array:
+    """Instants at which runs are compared [s], shape (ROWS + 1,)."""
+    return np.linspace(0.0, end, ROWS + 1)
+
+
+def refused_trial(method: str, rtol: float, scene: Scene, why: str) -> Trial:
+    """The trial of a method that cannot run this scene."""
+    empty = np.zeros((0, 2)), np.zeros((0, scene.bearing.layout.surfaces))
+    return Trial(method, rtol, REFUSED, 0.0, 0.0, scene.end, 0, 0, 0, *empty, message=why)
+
+
+class _OutOfTime(KeyboardInterrupt):
+    """Ends a run as Ctrl-C does, so that `simulate` returns what was computed until then."""
+
+
+def time_limit(limit: float) -> Callable[[float, float], None]:
+    """A progress callback for `simulate` that ends the run after `limit` seconds of wall time."""
+    begin = time.perf_counter()
+
+    def check(reached: float, end: float) -> None:
+        if time.perf_counter() - begin > limit and reached < end:
+            raise _OutOfTime
+
+    return check
+
+
+def require_base_motion_only(scene: Scene) -> None:
+    """Raise InputError for a scene with a load or a rotation of the top, which this method would ignore."""
+    for name in ("load", "top_rotation"):
+        if getattr(scene, name) is not None:
+            raise InputError(f"{name}: this method applies the motion of the base only; leave {name} or the method out")
+
+
+def run_native(name: str, scene: Scene, rtol: float, limit: float, repeats: int = REPEATS) -> Trial:
+    """Run `scene` by a method of the compiled runtime at `rtol`, for at most about `limit` seconds of wall time.
+
+    repeats: how often a run shorter than QUICK is repeated for its time; 0: not. Raises InputError if the method cannot
+    run the scene.
+    """
+    solver = replace(scene.solver, method=cast(Any, name), rtol=rtol, atol_angle=None)
+    compared = replace(scene, solver=solver, output_step=scene.end / ROWS)
+    result, status, message = _run_limited(compared, limit)
+    if result is None:
+        return replace(refused_trial(name, rtol, scene, message), status=status)
+    counters = result.counters
+    if repeats and status == OK and counters.wall_time < QUICK:
+        plain = replace(scene, solver=solver, output_step=None)
+        seconds = min(simulate(plain).counters.wall_time for _ in range(repeats))
+        counters = replace(counters, wall_time=seconds)
+    return _trial(name, rtol, scene, result, counters, status, message)
+
+
+def _run_limited(scene: Scene, limit: float) -> tuple[Result | None, str, str]:
+    """The result as far as it was computed, its status, and the message of a failure."""
+    from msfp_gen.result import Result
+
+    started = time.perf_counter()
+    try:
+        return simulate(scene, progress=time_limit(limit)), OK, ""
+    except RunError as error:
+        result = error.result if isinstance(error.result, Result) else None
+        if error.status != "interrupted":
+            return result, error.status or "failed", str(error)
+        if time.perf_counter() - started < limit:
+            raise  # interrupted by the user
+        return result, CUT_OFF, f"cut off after {limit:g} s"
+
+
+def _trial(
+    name: str, rtol: float, scene: Scene, result: Result, counters: Counters, status: str, message: str
+) -> Trial:
+    history = result.history
+    return Trial(
+        method=name,
+        rtol=rtol,
+        status=status,
+        seconds=counters.wall_time,
+        reached=scene.end if status == OK else float(history.time[-1]),
+        end=scene.end,
+        newton=counters.newton_iterations,
+        evaluations=counters.evaluations,
+        steps=counters.steps,
+        force=history.top_force[:, :2],
+        sliding=history.sliding,
+        message=message,
+    )
+
+
+def dopri5_cost(scene: Scene) -> tuple[str, ...]:
+    """The cost of the method of PEER 2017/07, extrapolated from half a second of wall time."""
+    try:
+        burst = run_native("dopri5", scene, 1e-3, 0.5, repeats=0)
+    except InputError as error:
+        return (f"dopri5 cannot run this scene: {error}",)
+    if burst.finished:
+        return (f"dopri5, the method of PEER 2017/07, takes {burst.seconds:.2g} s at rtol 1e-3",)
+    if burst.status != CUT_OFF or not burst.reached:
+        return (f"dopri5, the method of PEER 2017/07, fails here: {burst.message}",)
+    return (
+        f"dopri5, the method of PEER 2017/07, resolves the ringing: about {burst.expected_seconds:.2g} s at its rate "
+        f"over the first {burst.reached:.2g} s of motion",
+    )

@@ -1,0 +1,237 @@
+"""Runs of a scene at lower bound, nominal and upper bound properties, and their results side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from msfp_gen.analysis.characterise import Characterisation, characterise
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.scene.friction_parameters import proportional
+from msfp_gen.simulation.simulate import simulate
+from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
+
+if TYPE_CHECKING:
+    from msfp_gen.result import Result
+    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.scene import Scene
+
+CASES = ("lower", "nominal", "upper")
+Progress = Callable[[str], Callable[[float, float], None] | None]
+
+
+class Measure(NamedTuple):
+    """A quantity that is compared.
+
+    Attributes:
+        unit: SI unit.
+        governs: whether its largest or its least value governs a design; "" if neither does.
+        read: its value from a characterisation; None if it is not defined.
+    """
+
+    unit: str
+    governs: Literal["most", "least", ""]
+    read: Callable[[Characterisation], float | None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run of a bounding analysis.
+
+    Attributes:
+        name: "lower", "nominal" or "upper".
+        scene: the scene with its properties multiplied.
+        result: the run; of a run that failed what was computed until then, if anything.
+        found: characterisation; None if the run failed.
+        failure: message of a failure, else empty.
+    """
+
+    name: str
+    scene: Scene
+    result: Result | None
+    found: Characterisation | None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Result of `bound`.
+
+    Attributes:
+        table: the table of factors.
+        lambdas: property -> case -> factor of every surface, bottom first.
+        cases: the runs.
+    """
+
+    table: FactorTable
+    lambdas: dict[str, dict[str, tuple[float, ...]]]
+    cases: tuple[Case, ...]
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every run reached its end."""
+        return not any(case.failure for case in self.cases)
+
+    @property
+    def surfaces(self) -> int:
+        """Number of surfaces of the bearing."""
+        return len(self.cases[0].scene.bearing.surfaces)
+
+    def quantities(self) -> dict[str, dict[str, float | None]]:
+        """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
+        return {
+            name: {case.name: None if case.found is None else measure.read(case.found) for case in self.cases}
+            for name, measure in measures(self.surfaces).items()
+        }
+
+    def governing(self) -> dict[str, str]:
+        """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
+        worst, kinds = {}, measures(self.surfaces)
+        for name, values in self.quantities().items():
+            known = {case: value for case, value in values.items() if value is not None}
+            if kinds[name].governs and len(known) == len(values) and len(set(known.values())) > 1:
+                pick = max if kinds[name].governs == "most" else min
+                worst[name] = pick(known, key=known.__getitem__)
+        return worst
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON: factors, quantities by case, governing cases, and each characterisation."""
+        table = self.table
+        return {
+            "factors": {
+                "name": table.name,
+                "description": table.description,
+                "source": table.source,
+                "rule": table.rule,
+                "adjustment": table.adjustment,
+                "lambdas": self.lambdas,
+            },
+            "quantities": self.quantities(),
+            "governing": self.governing(),
+            "cases": {
+                case.name: {"failure": case.failure, "characterisation": case.found and case.found.as_dict()}
+                for case in self.cases
+            },
+        }
+
+
+def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
+    """Run `scene` with its properties at their lower bounds, nominal values and upper bounds.
+
+    A case that fails is part of the result, and the other cases are run.
+
+    Args:
+        scene: the nominal case.
+        table: factors of the properties.
+        progress: called with the name of each case; returns the progress callback for `simulate`.
+
+    Raises:
+        InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
+        RunError: only if the user interrupts.
+    """
+    lambdas = _lambdas(scene.bearing, table)
+    cases = []
+    for name, bounded in bounded_scenes(scene, table).items():
+        callback = progress(name) if progress else None
+        try:
+            result = simulate(bounded, progress=callback)
+        except RunError as error:
+            if error.status == "interrupted":
+                raise
+            partial: Any = error.result
+            cases.append(Case(name, bounded, partial, None, str(error)))
+        else:
+            cases.append(Case(name, bounded, result, characterise(result)))
+    return Bounds(table, lambdas, tuple(cases))
+
+
+def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:
+    """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`."""
+    lambdas, law = _lambdas(scene.bearing, table), scene.law[1]
+    if "friction" in lambdas and law is not None and not proportional(law, scene.bearing):
+        raise InputError(
+            f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, to which this formula is not "
+            "proportional; give a formula of the form mu * (...)"
+        )
+    scenes = {}
+    for case in CASES:
+        bearing = scene.bearing
+        for named, factors in lambdas.items():
+            for column in PROPERTIES[named]:
+                bearing = _scaled(bearing, column, factors[case])
+        label = f"{scene.name or 'scene'}, {case}"
+        scenes[case] = scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
+    return scenes
+
+
+def _scaled(bearing: Bearing, column: str, factors: tuple[float, ...]) -> Bearing:
+    """`bearing` with a field of its surfaces multiplied by `factors`; unchanged if the surfaces have no such value."""
+    values: list[Any] = [getattr(surface, column, None) for surface in bearing.surfaces]
+    if any(value is None for value in values):
+        return bearing
+    return bearing.replace(**{column: [value * factor for value, factor in zip(values, factors, strict=True)]})
+
+
+def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[float, ...]]]:
+    """Property -> case -> factor of every surface; 1 for a surface without a factor."""
+    count = bearing.layout.surfaces
+    pairs: dict[str, dict[int, tuple[float, float]]] = {}
+    for index, factor in enumerate(table.factors):
+        for surface in factor.surfaces or range(1, count + 1):
+            if surface > count:
+                raise InputError(f"factor[{index}].surfaces has {surface}: this bearing has surfaces 1 to {count}")
+            found = pairs.setdefault(factor.property, {})
+            if surface in found:
+                raise InputError(
+                    f"factor[{index}]: {factor.property} of surface {surface} has a factor already; "
+                    "give one factor for each property of a surface"
+                )
+            found[surface] = table.combined(factor)
+    ends = {"lower": 0, "upper": 1}
+    return {
+        named: {
+            case: tuple(
+                found.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0 for surface in range(1, count + 1)
+            )
+            for case in CASES
+        }
+        for named, found in pairs.items()
+    }
+
+
+def measures(surfaces: int) -> dict[str, Measure]:
+    """Name -> quantity that is compared, for a stack with this number of surfaces; loop properties are cycle means."""
+    whole = {
+        "peak_displacement": Measure("m", "most", lambda found: found.peak_displacement),
+        "peak_force": Measure("N", "most", lambda found: found.peak_force),
+        "secant_stiffness": Measure("N/m", "", lambda found: found.secant_stiffness),
+        "effective_stiffness": Measure("N/m", "", _mean("effective_stiffness")),
+        "effective_period": Measure("s", "", _mean("effective_period")),
+        "energy_dissipated": Measure("J", "", _mean("energy_dissipated")),
+        "effective_damping": Measure("1", "", _mean("effective_damping")),
+        "zero_displacement_force": Measure("N", "", _mean("zero_displacement_force")),
+        "residual_displacement": Measure(
+            "m", "most", lambda found: found.residual_displacement if found.at_rest else None
+        ),
+        "maximum_uplift": Measure("m", "most", lambda found: found.maximum_uplift),
+    }
+    kinds: dict[str, tuple[str, Literal["most", "least"]]] = {
+        "capacity_left": ("m", "least"),
+        "peak_velocity": ("m/s", "most"),
+        "peak_heat_flux": ("W/m^2", "most"),
+    }
+    each = {
+        f"{name}_{surface}": Measure(unit, governs, _of_surface(name, surface))
+        for name, (unit, governs) in kinds.items()
+        for surface in range(1, surfaces + 1)
+    }
+    return whole | each
+
+
+def _mean(name: str) -> Callable[[Characterisation], float | None]:
+    return lambda found: found.envelope[name].mean if name in found.envelope else None
+
+
+def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
+    return lambda found: getattr(found.surfaces[surface - 1], name)

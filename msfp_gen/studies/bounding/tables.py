@@ -1,0 +1,91 @@
+"""Output of a bounding analysis: tables of factors and of quantities by case, and a CSV file."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from msfp_gen.common.output import check_output, replacing
+from msfp_gen.common.tables import Table
+from msfp_gen.studies.bounding.factors import RULES, FactorTable
+from msfp_gen.studies.bounding.runs import CASES, Bounds, measures
+
+# SI unit -> (unit shown, scale).
+SHOWN = {
+    "m": ("mm", 1e3),
+    "N": ("kN", 1e-3),
+    "N/m": ("kN/m", 1e-3),
+    "m/s": ("mm/s", 1e3),
+    "W/m^2": ("kW/m2", 1e-3),
+    "1": ("%", 100.0),
+}
+
+
+def bounding_tables(found: Bounds) -> list[Table]:
+    """Tables of the factors, of the factors by surface, of quantities by case, and of runs that failed."""
+    failed = [(case.name, case.failure) for case in found.cases if case.failure]
+    extra = [Table("runs that failed", (), failed)] if failed else []
+    return [_factor_table(found.table), _lambda_table(found), _quantity_table(found), *extra]
+
+
+def write_quantities(found: Bounds, path: str | Path) -> Path:
+    """Write the quantities by case as CSV in SI units; the file appears only when complete.
+
+    Raises InputError for a path that does not end in .csv or cannot be written.
+    """
+    path = check_output(path, (".csv",))
+    units, governing = measures(found.surfaces), found.governing()
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["quantity", *CASES, "governs"])
+        for name, values in found.quantities().items():
+            cells = ["" if values[case] is None else values[case] for case in CASES]
+            writer.writerow([f"{name} [{units[name].unit}]", *cells, governing.get(name, "")])
+    return path
+
+
+def _factor_table(table: FactorTable) -> Table:
+    rows = [
+        ("table", table.name),
+        ("", table.description),
+        ("rule", f"{table.rule}: {RULES[table.rule].formula}"),
+        ("adjustment", f"{table.adjustment:g}"),
+        ("source", table.source),
+    ]
+    if table.limits is not None:
+        rows.append(("limits", f"lambda_min at most {table.limits[0]:g}, lambda_max at least {table.limits[1]:g}"))
+    for factor in table.factors:
+        causes = [
+            f"{cause} {low:g} to {high:g}"
+            for group in (factor.environment, factor.direct)
+            for cause, (low, high) in group.items()
+        ]
+        where = f" of surface {', '.join(map(str, factor.surfaces))}" if factor.surfaces else ""
+        low, high = table.combined(factor)
+        rows.append((factor.property + where, f"{low:.4g} to {high:.4g} from {', '.join(causes)}"))
+    return Table("property-modification factors", (), [row for row in rows if row[1]])
+
+
+def _lambda_table(found: Bounds) -> Table:
+    nominal = next(case for case in found.cases if case.name == "nominal").scene.bearing.surfaces
+    rows = [
+        (
+            f"{named} {surface + 1}",
+            *(f"{factors[case][surface]:.4g}" for case in CASES),
+            *(f"{factors[case][surface] * getattr(nominal[surface], named):.4g}" for case in CASES),
+        )
+        for named, factors in found.lambdas.items()
+        for surface in range(found.surfaces)
+    ]
+    return Table("lambda of every surface, and property times lambda [SI]", ("", *CASES, *CASES), rows)
+
+
+def _quantity_table(found: Bounds) -> Table:
+    units, governing = measures(found.surfaces), found.governing()
+    rows = []
+    for name, values in found.quantities().items():
+        if any(value is not None for value in values.values()):
+            unit, scale = SHOWN.get(units[name].unit, (units[name].unit, 1.0))
+            cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
+            rows.append((f"{name.replace('_', ' ')} [{unit}]", *cells, governing.get(name, "")))
+    return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)

@@ -1,0 +1,59 @@
+"""docs/accuracy.md is written by one command, and holds what its template says."""
+
+from __future__ import annotations
+
+import re
+
+import accuracy as page
+import pytest
+from support import ROOT
+
+TEMPLATE = (ROOT / "benchmarks" / "accuracy.md.in").read_text(encoding="utf-8")
+WRITTEN = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
+
+
+def test_one_command_writes_figures_numbers_and_page(tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "TOLERANCES", (1e-2, 1e-4))
+    monkeypatch.setattr(page, "MODEL_TOLERANCES", (1e-2, 1e-4))
+    monkeypatch.setattr(page, "CASES", (page.Case("A short push", "fenz-monotonic", 0.1, 0.2, models=True),))
+    monkeypatch.setattr(page, "PEER_METHOD", page.Case("The method of PEER 2017/07", "fenz-monotonic", 0.05, 2.0))
+    monkeypatch.setattr(page, "PEER_METHOD_TOLERANCES", (0.3, 1e-3))
+    monkeypatch.setattr(page, "RINGING", (("fenz-monotonic", 0.05, 1e-6),))
+    monkeypatch.setattr(page, "ESTIMATED", ("double-push",))
+    monkeypatch.setattr(page, "TARGETS", (0.02,))
+    page.main([str(tmp_path), "--share", "0.9"])
+    text = (tmp_path / "accuracy.md").read_text(encoding="utf-8")
+    assert "{{" not in text and "A short push" in text and "processor" in text and "compiler" in text
+    for target in re.findall(r"\]\((figures/[^)]+)\)", text):
+        assert (tmp_path / target).is_file() and (tmp_path / target).with_suffix(".csv").is_file()
+    assert len(re.findall(r"\]\(figures/", text)) == 2
+    assert re.search(r"\| `implicit` \| 0\.\d+ \|", text) and "| planar |" in text and "| double-push |" in text
+
+
+def test_only_some_scenes_leave_the_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(page, "TOLERANCES", (1e-2,))
+    monkeypatch.setattr(page, "CASES", (page.Case("A short push", "fenz-monotonic", 0.05, 0.2),))
+    page.main([str(tmp_path), "--only", "fenz-monotonic"])
+    assert "A short push" in capsys.readouterr().out and not (tmp_path / "accuracy.md").exists()
+    page.main([str(tmp_path), "--only", "fenz-test1"])
+    assert not capsys.readouterr().out
+
+
+def test_page_says_what_the_template_says():
+    for part in re.split(r"\{\{\w+\}\}", TEMPLATE):
+        assert part in WRITTEN
+    assert "{{" not in WRITTEN
+
+
+def test_every_case_of_the_issue_is_there():
+    scenes = {case.scene for case in page.CASES}
+    assert {f"fenz-test{k}" for k in range(1, 6)} <= scenes
+    assert {"becker-circle-50", "ridgecrest-clc", "fenz-monotonic"} <= scenes
+    for case in page.CASES:
+        assert f"figures/accuracy-{case.scene}.png" in WRITTEN
+        assert (f"figures/accuracy-models-{case.scene}.png" in WRITTEN) is case.models
+
+
+@pytest.mark.parametrize(("value", "told"), [(0.00123, "1.2 ms"), (0.5, "0.5 s"), (250.4, "250 s")])
+def test_seconds_are_told_in_two_digits(value, told):
+    assert page.seconds(value) == told

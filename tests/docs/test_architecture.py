@@ -1,0 +1,261 @@
+"""House rules of docs/architecture.md, read from the sources: imports run downward, one module prints, paths exist."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+
+import pytest
+from support import ROOT
+
+LINKED = {"generator", "templates"}  # the same folders again, under their import names
+PACKAGE = sorted(p for p in (ROOT / "msfp_gen").rglob("*.py") if not LINKED & set(p.relative_to(ROOT).parts))
+CONSOLE = ROOT / "msfp_gen" / "cli" / "console.py"
+GENERATOR = sorted((ROOT / "generator").glob("*.py"))
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+# The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
+ORDER = (
+    "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
+    "model", "results", "analysis", "figures", "result", "simulation", "studies", "report", "", "cli", "__main__",
+)  # fmt: skip  # "" is msfp_gen/__init__.py
+
+# What `import msfp_gen` must never load.
+HEAVY = {"sympy", "xarray", "matplotlib", "pint", "scipy", "pydantic", "h5netcdf", "h5py", "jinja2", "Cython"}
+# Third-party modules that a module of the package may import when it is itself imported.
+AT_IMPORT = {"numpy": None, "typer": {"cli"}, "pydantic": {"schema"}}
+
+
+def name_of(path):
+    """Dotted name of a module."""
+    inside = path.relative_to(ROOT).with_suffix("")
+    parts = ("msfp_gen", *inside.parts) if inside.parts[0] == "generator" else inside.parts
+    return ".".join(parts).removesuffix(".__init__")
+
+
+def type_checking(node):
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def imports_of(path, *, late):
+    """Modules that a file imports, made absolute: when it is imported itself, or (late) ever, for types too."""
+    found, todo = set(), list(ast.parse(path.read_text(encoding="utf-8")).body)
+    package = name_of(path) if path.name == "__init__.py" else name_of(path).rpartition(".")[0]
+    while todo:
+        node = todo.pop()
+        if not late and (type_checking(node) or isinstance(node, ast.FunctionDef)):
+            continue
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            module = ".".join(part for part in (base, node.module) if part)
+            names = {f"{module}.{alias.name}" for alias in node.names}
+            found |= names if names <= set(MODULES) else {module, *names}  # a package is not what it holds
+        todo += list(ast.iter_child_nodes(node))
+    return found
+
+
+MODULES = {name_of(path): path for path in (*PACKAGE, *GENERATOR)}
+PACKAGES = sorted({name.split(".")[1] for name, path in MODULES.items() if path.parent.name != "msfp_gen"})
+
+
+def ours(path, *, late):
+    """The modules of the package that a file imports."""
+    return {name for name in imports_of(path, late=late) if name in MODULES} - {name_of(path)}
+
+
+def place(name):
+    """How high a module stands, by the package it lies in."""
+    return ORDER.index(name.removeprefix("msfp_gen").lstrip(".").partition(".")[0])
+
+
+def test_the_reader_of_imports_sees_them():
+    assert "msfp_gen.errors" in ours(ROOT / "msfp_gen" / "specification" / "layout.py", late=False)
+    for name in ("derive", "specification.layout"):  # in a function, and for types
+        module = name if "." in name else f"generator.{name}"
+        assert f"msfp_gen.{module}" in ours(ROOT / "generator" / "__init__.py", late=True)
+        assert f"msfp_gen.{module}" not in ours(ROOT / "generator" / "__init__.py", late=False)
+    assert "scipy" not in {m.partition(".")[0] for p in PACKAGE for m in imports_of(p, late=False)}
+
+
+def test_packages_import_downward():
+    """Imports for types and in functions count."""
+    back = [
+        f"{name} imports {other}"
+        for name, path in MODULES.items()
+        for other in sorted(ours(path, late=True))
+        if place(other) > place(name)
+    ]
+    assert not back, back
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    """Imports for types and in functions count."""
+    left = {name: ours(path, late=True) for name, path in MODULES.items()}
+    while left:
+        free = {name for name, needs in left.items() if not needs & set(left)}
+        assert free, f"a circle of imports among {sorted(left)}"
+        left = {name: needs for name, needs in left.items() if name not in free}
+
+
+def test_few_modules_lie_beside_the_packages():
+    assert len(list((ROOT / "msfp_gen").glob("*.py"))) <= 6
+
+
+@pytest.mark.parametrize("path", MODULES.values(), ids=name_of)
+def test_modules_are_short(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
+
+
+def test_errors_and_version_are_leaves():
+    for name in ("errors", "version"):
+        assert not ours(ROOT / "msfp_gen" / f"{name}.py", late=True)
+
+
+def test_nothing_imports_the_command_line():
+    for path in (*PACKAGE, *GENERATOR):
+        if path.name != "__main__.py" and path.parent.name != "cli":
+            assert not any(name.startswith("msfp_gen.cli") for name in imports_of(path, late=True)), path.name
+
+
+@pytest.mark.parametrize("path", GENERATOR, ids=lambda path: path.name)
+def test_generator_knows_little_of_the_package(path):
+    allowed = ("msfp_gen.specification", "msfp_gen.version", "msfp_gen.errors", "msfp_gen.generator")
+    assert all(name.startswith(allowed) for name in ours(path, late=True))
+
+
+def test_generator_is_pure():
+    """No disk and no processes; templates are read as package data."""
+    for path in GENERATOR:
+        assert not imports_of(path, late=True) & {"os", "pathlib", "subprocess", "tempfile", "shutil"}, path.name
+        assert "open" not in calls(path), path.name
+
+
+def calls(path):
+    """Plain names that a file calls."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return {node.func.id for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+
+
+def streams(path):
+    """Streams of the process that a file touches."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)} & {"sys.stdout", "sys.stderr"}
+
+
+def test_only_the_command_line_prints():
+    for path in (*PACKAGE, *GENERATOR):
+        if path != CONSOLE:
+            assert "print" not in calls(path) and not streams(path), f"{path.name} prints"
+    assert streams(CONSOLE)
+
+
+def test_modules_import_no_heavy_library_at_import():
+    for path in PACKAGE:
+        for module in imports_of(path, late=False):
+            top = module.partition(".")[0]
+            if top in sys.stdlib_module_names or top == "msfp_gen":
+                continue
+            where = AT_IMPORT.get(top, set())
+            allowed = where is None or bool({path.stem, path.parent.name} & where)
+            assert allowed, f"{path.name} imports {top} when it is imported"
+
+
+def test_import_of_the_package_is_light():
+    code = "import sys, msfp_gen; print(*sorted({m.partition('.')[0] for m in sys.modules}))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not HEAVY & set(run.stdout.split())
+
+
+def test_every_dependency_has_its_sentence():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = [*project["dependencies"], *(d for extra in project["optional-dependencies"].values() for d in extra)]
+    names = {re.split(r"[^A-Za-z0-9-]", text)[0].lower() for text in wanted}
+    names -= {"sympy", "numpy", "scipy", "cython", "pytest"}
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w, -]+?)(?: \(tests\))? \| .+ \|$", page, flags=re.MULTILINE)
+    told = {name.strip().lower() for row in rows for name in row.split(",")}
+    assert names <= told, f"docs/architecture.md says nothing of {sorted(names - told)}"
+
+
+def test_every_package_is_on_the_map():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    names = [f"{name}/" for name in (*PACKAGES, *(f"runtime/{folder}" for folder in LAYERS))]
+    missing = sorted(name for name in names if f"{name}`" not in page)
+    assert not missing, f"docs/architecture.md does not name {missing}"
+
+
+# The folders of the runtime, lowest first, and the headers that each may include beside its own.
+LAYERS = ("equations", "steppers", "run")
+RUNTIME = ROOT / "msfp_gen" / "runtime"
+GENERATED = {"msfp_model.h", "msfp_kernels.h"}
+SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
+def test_runtime_includes_one_way(path):
+    """run -> steppers -> equations -> generated headers; the public header includes nothing of ours."""
+    included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    if path.parent == RUNTIME:
+        assert not included
+        return
+    layer = LAYERS.index(path.parent.name)
+    below = {f"{name}.h" for name in LAYERS[max(layer - 1, 0) : layer + 1]} - {path.name}
+    assert included and included <= (below | GENERATED if layer == 0 else below)
+
+
+def test_names_of_runtime_files_are_unique():
+    """Generated sources lie in one folder."""
+    assert len({path.name for path in SOURCES}) == len(SOURCES)
+    assert {path.parent.name for path in SOURCES} == {"runtime", *LAYERS}
+
+
+def test_headers_of_the_runtime_define_only_prefixed_macros():
+    headers = [*RUNTIME.rglob("*.h"), *(ROOT / "templates").glob("*.h.jinja")]
+    assert len(headers) == 6
+    for path in headers:
+        macros = re.findall(r"^\s*#\s*define\s+(\w+)", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        assert macros and not [m for m in macros if not m.lower().startswith("msfp_")], path.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_paths_in_the_docs_exist(page):
+    text = page.read_text(encoding="utf-8")
+    links = {target.partition("#")[0] for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target}
+    for target in links - {""}:
+        assert (page.parent / target).exists(), f"{page.name} links to {target}"
+    named = re.findall(r"`((?:docs|tests|generator|templates|msfp_gen|benchmarks|build)/[\w./-]*)`", text)
+    for name in set(named) - {"build/models/"}:  # made by the first build
+        assert (ROOT / name).exists(), f"{page.name} names {name}"
+    scripts = re.findall(r"python ((?:docs|benchmarks)/\w+\.py)", text)
+    for name in scripts:
+        assert (ROOT / name).is_file(), f"{page.name} runs {name}"
+
+
+def test_anchors_in_the_docs_exist():
+    for page in PAGES:
+        for target, anchor in re.findall(r"\]\(([^)\s#]*)#([^)\s]+)\)", page.read_text(encoding="utf-8")):
+            text = (page.parent / target if target else page).read_text(encoding="utf-8")
+            titles = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+            slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+            assert anchor in slugs, f"{page.name} links to {target}#{anchor}"
+
+
+def test_tests_named_in_the_docs_exist():
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")]
+    defined = {name for source in sources for name in re.findall(r"def (test_\w+)\(", source)}
+    for page in PAGES:
+        for name in re.findall(r"`(test_\w+)`", page.read_text(encoding="utf-8")):
+            assert name in defined, f"{page.name} names {name}"
+
+
+def test_paths_of_the_project_file_exist():
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
+    folders = [*tools["setuptools"]["package-dir"].values(), *tools["pytest"]["ini_options"]["testpaths"]]
+    folders += [package.replace(".", "/") for package in tools["setuptools"]["packages"]]
+    for folder in folders:
+        assert (ROOT / folder).is_dir(), folder
+    found = {name for name, path in MODULES.items() if path.name == "__init__.py"} | {"msfp_gen.templates"}
+    assert set(tools["setuptools"]["packages"]) == found

@@ -1,0 +1,48 @@
+"""The scenes in examples/: they load, they run, and the bearings in them are those of the presets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import ROOT
+
+from msfp_gen import load_scene, presets, simulate
+
+EXAMPLES = ROOT / "examples"
+BEARINGS = {
+    "single": "single-articulated-fp",
+    "double": "double-fp",
+    "triple": "fenz-tfp",
+    "quintuple": "quintuple-fp",
+    "heating": "single-articulated-fp",
+}
+
+
+def test_one_example_for_each_kind():
+    assert {path.stem for path in EXAMPLES.glob("*.toml")} == set(BEARINGS)
+
+
+@pytest.mark.parametrize("name", BEARINGS)
+def test_bearing_is_the_preset(name):
+    found, expected = load_scene(EXAMPLES / f"{name}.toml").bearing, presets.bearing(BEARINGS[name])
+    assert found.layout == expected.layout
+    for key, values in expected.arrays().items():
+        np.testing.assert_allclose(found.arrays()[key], values, rtol=1e-12, err_msg=key)
+
+
+@pytest.mark.parametrize("name", BEARINGS)
+def test_example_runs_as_its_name_says(name):
+    scene = load_scene(EXAMPLES / f"{name}.toml")
+    assert scene.name == name
+    result = simulate(scene)
+    amplitude = float(str(scene.motion.metadata["amplitude"]))
+    assert result.succeeded
+    assert result.summary["peak_displacement"]["radial"] == pytest.approx(amplitude, rel=0.01)
+    assert result.summary["energy"]["closure_error"] < 5e-3
+    assert result.summary["rims_met"] == ([1, 6] if name == "quintuple" else [])
+
+
+@pytest.mark.parametrize("name", BEARINGS)
+def test_command_in_the_header_is_right(name):
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    assert f"#     msfp-gen run examples/{name}.toml --plot {name}.png\n" in text

@@ -1,0 +1,111 @@
+"""docs/extending.md holds: its blocks, put where it says into a copy of the sources, are a new effect that runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import ROOT
+
+LAW, NUMBER, FIELD, SWITCHES = re.findall(
+    r"```python\n(.*?)```", (ROOT / "docs" / "extending.md").read_text(encoding="utf-8"), re.DOTALL
+)
+WHERE = {
+    # The page shows the entry within the parentheses of `_LAWS`, as the formatter requires.
+    ("msfp_gen/specification/friction_laws.py", "_LAWS = (\n"): LAW.removeprefix("(\n").removesuffix(")\n"),
+    ("msfp_gen/specification/friction_laws.py", "NUMBERS: dict[str, tuple[str, str]] = {\n"): NUMBER,
+    ("msfp_gen/specification/hysteresis.py", "HYSTERESIS = {\n"): SWITCHES,
+    ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD,
+}
+SCENE = """
+from dataclasses import replace
+from msfp_gen import Effects, load_scene
+scene = load_scene("single-articulated-push")
+effects = Effects(friction="pressure", bouc_wen="rounded", dimension="planar")
+bearing = scene.bearing.replace(pressure_drop=0.02, reference_pressure=30e6)
+scene = replace(scene, bearing=bearing, effects=effects)
+"""
+
+
+@pytest.fixture(scope="module")
+def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the sources with the new effects."""
+    root = tmp_path_factory.mktemp("extended")
+    for folder in ("generator", "templates", "msfp_gen"):
+        shutil.copytree(ROOT / folder, root / folder, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    for (name, place), block in WHERE.items():
+        path = root / name
+        text = path.read_text(encoding="utf-8")
+        assert text.count(place) == 1, f"{name}: {place!r} is not there"
+        shown = place + block if place.endswith("\n") else block + place
+        path.write_text(text.replace(place, shown), encoding="utf-8")
+    return root
+
+
+def run(root: Path, code: str) -> str:
+    """What a program prints that imports the copy."""
+    environment = {**os.environ, "PYTHONPATH": str(root), "MSFP_GEN_CACHE": str(root / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_new_words_are_known_everywhere(extended: Path) -> None:
+    out = run(
+        extended,
+        f"""{SCENE}
+from msfp_gen.scene.explain import explain
+from msfp_gen.generator import generate
+from msfp_gen.cli import main
+import msfp_gen
+print(msfp_gen.__file__)
+print("\\n".join(table.text for table in explain(scene)))
+print(scene.spec.key)
+print(generate(scene.spec, "some_model").files["msfp_model.h"])
+main(["generate", "--help"])
+""",
+    )
+    assert str(extended) in out.splitlines()[0]
+    told = (
+        "it falls with pressure, by pressure_drop in the end",
+        "always on: unloading is curved",
+        "planar-locked-inertial-rims-rounded-pressure",
+        "MSFP_SURFACE_PARAMETERS_PRESSURE_DROP",
+        "what friction loses under high pressure",
+        "rounded|report|isotropic",
+    )
+    for words in told:
+        assert words in out, words
+
+
+def test_numbers_that_are_missing_are_named(extended: Path) -> None:
+    without = SCENE.replace("pressure_drop=0.02, ", "").replace("scene = replace", "try:\n    scene = replace")
+    out = run(extended, without + "except Exception as error:\n    print(error)\n")
+    assert re.search(r"surfaces\[0\]\.pressure_drop is missing .*'pressure' needs it", out)
+
+
+@pytest.mark.slow
+def test_the_new_effects_run(extended: Path) -> None:
+    """Built, the law is that of the formula, and the hysteresis that of its switches."""
+    run(
+        extended,
+        f"""{SCENE}
+import numpy as np
+from msfp_gen import simulate
+found = simulate(scene)
+rows, surface = found.history, bearing.surfaces[0]
+assert found.succeeded and found.summary["energy"]["closure_error"] < 5e-3
+p = rows.normal_force[:, 0] / (np.pi * bearing.slider_rim_radius(0) ** 2)
+want = surface.friction - 0.02 * np.tanh(p / 30e6)
+assert np.abs(rows.friction_coefficient[:, 0] - want).max() < 1e-6 * want.max()
+assert np.ptp(want) > 0 and want.max() < surface.friction
+assert np.abs(rows.friction_state[-1, 0]).max() > 0.999
+""",
+    )

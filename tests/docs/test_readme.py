@@ -1,0 +1,72 @@
+"""What the README shows works as shown."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from support import ROOT
+
+from msfp_gen import load_scene
+from msfp_gen.cli import main
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("code", blocks("python"), ids=lambda code: code.splitlines()[0][:60])
+def test_python_runs(code, tmp_path):
+    command = [sys.executable, "-W", "error", "-c", code]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip()
+
+
+def test_there_is_python_to_run():
+    assert len(blocks("python")) == 3 and len(blocks("toml")) == 1
+
+
+def test_scene_file_loads_and_runs(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_text(blocks("toml")[0], encoding="utf-8")
+    scene = load_scene(path)
+    assert scene.top.axial_load == 112e3 and scene.top.stiffness == pytest.approx(1e8) and scene.end == 10.0
+    command = next(line for line in README.splitlines() if line.startswith("msfp-gen run scene.toml"))
+    arguments = [str(tmp_path / a) if Path(a).suffix in (".toml", ".nc", ".png") else a for a in command.split()[1:]]
+    assert main(arguments) == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"scene.toml", "result.nc", "loops.png"}
+    capsys.readouterr()
+
+
+def test_every_command_is_listed(capsys):
+    main(["--help"])
+    listed = re.search(r"^Commands:\n(.*?)\n\n", capsys.readouterr().out, flags=re.MULTILINE | re.DOTALL)
+    names = {line.split()[0] for line in listed[1].splitlines() if line.startswith("  ") and line[2] != " "}
+    assert names == set(re.findall(r"^\| `msfp-gen (\w+)", README, flags=re.MULTILINE))
+
+
+def test_every_page_is_linked_and_every_link_leads_somewhere():
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/*.md")]
+    for page in pages:
+        for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert link.startswith("http") or (page.parent / link).exists(), f"{page.name}: {link}"
+    linked = set(re.findall(r"\(docs/(\w+)\.md", README))
+    assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
+
+
+def test_make_targets_exist():
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
+    pages = README + (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    wanted = set(re.findall(r"^make (\w+)", pages, flags=re.MULTILINE))
+    assert wanted and wanted <= targets
+
+
+def test_citation_names_the_version_that_is_built():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"## {version}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# What is published: sdist and wheel are built and checked, and each is installed in an empty environment. There, outside
+# the checkout, a preset runs, which builds its model from the installed sources.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bin=$PWD/.venv/bin
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+
+"$bin/python" -m build --outdir "$folder/dist" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+"$bin/python" -m twine check --strict "$folder"/dist/*
+for archive in "$folder"/dist/*; do
+    place=$folder/${archive##*.}
+    "$bin/uv" venv -q --python "$bin/python" "$place/venv"
+    "$bin/uv" pip install -q --python "$place/venv" "$archive"
+    cd "$place"
+    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen run fenz-test1 --json >summary.json
+    venv/bin/python - <<'PYTHON'
+import json, pathlib, msfp_gen
+assert "site-packages" in msfp_gen.__file__, f"not the installed package: {msfp_gen.__file__}"
+assert len(list(pathlib.Path("models").glob("msfp_5_2_2-*/manifest.json"))) == 1, "the model was not built here"
+summary = json.loads(pathlib.Path("summary.json").read_text())
+assert summary["status"] == "ok", summary
+PYTHON
+    echo "${archive##*/}: installed, a preset runs"
+done

@@ -1,0 +1,60 @@
+"""A generator small enough to build in a second, for tests of the compile room; also run in child processes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+HEADER = "double msfp_twice(double x);\nextern const double msfp_factor;\n"
+KERNEL = '#include "msfp_model.h"\n\ndouble msfp_twice(double x) { return msfp_factor * x; }\n'
+RUNTIME = '#include "msfp_model.h"\n\nconst double msfp_factor = 2.0;\n'
+WRAPPER = """\
+cdef extern from "msfp_model.h":
+    double msfp_twice(double x)
+
+
+def twice(double x):
+    return msfp_twice(x)
+"""
+STAGES = {"derive": 0.25, "lower": 0.5, "emit": 0.125}
+
+
+def sources(module: str, kernel: str = KERNEL, wrapper: str = WRAPPER) -> dict[str, str]:
+    return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, f"{module}.pyx": wrapper}
+
+
+def generate(spec: object, module: str) -> SimpleNamespace:
+    return SimpleNamespace(files=sources(module), statements=1, operations=1, stages=dict(STAGES))
+
+
+def generator(function=generate) -> ModuleType:
+    module = ModuleType("msfp_gen.generator")
+    module.generate = function
+    return module
+
+
+def write_house(house: Path) -> Path:
+    """What the cache key reads: a specification, a generator, a template and a runtime."""
+    python = {f"{folder}/one.py": "1\n" for folder in ("specification", "generator")}
+    for name, text in {**python, "templates/one.jinja": "1\n", "runtime/unit.c": RUNTIME}.items():
+        (house / name).parent.mkdir(parents=True, exist_ok=True)
+        (house / name).write_text(text)
+    return house
+
+
+def prepare_in_child(house: str) -> None:
+    """Build or find the double pendulum's fake model and say which."""
+    from msfp_gen.jit import build, cache
+    from msfp_gen.specification.layout import Layout, ModelSpec
+
+    sys.modules["msfp_gen.generator"] = generator()
+    cache.PACKAGE = Path(house)
+    info = build.prepare(ModelSpec(Layout.dfp()))
+    extension = build.load_extension(info.path, info.module)
+    tools = sorted({"sympy", "Cython", "jinja2", "filelock"} & set(sys.modules))
+    print(info.cached, extension.twice(21.0), *tools)
+
+
+if __name__ == "__main__":
+    prepare_in_child(sys.argv[1])

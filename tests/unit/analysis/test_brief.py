@@ -1,0 +1,68 @@
+"""What `print` and a notebook show of a scene, a run and its characterisation."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import preset_run
+
+import msfp_gen
+from msfp_gen import Load, Result, load_scene, simulate
+from msfp_gen.results.note import Note
+
+
+def test_a_result_prints_its_main_values_in_ten_lines() -> None:
+    result = preset_run("fenz-test2")
+    lines = str(result).splitlines()
+    assert len(lines) <= 10 and lines[0] == "Result of fenz-test2" and max(map(len, lines)) < 120
+    values = {line[2:20].strip(): line[20:] for line in lines[1:]}
+    assert values["peak displacement"] == f"{1e3 * result.summary['peak_displacement']['radial']:.4g} mm"
+    assert values["peak force"].startswith(f"{1e-3 * result.summary['peak_top_force']['radial']:.4g} kN (")
+    assert f"{result.counters.steps} steps" in values["time"] and values["status"] == "ok"
+    assert [float(x) for x in values["peak sliding"].partition(" mm")[0].split(",")] == pytest.approx(
+        1e3 * result.history.sliding.max(axis=0), rel=1e-3
+    )
+
+
+def test_many_notes_and_a_failure_stay_within_ten_lines() -> None:
+    notes = tuple(Note(float(k), "heat", 1, 2.0, "friction may heat surface 1\nby 2 K") for k in range(9))
+    result = replace(preset_run("fenz-test2"), notes=notes, status="newton", message="stopped at t = 3 s: jammed")
+    text = str(result)
+    assert len(text.splitlines()) <= 10 and "7 more in .notes" in text and "newton: stopped at t = 3 s" in text
+
+
+def test_a_notebook_shows_a_table_and_a_loop() -> None:
+    result = replace(preset_run("fenz-test2"), message="<b>&")
+    html = result._repr_html_()
+    assert "<table>" in html and "&lt;b&gt;&amp;" in html and len(html) < 20_000
+    points = np.array([pair.split(",") for pair in re.findall(r'points="([^"]+)"', html)[0].split()], dtype=float)
+    assert 200 < len(points) <= 600
+    assert points.min() == pytest.approx(8.0) and points[:, 0].max() == pytest.approx(312.0)
+    furthest = points[:, 0].argmax()
+    assert points[furthest, 1] < 100  # the loop rises to the right, and y is downwards
+
+
+def test_a_scene_prints_its_parts() -> None:
+    scene = replace(load_scene("fenz-test2"), load=Load.constant((0.0, 0.0, -1e3)))
+    lines = str(scene).splitlines()
+    assert len(lines) == 7 and lines[0] == "Scene fenz-test2" and lines[-1].split() == ["also", "load"]
+    for words in ("(n, m, p) = 5_2_2", "R = [0.473, 0.076", "axial_load=112000.0", "sliders = inertial", "rtol 0.0001"):
+        assert words in "\n".join(lines)
+
+
+def test_a_characterisation_prints_its_main_values() -> None:
+    found = preset_run("fenz-test2").characterise()
+    lines = str(found).splitlines()
+    assert len(lines) <= 10 and "2 closed cycles" in lines[1]
+    assert f"{1e-6 * (found.secant_stiffness or 0):.4g} kN/mm" in str(found)
+
+
+def test_names_that_users_look_for_are_at_the_top() -> None:
+    for name in ("Result", "InitialState", "changed_scene", "bound", "characterise"):
+        assert name in msfp_gen.__all__ and name in dir(msfp_gen) and callable(getattr(msfp_gen, name))
+    scene = msfp_gen.changed_scene("fenz-test2", {"bearing.friction": [0.05, 0.02, 0.02, 0.1], "duration": 1.0})
+    result = simulate(scene)
+    assert isinstance(result, Result) and scene.bearing.surfaces[0].friction == 0.05

@@ -1,0 +1,53 @@
+"""The compile room with the real generator: the warm path, and a folder for a plain script."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from msfp_gen import Layout, build_model
+from msfp_gen.jit.build import BuildInfo, generate_to, prepare
+from msfp_gen.specification.layout import ModelSpec
+
+WARM = """
+import json, sys
+from msfp_gen import Layout, build_model
+info = build_model(Layout.dfp()).info
+tools = sorted({"sympy", "Cython", "jinja2", "filelock", "msfp_gen.generator.derive"} & set(sys.modules))
+print(json.dumps([info.cached, str(info.path), tools]))
+"""
+
+
+def run(code: str, *options: str) -> str:
+    return subprocess.run([sys.executable, *options, "-c", code], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(scope="module")
+def built() -> BuildInfo:
+    return build_model(Layout.dfp()).info  # type: ignore[no-any-return]
+
+
+def test_stages_and_counts_of_a_build(built: BuildInfo) -> None:
+    assert list(built.stages) == ["derive", "lower", "emit", "compile"]
+    assert all(seconds > 0 for seconds in built.stages.values())
+    assert built.statements > 0 and built.operations > built.statements
+
+
+def test_second_process_takes_it_from_the_cache_without_the_tools(built: BuildInfo) -> None:
+    assert json.loads(run(WARM)) == [True, str(built.path), []]
+
+
+def test_generated_folder_serves_a_plain_script(built: BuildInfo, tmp_path: Path) -> None:
+    info = generate_to(ModelSpec(Layout.dfp()), tmp_path / "out")
+    assert info.cached and info.stages == built.stages
+    code = f"import sys; sys.path.insert(0, {str(info.folder)!r}); import msfp_3_1_1; print(msfp_3_1_1.__file__)"
+    assert run(code).strip() == str(info.path)
+
+
+def test_layouts_and_effects_have_entries_of_their_own(built: BuildInfo) -> None:
+    other = prepare(ModelSpec(Layout(2, 1, 0)))
+    assert other.folder != built.folder and other.module == "msfp_2_1_0"

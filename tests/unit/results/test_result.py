@@ -1,0 +1,202 @@
+"""Rows, dataset, summary and netCDF files of a result, on rows with known answers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import h5netcdf
+import numpy as np
+import pytest
+from support.synthetic import LOAD, history, loops, ramp, scene
+
+from msfp_gen.analysis.summary import energy_balance
+from msfp_gen.errors import InputError
+from msfp_gen.result import Counters, Result
+from msfp_gen.results.dataset import read_netcdf
+from msfp_gen.results.history import ENERGY, quantities
+from msfp_gen.scene.top import Top
+
+
+def still(surfaces: int = 1, rows: int = 3) -> Result:
+    """A bearing that does not move."""
+    zero = np.zeros((rows, 3))
+    capacities = (0.1,) * surfaces
+    return Result(scene(capacities=capacities), history(zero, zero, np.zeros((rows, surfaces)), capacities))
+
+
+def test_dataset_has_every_quantity_with_unit_and_meaning():
+    result = loops()
+    dataset = result.dataset
+    names = {name for field in result.history.arrays() for name in quantities()[field].names or (field,)} - {"time"}
+    assert names | {f"energy_{name}" for name in ENERGY} <= set(dataset.data_vars)
+    for name in ("displacement", "top_force", "sliding", "tilt", "normal_force", "gap", "Y", "Z"):
+        assert dataset[name].attrs["units"] and dataset[name].attrs["long_name"]
+    assert dataset.sizes == {
+        "time": 2001,
+        "body": 4,
+        "surface": 4,
+        "axis": 3,
+        "angle": 3,
+        "contact_angle": 2,
+        "direction": 2,
+        "event": 2,
+    }
+
+
+def test_dataset_is_addressed_by_the_numbers_of_the_report():
+    result = loops()
+    dataset = result.dataset
+    assert dataset["body"].values.tolist() == [2, 3, 4, 5]
+    np.testing.assert_array_equal(dataset["sliding"].sel(surface=4), result.history.sliding[:, 3])
+    np.testing.assert_array_equal(dataset["displacement"].sel(axis="E1"), result.history.displacement[:, 0])
+    assert np.all(dataset["Y"] == 0.25) and np.all(dataset["Z"] == -0.5)
+    assert dataset["Y"].dims == ("time", "surface")
+    assert "Bouc-Wen variable Y" in dataset["Y"].attrs["long_name"]
+
+
+def test_dataset_is_built_when_asked_for_and_once():
+    result = loops()
+    assert "dataset" not in vars(result)
+    assert result.dataset is result.dataset
+
+
+@pytest.mark.parametrize("result", [loops(), still()], ids=["with events", "without events"])
+def test_netcdf_gives_back_what_was_written(result, tmp_path):
+    path = result.to_netcdf(tmp_path / "run.nc")
+    assert path == tmp_path / "run.nc"
+    assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
+    read = read_netcdf(path)
+    assert read.equals(result.dataset)
+    assert read["displacement"].attrs == result.dataset["displacement"].attrs
+    assert (read.attrs["status"], read.attrs["title"]) == ("ok", result.scene.name)
+    assert read["event_surface"].values.tolist() == [event.surface for event in result.events]
+    assert read["event_kind"].values.tolist() == [event.kind for event in result.events]
+
+
+def test_result_comes_back_from_its_file(tmp_path):
+    result = dataclasses.replace(loops(both=True), status="stopped", message="as asked")
+    back = Result.from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
+    assert back.scene == result.scene and back.summary == result.summary
+    assert (back.counters, back.provenance) == (result.counters, result.provenance)
+    assert back.dataset.equals(result.dataset)
+
+
+def test_a_file_of_something_else_is_no_result(tmp_path):
+    import xarray as xr
+
+    xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"a\.nc.*no result"):
+        Result.from_netcdf(tmp_path / "a.nc")
+
+
+def test_failed_run_is_saved_with_its_status(tmp_path):
+    failed = dataclasses.replace(loops(), status="singular_matrix", message="t = 3 s, surface 2")
+    read = read_netcdf(failed.to_netcdf(tmp_path / "partial.nc"))
+    assert (read.attrs["status"], read.attrs["message"]) == ("singular_matrix", "t = 3 s, surface 2")
+    assert not failed.succeeded and loops().succeeded
+
+
+@pytest.mark.parametrize("name", ["run.txt", "nowhere/run.nc", "run"])
+def test_netcdf_refuses_a_path_and_writes_nothing(name, tmp_path):
+    with pytest.raises(InputError, match="output"):
+        still().to_netcdf(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_failed_write_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
+    path = tmp_path / "run.nc"
+    path.write_text("old")
+    result = still()
+    monkeypatch.setattr("os.fsync", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        result.to_netcdf(path)
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
+
+
+def test_reading_something_else_says_so(tmp_path):
+    path = tmp_path / "no.nc"
+    path.write_text("no netCDF")
+    with pytest.raises(InputError, match=r"no\.nc"):
+        read_netcdf(path)
+
+
+def test_history_refuses_a_wrong_shape_a_nan_and_no_rows():
+    rows = loops().history
+    with pytest.raises(InputError, match=r"history\.gap has shape \(2001, 3\): give \(2001, 4\)"):
+        dataclasses.replace(rows, gap=rows.gap[:, :3])
+    bad = rows.top_force.copy()
+    bad[7, 1] = np.nan
+    with pytest.raises(InputError, match=r"history\.top_force is not finite in row 7"):
+        dataclasses.replace(rows, top_force=bad)
+    with pytest.raises(InputError, match="energy"):
+        dataclasses.replace(rows, energy={"input": rows.energy["input"]})
+    with pytest.raises(InputError, match="no rows"):
+        dataclasses.replace(rows, time=rows.time[:0])
+
+
+def test_rows_that_do_not_follow_each_other_are_refused(tmp_path):
+    whole = loops().history
+    for time in (whole.time[::-1].copy(), np.where(np.arange(2001) == 7, whole.time[6], whole.time)):
+        with pytest.raises(InputError, match=r"history\.time\[\d+\] = .*rising"):
+            dataclasses.replace(whole, time=time)
+    path = loops().to_netcdf(tmp_path / "run.nc")
+    with h5netcdf.File(path, "a") as file:
+        file["time"][...] = whole.time[::-1]
+    with pytest.raises(InputError, match="rising"):
+        Result.from_netcdf(path)
+
+
+def test_summary_knows_the_answers():
+    result = loops()
+    rows, summary = result.history, result.summary
+    assert summary["name"] == "fenz-test5" and summary["status"] == "ok" and summary["duration"] == 20.0
+    assert summary["peak_displacement"] == pytest.approx({"E1": 0.14, "E2": 0, "E3": 0, "radial": 0.14}, rel=1e-3)
+    peak = np.abs(rows.top_force[:, 0]).max()
+    assert summary["peak_top_force"]["radial"] == peak
+    assert summary["peak_force_ratio"] == pytest.approx(peak / LOAD)
+    assert summary["peak_sliding"] == rows.sliding.max(axis=0).tolist()
+    assert summary["rims_met"] == [1, 4] and min(summary["minimum_gap"]) == pytest.approx(-1e-4)
+    assert summary["minimum_normal_force"] == summary["maximum_normal_force"] == [LOAD] * 4
+    assert summary["counters"]["steps"] == 2000 and "wall_time" not in summary["counters"]
+    assert summary["real_time_factor"] == 80.0
+    assert "transitions" not in summary
+
+
+def test_summary_is_json():
+    for result in (loops(both=True), ramp(), still()):
+        assert json.loads(json.dumps(result.summary, allow_nan=False)) == result.summary
+
+
+def test_peak_of_the_radius_is_not_the_radius_of_the_peaks():
+    u = np.array([[0.03, 0, 0], [0, 0.04, 0], [0.02, 0.02, 0]])
+    result = Result(scene(capacities=(0.1,)), history(u, 0 * u, np.zeros((3, 1)), (0.1,)))
+    assert result.summary["peak_displacement"] == {"E1": 0.03, "E2": 0.04, "E3": 0.0, "radial": 0.04}
+
+
+def test_energy_balance_divides_by_the_peak_input():
+    balance = energy_balance(loops().history)
+    assert balance == pytest.approx({"peak_input": 2000.0, "closure_error": 5e-4, "dissipated_share": 0.9})
+    rows = still().history
+    nothing = dataclasses.replace(rows, energy={name: np.zeros(3) for name in ENERGY})
+    assert energy_balance(nothing) == {"peak_input": 0.0, "closure_error": None, "dissipated_share": None}
+
+
+@pytest.mark.parametrize(
+    ("top", "load"),
+    [
+        (Top.rig(axial_load=5e3, stiffness=1.0), 5e3),
+        (Top.prescribed(force=(1.0, 2.0, -7e3)), 7e3),
+        (Top.prescribed(force=(1.0, 2.0, 0.0)), None),
+        (Top.mass(mass=100.0, inertia=1.0, height=1.0), 980.0),
+    ],
+)
+def test_axial_load_of_every_top(top, load):
+    result = still()
+    result = dataclasses.replace(result, scene=dataclasses.replace(result.scene, top=top))
+    assert result.summary["axial_load"] == pytest.approx(load)
+    assert (result.summary["peak_force_ratio"] is None) == (load is None)
+
+
+def test_no_time_taken_is_no_infinite_speed():
+    assert dataclasses.replace(still(), counters=Counters()).summary["real_time_factor"] is None

@@ -1,0 +1,324 @@
+"""Effects chosen from the scene; watches over what is left out, and what follows when one trips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from msfp_gen import Auto, Effects, InputError, Load, Motion, RunError, Scene, Top, load_scene, presets, simulate
+from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.result import Result
+from msfp_gen.scene.effect_selection import EffectSelection
+from msfp_gen.scene.explain import explain
+from msfp_gen.scene.file.loader import scene_from_table
+from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.simulation.effect_switching import next_effects
+
+FULL = Effects()
+STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
+TEST2 = replace(load_scene("fenz-test2"), output_step=0.02)
+
+
+def chosen(scene: Scene, effect: str) -> tuple[object, str]:
+    """The choice of one effect and what it rests on."""
+    reason = next(reason for reason in scene.effect_selection.reasons if reason.effect == effect)
+    return reason.chosen, reason.because
+
+
+def with_selection(scene: Scene, **effects: Any) -> Scene:
+    """The same scene started with other effects than selected: those of a wrong selection."""
+    again = replace(scene)
+    again.__dict__["effect_selection"] = EffectSelection(replace(scene.modelled, **effects))
+    return again
+
+
+def apart(one: Result, other: Result) -> float:
+    """Largest difference of the top force over its horizontal peak."""
+    first, second = one.history.top_force, other.history.top_force
+    return float(np.abs(first - second).max() / np.abs(second[:, :2]).max())
+
+
+def kinds(result: Result) -> list[str]:
+    """What a run went on with more for."""
+    return [note.kind for note in result.notes if note.action]
+
+
+# ---- the choice ---------------------------------------------------------------------------------------------------
+
+
+def test_motion_loads_and_start_decide_the_plane() -> None:
+    across = Load.constant((0.0, 1e3, 0.0))
+    aslant = Motion.harmonic(0.05, 0.5, direction=0.4)
+    for scene, word in [
+        (replace(TEST2, effects=Auto()), "planar"),
+        (replace(TEST2, effects=Auto(), motion=aslant, duration=None), "planar"),
+        (replace(TEST2, effects=Auto(), load=across), "spatial"),
+        (replace(TEST2, effects=Auto(), motion=Motion.circle(0.05, 1.0), duration=None), "spatial"),
+        (replace(TEST2, effects=Auto(dimension="spatial")), "spatial"),
+    ]:
+        assert chosen(scene, "dimension")[0] == word == scene.modelled.dimension
+    assert "22.92 deg" in chosen(replace(TEST2, effects=Auto(), motion=aslant, duration=None), "dimension")[1]
+
+
+def test_masses_and_loads_decide_inertia() -> None:
+    light = replace(TEST2, effects=Auto(), top=replace(TEST2.top, axial_load=50.0))
+    quick = replace(light, motion=Motion.harmonic(0.05, 2.0), duration=None)
+    heavy = replace(TEST2, effects=Auto())
+    assert chosen(heavy, "sliders")[0] == "massless"
+    assert chosen(quick, "sliders")[0] == "inertial" and "of N" in chosen(quick, "sliders")[1]
+    assert chosen(replace(heavy, effects=Auto(spin="free")), "sliders")[0] == "inertial"
+    explicit = replace(heavy, solver=replace(heavy.solver, method="dopri5"))
+    assert chosen(explicit, "sliders")[0] == "inertial"
+
+
+def test_loads_decide_uplift_and_capacity_decides_rims() -> None:
+    heavy = replace(TEST2, effects=Auto())
+    lifted = replace(heavy, load=Load.ramp((0.0, 0.0, 0.9 * 112e3), duration=3.0))
+    assert chosen(heavy, "uplift")[0] is False and chosen(lifted, "uplift")[0] is True
+    assert lifted.modelled.sliders == "inertial"
+    gentle = replace(heavy, motion=Motion.harmonic(0.004, 0.5), duration=None)
+    assert chosen(heavy, "rims")[0] is True and chosen(gentle, "rims")[0] is False
+    assert "21.5 mm" in chosen(gentle, "rims")[1]
+
+
+def test_what_a_file_leaves_out_is_chosen_and_what_it_gives_stands() -> None:
+    table = {
+        "bearing": "fenz-tfp",
+        "motion": {"kind": "harmonic", "amplitude": 0.05, "frequency": 0.5},
+        "top": {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "rotational_stiffness": 1e6},
+    }
+    assert scene_from_table(table).effects == Auto() == scene_from_table({**table, "effects": "auto"}).effects
+    assert scene_from_table({**table, "effects": {"rims": False}}).effects == Auto(rims=False)
+    everything = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
+    assert scene_from_table({**table, "effects": everything}).effects == FULL
+    assert load_scene("fenz-test2").effects == FULL  # presets are the report's model
+    with pytest.raises(InputError, match="effects = 'all'"):
+        scene_from_table({**table, "effects": "all"})
+    with pytest.raises(InputError, match=r"effects\.error = 2"):
+        Auto(error=2.0)
+
+
+def test_explain_says_what_each_choice_rests_on_and_saves() -> None:
+    table = next(t for t in explain(replace(TEST2, effects=Auto())) if t.title.startswith("effects"))
+    text = "\n".join(" ".join(row) for row in table.rows)
+    for words in (
+        "vertical plane at azimuth 0 deg",
+        "of N",
+        "smallest capacity",
+        "of the load at rest",
+        "in place of 8",
+    ):
+        assert words in text, words
+
+
+# ---- what is left out does not matter -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["fenz-test1", "fenz-test2", "fenz-test5", "becker-eight-125"])
+def test_the_chosen_effects_give_the_answer_of_all(name: str) -> None:
+    scene = replace(load_scene(name), output_step=0.05)
+    fewer = simulate(replace(scene, effects=Auto()))
+    assert "massless" in fewer.provenance["model"] and not kinds(fewer)
+    assert apart(fewer, simulate(scene)) < 5e-3
+
+
+def test_a_planar_run_lies_in_any_plane() -> None:
+    aslant = replace(TEST2, motion=Motion.harmonic(0.05, 0.2, cycles=1, direction=0.7), duration=None)
+    result = simulate(replace(aslant, effects=Auto(bouc_wen="isotropic")))
+    assert "planar" in result.provenance["model"]
+    assert apart(result, simulate(replace(aslant, effects=Effects(bouc_wen="isotropic")))) < 5e-3
+
+
+# ---- the watches --------------------------------------------------------------------------------------
+
+
+def test_motion_that_leaves_its_plane_is_followed_out_of_it() -> None:
+    time = np.linspace(0.0, 12.0, 601)
+    moved = np.zeros((601, 3))
+    moved[:, 0] = 0.05 * np.sin(np.pi * time) * np.sin(np.pi * np.clip(time / 8, 0, 1)) ** 2
+    moved[:, 1] = 0.02 * np.sin(np.pi * np.clip(time - 8, 0, None) / 4) ** 3
+    scene = replace(TEST2, motion=Motion.from_arrays(time, moved), duration=None)
+    result = simulate(replace(scene, effects=Auto()))
+    full = simulate(scene)
+    assert kinds(result) == ["plane"] and "planar" in result.provenance["model"].split(", then ")[0]
+    np.testing.assert_array_equal(result.history.time, full.history.time)
+    assert apart(result, full) < 1e-3
+    flat = simulate(with_selection(replace(scene, effects=Auto()), dimension="planar"))  # what ignoring it would say
+    assert apart(flat, full) > 0.2
+    assert result.summary["energy"]["closure_error"] < 1e-3
+
+
+def test_sliders_get_their_mass_back_when_the_load_falls() -> None:
+    load = Load.from_arrays([0, 1, 3, 40], np.outer([0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 111.95e3]))
+    top = Top.rig(112e3, stiffness=1e6, damping=5.0, rotational_stiffness=1e5, rotational_damping=5.0)
+    motion = Motion.harmonic(0.05, 1.0, cycles=4)
+    scene = Scene(presets.bearing("fenz-tfp"), motion, top, load=load, output_step=0.005, effects=Auto(uplift=False))
+    scene = replace(scene, solver=replace(scene.solver, rtol=1e-5))
+    result, full = simulate(scene), simulate(replace(scene, effects=Effects(dimension="planar")))
+    assert kinds(result) == ["inertia"] and result.provenance["model"].count("massless") == 1
+    ignored = simulate(replace(scene, effects=Auto(uplift=False, sliders="massless")))
+    assert [note.kind for note in ignored.notes if note.kind == "inertia"] and not kinds(ignored)
+
+    def peak(result: Result) -> float:
+        return float(np.abs(result.history.top_force[result.history.time > 3.2, 0]).max())
+
+    # Light bodies ring for long without damping: their phase is nobody's business, their force is.
+    assert peak(result) == pytest.approx(peak(full), rel=0.03) and peak(ignored) < 0.87 * peak(full)
+
+
+def test_rims_are_there_when_a_slider_comes_to_them() -> None:
+    scene = replace(load_scene("fenz-test5"), output_step=0.1, duration=60.0, effects=Auto())
+    full = simulate(replace(scene, effects=FULL))
+    blind = with_selection(scene, rims=False)
+    result = simulate(blind)
+    assert kinds(result) == ["rims"] and result.notes[0].value > 0
+    assert apart(result, full) < 5e-3
+    ignored = simulate(replace(scene, effects=Auto(rims=False)))
+    assert apart(ignored, full) > 0.05 and next(note.kind for note in ignored.notes) == "rims"
+    with pytest.raises(RunError, match="beyond the capacity") as error:
+        simulate(blind, strict=True)
+    assert error.value.status == "guard" and isinstance(error.value.result, Result)
+    assert error.value.result.history.time[-1] == pytest.approx(result.notes[0].time, abs=0.1)
+    assert error.value.result.history.gap.min() > 0
+
+
+def test_a_bearing_that_parts_is_followed_into_flight() -> None:
+    """A jerk that unloads the bearing for a fifth of a second."""
+    weight = 11e3 * 9.80665
+    load = Load.from_arrays([0, 1, 1.05, 1.15, 1.2, 4], np.outer([0, 0, 1, 1, 0, 0], [0.0, 0.0, 1.5 * weight]))
+    top = Top.mass(11e3, 4e3, 0.3, rotational_stiffness=1e7, rotational_damping=1e4)
+    scene = Scene(presets.bearing("double-fp"), STILL, top, load=load, output_step=0.005, duration=1.5, effects=Auto())
+    assert chosen(scene, "uplift")[0] is True
+    known = simulate(scene)
+    result = simulate(with_selection(scene, uplift=False, sliders="massless"))
+    assert "uplift" in kinds(result) and result.history.lift is not None and known.history.lift is not None
+    flown = result.history.top_displacement[:, 2].max()
+    assert flown > 0.01 and flown == pytest.approx(known.history.top_displacement[:, 2].max(), rel=1e-2)
+    assert result.summary["energy"]["closure_error"] < 5e-3
+    with pytest.raises(RunError, match="would have to pull"):
+        simulate(replace(scene, effects=Effects(dimension="planar")))
+
+
+def kumar() -> Scene:
+    """Strokes that heat: a triple pendulum whose surfaces carry the numbers of Kumar et al. (2015)."""
+    bearing = presets.bearing("fenz-tfp").replace(reference_pressure=15e6)
+    return replace(TEST2, bearing=bearing, motion=Motion.harmonic(0.08, 0.5, cycles=8), duration=None, effects=Auto())
+
+
+def test_heat_is_followed_once_it_matters() -> None:
+    scene = kumar()
+    assert chosen(scene, "friction")[0] == "pv"
+    result = simulate(scene)
+    full = simulate(replace(scene, effects=Effects(friction="pvt")))
+    assert "heat" in kinds(result) and result.history.temperature is not None
+    assert apart(result, full) < 0.01
+    ignored = simulate(replace(scene, effects=Auto(friction="pv")))
+    assert apart(ignored, full) > 0.05
+    assert [note.kind for note in ignored.notes] == ["heat"]
+
+
+def test_heat_without_numbers_is_noted() -> None:
+    scene = replace(TEST2, motion=Motion.harmonic(0.08, 0.5, cycles=8), duration=None)
+    result = simulate(scene)
+    assert [note.kind for note in result.notes] == ["heat"] and "K" in result.notes[0].line
+    assert result.summary["notes"] == [note.line for note in result.notes]
+
+
+def test_a_watch_bounds_the_heat_from_above() -> None:
+    """The bound holds against the temperature that the law of Kumar et al. itself computes."""
+    full = simulate(replace(kumar(), effects=Effects(friction="pvt")))
+    noted = next(note for note in simulate(kumar()).notes if note.kind == "heat")
+    assert full.history.temperature is not None
+    before = full.history.time <= noted.time
+    assert full.history.temperature[before].max() - 20.0 <= noted.value
+
+
+# ---- going on -----------------------------------------------------------------------------------------
+
+
+def test_positions_and_friction_are_carried_over_exactly() -> None:
+    scene = replace(kumar(), output_step=None)
+    result = simulate(with_selection(scene, rims=True))
+    time = next(note.time for note in result.notes if note.action)
+    row = int(np.searchsorted(result.history.time, time))
+    assert result.history.time[row] == time
+    assert np.all(np.diff(result.history.time) > 0)
+    alone = simulate(replace(scene, effects=Auto(friction="pv")))
+    for name in ("tilt_angles", "friction_state", "tilt_rates"):
+        np.testing.assert_array_equal(getattr(result.history, name)[: row + 1], getattr(alone.history, name)[: row + 1])
+
+
+def test_notes_are_kept_in_the_file(tmp_path: Any) -> None:
+    result = simulate(kumar())
+    again = Result.from_netcdf(result.to_netcdf(tmp_path / "out.nc"))
+    assert again.notes == result.notes and again.scene == result.scene
+
+
+def test_a_run_of_several_models_resumes_to_the_same_rows(tmp_path: Any) -> None:
+    scene, path = kumar(), tmp_path / "run.ck"
+    whole = simulate(scene)
+    first = simulate(scene, checkpoint=path, every=0.0)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.ck.2"]  # the first was over before it could be kept
+    with pytest.raises(InputError, match=r"run\.ck\.2' exists"):
+        simulate(scene, checkpoint=path)
+    again = simulate(scene, checkpoint=path, every=0.0, resume=True)
+    for result in (first, again):
+        np.testing.assert_array_equal(result.history.top_force, whole.history.top_force)
+        assert result.notes == whole.notes
+
+
+def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:
+    """Heat without numbers can only be noted; inertia, in the same step, is answered."""
+    scene = replace(TEST2, effects=Auto())
+    segment = SimpleNamespace(
+        status="guard",
+        run=SimpleNamespace(row_count=1, time=1.0, trips={"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}),
+    )
+    assert next_effects(scene, scene.modelled, segment) == replace(scene.modelled, sliders="inertial")  # type: ignore[arg-type]
+
+
+def test_displacements_go_on_from_their_start_in_the_frame_of_the_user() -> None:
+    """A planar run aslant, begun off centre, that becomes spatial: events measure from where the first run began."""
+    time = np.linspace(0.0, 6.0, 301)
+    moved = np.outer(0.02 * np.sin(np.pi * time) * np.sin(np.pi * np.clip(time / 4, 0, 1)) ** 2, [0.0, 1.0, 0.0])
+    moved[:, 0] = 0.05 * np.sin(np.pi * np.clip(time - 4, 0, None) / 4) ** 3
+    tilt = np.zeros((4, 3))
+    tilt[:, 0] = 0.01, -0.02, 0.02, -0.01
+    start = InitialState(tilt.tolist(), np.zeros((4, 3)).tolist(), np.zeros((4, 2)).tolist())
+    scene = replace(TEST2, motion=Motion.from_arrays(time, moved), duration=None, initial_state=start)
+    whole = simulate(replace(scene, effects=FULL))
+    far = 0.9 * whole.history.horizontal[whole.history.time > 4.5].max()
+    assert whole.history.horizontal[whole.history.time < 4.0].max() < far
+    stop = Stop(displacement=float(far))
+    stopped = [simulate(replace(scene, effects=each, stop=stop)) for each in (Auto(sliders="inertial"), FULL)]
+    assert kinds(stopped[0]) == ["plane"] and [result.status for result in stopped] == ["stopped", "stopped"]
+    times = [result.history.time[-1] for result in stopped]
+    assert times[0] == pytest.approx(times[1], abs=2e-3)
+    assert np.hypot(*stopped[0].events[-1].displacement[:2]) == pytest.approx(far, rel=1e-3)
+
+
+def test_energies_are_continuous_over_a_change_of_models() -> None:
+    """Every term goes on from where it stood: the first step after moves it no more than those beside."""
+    load = Load.from_arrays([0, 1, 3, 40], np.outer([0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 111.95e3]))
+    motion, top = Motion.harmonic(0.05, 1.0, cycles=4), Top.rig(112e3, 1e8, damping=5.0, rotational_stiffness=1e6)
+    falling = Scene(presets.bearing("fenz-tfp"), motion, top, load=load, effects=Auto(uplift=False))
+    leaving = replace(load_scene("fenz-test5"), duration=60.0, effects=Auto())
+    for scene, fewer, model in [
+        (falling, {}, Effects(dimension="planar")),
+        (replace(kumar(), duration=2.0, output_step=None), {}, Effects(friction="pvt")),
+        (leaving, {"rims": False}, FULL),
+    ]:
+        result = simulate(with_selection(scene, **fewer) if fewer else scene)
+        time = next(note.time for note in result.notes if note.action)
+        at, whole = result.history, simulate(replace(scene, effects=model)).history
+        row, size = int(np.searchsorted(at.time, time)), max(np.abs(values).max() for values in at.energy.values())
+        assert 5 < row < len(at.time) - 10 and at.time[row] == time
+        for name, values in at.energy.items():
+            change = np.abs(np.diff(values))
+            assert change[row] <= 10 * np.median(change[row - 5 : row + 5]) + 1e-5 * size, name
+            ends = [np.interp(min(at.time[-1], whole.time[-1]), h.time, h.energy[name]) for h in (at, whole)]
+            assert ends[0] == pytest.approx(ends[1], abs=0.02 * size), name

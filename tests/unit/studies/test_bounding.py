@@ -1,0 +1,314 @@
+"""Bounding analysis: the codes' formulas, bad tables, closed forms of the bounds, and what the command leaves."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import re
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT
+from support.synthetic import loops
+
+from msfp_gen import (
+    Bearing,
+    Body,
+    Effects,
+    InputError,
+    Layout,
+    Motion,
+    RunError,
+    Scene,
+    Solver,
+    Surface,
+    Top,
+    load_scene,
+)
+from msfp_gen.cli import main
+from msfp_gen.studies.bounding import Bounds, bound, bounded_scenes, factor_tables, load_factors
+from msfp_gen.studies.bounding.figure import plot_bounds
+from msfp_gen.studies.bounding.runs import _scaled
+
+ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def pair(table: Any) -> tuple[float, float]:
+    (factor,) = table.factors
+    found: tuple[float, float] = table.combined(factor)
+    return found
+
+
+def test_asce_adjusts_the_product_of_environmental_factors() -> None:
+    assert pair(load_factors("asce7")) == pytest.approx(ASCE)
+    assert pair(load_factors("asce7-quality")) == pytest.approx((0.95 * 0.85, (1 + 0.75 * 0.21) * 1.2 * 1.15))
+
+
+def test_asce_lower_factors_are_adjusted_the_same_way(tmp_path: Path) -> None:
+    """lambda_min = (1 - 0.75 (1 - lambda_ae,min)) lambda_test,min."""
+    text = (
+        'rule = "asce7"\n[[factor]]\nproperty = "friction"\nenvironment = { a = [0.8, 1] }\ndirect = { t = [0.9, 1] }\n'
+    )
+    assert pair(load_factors(written(tmp_path, text))) == pytest.approx(((1 - 0.75 * 0.2) * 0.9, 1.0))
+
+
+@pytest.mark.parametrize(("name", "adjustment"), [("en1998-2", 0.70), ("aashto", 0.75)])
+def test_european_and_bridge_rules_adjust_each_factor(name: str, adjustment: float) -> None:
+    low, high = pair(load_factors(name))
+    assert low == 1.0
+    assert high == pytest.approx((1 + adjustment * 0.1) * (1 + adjustment * 0.2))
+
+
+def test_limits_hold_where_the_factors_do_not_reach_them(tmp_path: Path) -> None:
+    text = 'rule = "asce7"\nlimits = [0.6, 1.8]\n[[factor]]\nproperty = "friction"\ndirect = { test = [0.9, 1.2] }\n'
+    path = written(tmp_path, text)
+    assert pair(load_factors(path)) == (0.6, 1.8)
+    path.write_text(text.replace("limits = [0.6, 1.8]\n", ""), encoding="utf-8")
+    assert pair(load_factors(path)) == pytest.approx((0.9, 1.2))
+
+
+def test_every_table_that_comes_along_says_where_it_is_from() -> None:
+    known = factor_tables()
+    assert set(known) == {"aashto", "asce7", "asce7-quality", "en1998-2"} and all(known.values())
+    for name in known:
+        table = load_factors(name)
+        low, high = pair(table)
+        assert table.source and low <= 1 <= high
+
+
+def test_a_printed_table_is_a_file_that_reads_back(tmp_path: Path, capsys: Any) -> None:
+    assert main(["factors", "en1998-2"]) == 0
+    path = written(tmp_path, capsys.readouterr().out)
+    assert dataclasses.replace(load_factors(path), name="en1998-2") == load_factors("en1998-2")
+    assert main(["factors"]) == 0
+    out = capsys.readouterr().out
+    assert all(name in out and description in out for name, description in factor_tables().items())
+
+
+PAGE = (ROOT / "docs" / "bounding.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_a_table_that_loads_and_numbers_that_come_out(tmp_path: Path) -> None:
+    (block,) = re.findall(r"^```toml\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
+    table = load_factors(written(tmp_path, block))
+    assert [factor.surfaces for factor in table.factors] == [(1, 4), (2, 3)]
+    for name in factor_tables():
+        numbers = re.search(rf"^\| `{name}` \| ([\d.]+), ([\d.]+) \|", PAGE, flags=re.MULTILINE)
+        assert numbers is not None
+        assert pair(load_factors(name)) == pytest.approx([float(number) for number in numbers.groups()], abs=5e-4)
+
+
+@pytest.mark.parametrize("page", ["bounding.md", "characterise.md"])
+def test_python_on_the_pages_runs(page: str, capsys: Any) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    exec(block, {})
+    assert capsys.readouterr().out.strip()
+
+
+FRICTION = '[[factor]]\nproperty = "friction"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("rule = \n", ["no valid TOML"]),
+        (FRICTION + "direct = { test = [0.9, 1.1] }\n", ["rule is missing", "asce7", "aashto"]),
+        ('rule = "asce"\n' + FRICTION, ["rule = 'asce'", "asce7"]),
+        ('rule = "aashto"\n' + FRICTION + "direct = { test = [0.9, 1.1] }\n", ["adjustment is missing", "0.66"]),
+        ('rule = "asce7"\nadjustment = 75\n' + FRICTION + "direct = { t = [1, 1] }\n", ["adjustment = 75", "0.75"]),
+        ('rule = "asce7"\nadjustment = nan\n' + FRICTION + "direct = { t = [1, 1] }\n", ["adjustment = nan"]),
+        ('rule = "asce7"\nlimits = [1.8, 0.6]\n' + FRICTION + "direct = { t = [1, 1] }\n", ["limits", "least <= 1"]),
+        ('rule = "asce7"\n', ["factor is missing", "[[factor]]"]),
+        ('rule = "asce7"\nfactor = 3\n', ["factor is missing"]),
+        ('rule = "asce7"\nadjustmnt = 1\n' + FRICTION, ["adjustmnt: unknown key", "adjustment"]),
+        ('rule = "asce7"\n' + FRICTION + "enviroment = { a = [1, 1] }\n", ["factor[0].enviroment", "environment"]),
+        ('rule = "asce7"\n[[factor]]\ndirect = { t = [1, 1] }\n', ["factor[0].property is missing", "friction"]),
+        ('rule = "asce7"\n[[factor]]\nproperty = "mu"\n', ["factor[0].property = 'mu'"]),
+        ('rule = "asce7"\n' + FRICTION, ["factor[0]: no causes"]),
+        ('rule = "asce7"\n' + FRICTION + "direct = 3\n", ["factor[0].direct = 3", "causes"]),
+        ('rule = "asce7"\n' + FRICTION + "direct = { test = 1.1 }\n", ["factor[0].direct.test = 1.1"]),
+        ('rule = "asce7"\n' + FRICTION + "direct = { test = [1.1, 1.2] }\n", ["factor[0].direct.test", "least <= 1"]),
+        ('rule = "asce7"\n' + FRICTION + "direct = { test = [-1, 1.2] }\n", ["factor[0].direct.test", "above 0"]),
+        ('rule = "asce7"\n' + FRICTION + "direct = { test = [0.9, inf] }\n", ["factor[0].direct.test", "finite"]),
+        ('rule = "asce7"\n' + FRICTION + "surfaces = [0]\ndirect = { t = [1, 1] }\n", ["factor[0].surfaces"]),
+        ('rule = "asce7"\n' + FRICTION + "surfaces = []\ndirect = { t = [1, 1] }\n", ["factor[0].surfaces = []"]),
+        ('rule = "asce7"\n' + FRICTION + "surfaces = [9]\ndirect = { t = [1, 1] }\n", ["9", "surfaces 1 to 4"]),
+        ('rule = "asce7"\n' + 2 * (FRICTION + "direct = { t = [1, 1] }\n"), ["factor[1]", "already"]),
+    ],
+)
+def test_a_bad_table_is_one_line_and_nothing_is_written(
+    text: str, words: list[str], tmp_path: Path, capsys: Any
+) -> None:
+    path = written(tmp_path, text)
+    assert main(["bound", "fenz-test2", "--factors", str(path), "-o", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("error: ") and err.count("\n") == 1
+    assert all(word in err for word in words), err
+    assert [item.name for item in tmp_path.iterdir()] == ["mine.toml"]
+
+
+def test_unknown_tables_and_bytes_that_are_no_text(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"did you mean 'asce7'"):
+        load_factors("asce")
+    (tmp_path / "bytes.toml").write_bytes(b"rule = '\xff'")
+    with pytest.raises(InputError, match="no UTF-8 text at byte 8"):
+        load_factors(tmp_path / "bytes.toml")
+
+
+def test_scenes_have_their_properties_multiplied(tmp_path: Path) -> None:
+    text = (
+        'rule = "asce7"\n[[factor]]\nproperty = "friction"\nsurfaces = [1, 4]\ndirect = { t = [0.5, 2] }\n'
+        '[[factor]]\nproperty = "friction"\nsurfaces = [2]\ndirect = { t = [0.8, 1.5] }\n'
+        '[[factor]]\nproperty = "rim_stiffness"\ndirect = { t = [0.9, 1.1] }\n'
+    )
+    scene = load_scene("fenz-test2")
+    scenes = bounded_scenes(scene, load_factors(written(tmp_path, text)))
+    assert list(scenes) == ["lower", "nominal", "upper"] and scenes["nominal"] is scene
+    given = np.array([surface.friction for surface in scene.bearing.surfaces])
+    for case, factors, rim in (("lower", (0.5, 0.8, 1, 0.5), 0.9), ("upper", (2, 1.5, 1, 2), 1.1)):
+        surfaces = scenes[case].bearing.surfaces
+        assert [s.friction for s in surfaces] == pytest.approx(given * factors)
+        assert [s.rim_stiffness for s in surfaces] == pytest.approx([1e7 * rim] * 4)
+        assert [s.radius for s in surfaces] == [s.radius for s in scene.bearing.surfaces]
+        assert scenes[case].name == f"fenz-test2, {case}"
+
+
+def test_a_second_coefficient_of_friction_goes_with_the_first() -> None:
+    """Where every surface has it: a law that takes none leaves it out."""
+    changed: dict[str, Any] = {}
+    surfaces = [SimpleNamespace(friction=0.1, friction_slow=0.04), SimpleNamespace(friction=0.2, friction_slow=0.08)]
+    bearing: Any = SimpleNamespace(surfaces=surfaces, replace=lambda **given: changed.update(given) or bearing)
+    _scaled(bearing, "friction_slow", (0.5, 2.0))
+    assert changed == {"friction_slow": [0.02, 0.16]}
+    surfaces[1].friction_slow, plain = None, dict(changed)
+    assert _scaled(bearing, "friction_slow", (0.1, 0.1)) is bearing and changed == plain
+
+
+@cache
+def single() -> Bounds:
+    """A single pendulum under a free plate, pushed slowly, at the bounds of ASCE 7."""
+    top = Body(height=0.02, centroid=0.01, mass=0.1, inertia=(1e-4, 1e-4), rim_radius=0.05)
+    surface = Surface(radius=0.5, capacity=0.3, friction=0.05, yield_displacement=1e-5)
+    bearing = Bearing(layout=Layout(2, 1, 0), base_height=0.01, surfaces=[surface], bodies=[top])
+    scene = Scene(
+        bearing,
+        Motion.harmonic(0.1, 0.01, cycles=1.0),
+        Top.rig(axial_load=1e5, stiffness=1e10),
+        Effects(dimension="planar", sliders="massless", rims=False),
+        Solver(rtol=1e-6),
+        output_step=0.05,
+    )
+    return bound(scene, load_factors("asce7"))
+
+
+def test_bounds_of_a_single_pendulum_in_closed_form() -> None:
+    """Q = N tan b, sin b = mu R/sqrt(1 + mu^2)/L, for each case; forces follow the upper, damping too."""
+    found = single()
+    assert found.succeeded and found.lambdas["friction"]["nominal"] == (1.0,)
+    numbers = found.quantities()
+    for case, factor in zip(("lower", "nominal", "upper"), (ASCE[0], 1.0, ASCE[1]), strict=True):
+        mu = 0.05 * factor
+        circle = np.arcsin(mu * 0.5 / np.hypot(1, mu) / 0.48)
+        assert numbers["zero_displacement_force"][case] == pytest.approx(1e5 * np.tan(circle), rel=2e-3)
+        force = 1e5 * np.tan(np.arcsin(0.1 / 0.48) + circle)
+        assert numbers["peak_force"][case] == pytest.approx(force, rel=2e-3)
+    assert found.governing()["peak_force"] == "upper" and found.governing()["peak_heat_flux_1"] == "upper"
+    damping = numbers["effective_damping"]
+    assert damping["lower"] < damping["nominal"] < damping["upper"]  # type: ignore[operator]
+    assert "effective_damping" not in found.governing()  # neither end of it is the worse
+
+
+def test_the_nominal_case_is_the_scene_itself() -> None:
+    nominal = single().cases[1]
+    assert nominal.name == "nominal" and nominal.result is not None and nominal.found is not None
+    assert nominal.found.as_dict() == nominal.result.characterise().as_dict()
+    assert nominal.scene.bearing.surfaces[0].friction == 0.05
+
+
+def test_json_holds_every_case_and_no_nan() -> None:
+    table = json.loads(json.dumps(single().as_dict(), allow_nan=False))
+    assert list(table["cases"]) == ["lower", "nominal", "upper"]
+    assert table["factors"]["lambdas"]["friction"]["upper"] == pytest.approx([ASCE[1]])
+    assert table["cases"]["upper"]["characterisation"]["cycles"][0]["number"] == 1
+
+
+def test_figure_overlays_the_three_loops(tmp_path: Path) -> None:
+    figure = plot_bounds(single(), tmp_path / "bounds.png")
+    (axes,) = figure.axes
+    assert len({line.get_color() for line in axes.get_lines()}) == 3
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["lower: friction × 0.595", "nominal: friction × 1", "upper: friction × 2.12"]
+    assert (tmp_path / "bounds.png").stat().st_size > 10_000
+
+
+@pytest.fixture
+def upper_fails(monkeypatch: Any) -> None:
+    def simulate(scene: Scene, *, progress: Any = None) -> Any:
+        run = dataclasses.replace(loops(), scene=scene)
+        if scene.name.endswith("upper"):
+            run = dataclasses.replace(run, status="newton", message="t = 3 s")
+            raise RunError("stopped at t = 3 s: jammed", status="newton", result=run)
+        return run
+
+    monkeypatch.setattr("msfp_gen.studies.bounding.runs.simulate", simulate)
+    monkeypatch.setattr("msfp_gen.model.model.build_model", lambda *_, **__: None)
+
+
+def test_a_bound_that_fails_leaves_the_others(upper_fails: None, tmp_path: Path, capsys: Any) -> None:
+    folder = tmp_path / "out"
+    assert main(["bound", "fenz-test5", "-o", str(folder)]) == 1
+    out, err = capsys.readouterr()
+    assert "runs that failed" in out and "jammed" in out
+    assert err.splitlines()[-1] == "error: not all cases could be run; upper: stopped at t = 3 s: jammed"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "bounds.csv",
+        "bounds.png",
+        "lower.nc",
+        "nominal.nc",
+        "upper.nc",
+    ]
+    rows = {row["quantity"]: row for row in csv.DictReader((folder / "bounds.csv").read_text("utf-8").splitlines())}
+    assert rows["peak_force [N]"]["upper"] == "" and float(rows["peak_force [N]"]["lower"]) > 0
+    assert rows["peak_force [N]"]["governs"] == ""  # nothing governs what was not compared
+
+
+def test_an_interruption_stops_all_runs(monkeypatch: Any) -> None:
+    def simulate(scene: Scene, **_: Any) -> Any:
+        raise RunError("interrupted", status="interrupted")
+
+    monkeypatch.setattr("msfp_gen.studies.bounding.runs.simulate", simulate)
+    with pytest.raises(RunError, match="interrupted"):
+        bound(load_scene("fenz-test2"), load_factors("asce7"))
+
+
+def test_command_on_a_test_of_the_report(tmp_path: Path, capsys: Any) -> None:
+    folder = tmp_path / "new" / "bounds"
+    folder.parent.mkdir()
+    assert main(["bound", "fenz-test2", "--factors", "asce7-quality", "-o", str(folder)]) == 0
+    out, err = capsys.readouterr()
+    for words in ("asce7-quality", "not compared with the standard", "zero displacement force [kN]", "governs"):
+        assert words in out
+    assert [line.split("/")[-1] for line in err.splitlines() if line.startswith("wrote")] == [
+        "lower.nc",
+        "nominal.nc",
+        "upper.nc",
+        "bounds.csv",
+        "bounds.png",
+    ]
+    assert main(["bound", "fenz-test2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    stiffness = found["quantities"]["effective_stiffness"]
+    assert stiffness["lower"] < stiffness["nominal"] < stiffness["upper"]
+    assert found["governing"]["peak_force"] == "upper"
