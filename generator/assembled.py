@@ -98,7 +98,7 @@ def assembled() -> dict[str, sp.Expr]:
     body = evaluate(p["forward"], par=plate, u=base, x=coordinates(2))
 
     local = evaluate(p["surface_local"], b=base, a=body, x=coordinates(2), y=coordinates(1), tot=NO_FORCE, rim=NO_FORCE)
-    surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1")}
+    surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1"), "td": sp.Integer(0)}
     touch = evaluate(
         p["report_contact"],
         par=surface,

@@ -30,6 +30,8 @@ class Blocks:
     moment: Block
     local: Block
     friction: Block
+    shear: Block
+    stage: Block
     unknowns: Block
     contact: Block
     report_contact: Block
@@ -79,6 +81,7 @@ def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("sc", "m", "s_c, sliding capacity (3.21)")
         .scalar("mu", "-", "friction coefficient (3.16)")
         .scalar("dy", "m", "yield displacement, R_0/R of (3.18)")
+        .scalar("td", "s", "T, damping time of the sheared contact (docs/contact_damping.md)")
         .scalar("kc", "N/m", "rim stiffness (3.23)")
         .scalar("cc", "N s/m", "rim damping (3.23)")
         .scalar("rs", "m", "radius of the slider that carries the contact patch")
@@ -171,6 +174,16 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL)
         .build(),
         "friction": new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
+        "shear": new("shear")
+        .scalar("Y", "-", "friction force along t~1 over -mu N: Y + T dY/dt")
+        .scalar("Z", "-", "friction force along t~2 over -mu N: Z + T dZ/dt", 0)
+        .build(),
+        "stage": new("stage")
+        .scalar("Y", "-", "Y that the earlier stages of the step give; Y itself outside of a step")
+        .scalar("Z", "-", "Z likewise", 0)
+        .scalar("tau", "s", "beta + T, with beta the diagonal entry of the stage formula; 0 outside of a step")
+        .scalar("rest", "-", "T/(beta + T)")
+        .build(),
         "unknowns": new("unknowns")
         .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)
         .scalar("theta", "rad", "theta~, second angle of the normal's position")
@@ -181,6 +194,8 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("dY", "1/s", "dY/dt (3.18)")
         .scalar("dZ", "1/s", "dZ/dt (3.18)", 0)
         .scalar("N", "N", "normal force")
+        .scalar("Y", "-", "Y (3.18)")
+        .scalar("Z", "-", "Z (3.18)", 0)
         .scalar("sp", "-", "sin psi~", 0)
         .scalar("cp", "-", "cos psi~", 1)
         .scalar("st", "-", "sin theta~")

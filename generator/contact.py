@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from msfp_gen.specification import friction_laws
-from msfp_gen.specification.hysteresis import HYSTERESIS
+from msfp_gen.specification.hysteresis import HYSTERESIS, is_plastic
 
 from . import laws
 from .blocks import Blocks
@@ -22,6 +22,8 @@ from .vectors import add, dot, scale
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
 """w_0 [rad/s] of the drilling moment (docs/model.md)."""
+ON_THE_EDGE = sp.Float("1e-9")
+"""A friction state is on the edge of the unit disc if 1 less its square is at most this."""
 
 
 def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
@@ -56,17 +58,44 @@ def contact_basis(p: Program, sin_psi: sp.Expr, cos_psi: sp.Expr, sin_theta: sp.
     return t1, t2, t3
 
 
-def bouc_wen_rates(
-    p: Program, friction_model: FrictionModel, Y: sp.Expr, Z: sp.Expr, u: sp.Expr, v: sp.Expr, dy: sp.Expr
-) -> Symbols:
+@dataclass(frozen=True)
+class Shear:
+    """Friction state of a contact, and the data from which its rates follow.
+
+    Attributes:
+        Y, Z: friction state.
+        before: Y and Z that the earlier stages of a step give.
+        tau: sum of the diagonal entry of the stage formula and the damping time T; T outside of a step [s].
+        kept: derivative of the friction state with respect to the friction force over -mu N.
+    """
+
+    Y: sp.Expr
+    Z: sp.Expr
+    before: tuple[sp.Expr, sp.Expr]
+    tau: sp.Expr
+    kept: sp.Expr
+
+
+def bouc_wen_rates(p: Program, law: str, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
     """dY/dt and dZ/dt (3.18) with 1/d_y for R/R_0, and the switches of the hysteresis law.
 
     YY, YZ, ZY, ZZ are their derivatives with respect to Y and Z at constant slip velocity. An implicit stage solves for
-    Y and Z with them.
+    Y and Z with them. `plastic` is the velocity of plastic slip, and `plastic_Y`, `plastic_Z` are its derivatives.
+
+    The plastic slip is that of the isotropic law for every law, Y^2 + Z^2 times Y u + Z v where the latter is positive:
+    it is zero where friction unloads elastically and equals the slip velocity in steady sliding. The magnitude of the
+    slip velocity is not used: a friction coefficient that increases with it would increase friction during elastic
+    unloading, where friction acts along the slip and does work on the sliders, so that light sliders accelerate without
+    bound. The plastic part by the switches per axis has the same defect across the slip.
     """
+    Y, Z = shear.Y, shear.Z
     yu, zv = p.let(Y * u), p.let(Z * v)
-    a, b = HYSTERESIS[friction_model.bouc_wen].switches(yu, zv, lambda x: p.let(Step(p.let(x))))
+    switches = HYSTERESIS[law].switches
+    assert switches is not None
+    a, b = switches(yu, zv, lambda x: p.let(Step(p.let(x))))
     drive, au, bv = p.let(a * yu + b * zv), p.let(a * u), p.let(b * v)
+    square, along = p.let(Y**2 + Z**2), p.let(yu + zv)
+    positive = p.let(Step(along))
     return {
         "dY": p.let((u - Y * drive) / dy, "dY"),
         "dZ": p.let((v - Z * drive) / dy, "dZ"),
@@ -74,18 +103,49 @@ def bouc_wen_rates(
         "YZ": -Y * bv / dy,
         "ZY": -Z * au / dy,
         "ZZ": -(drive + Z * bv) / dy if Z != 0 else Z,
+        "plastic": p.let(square * along * positive),
+        "plastic_Y": positive * (2 * Y * along + square * u),
+        "plastic_Z": positive * (2 * Z * along + square * v),
+    }
+
+
+def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr) -> Symbols:
+    """dY/dt and dZ/dt of the elastic-perfectly plastic law by radial return; keys as of `bouc_wen_rates`.
+
+    The friction force over -mu N, g = (Y, Z) + T d(Y, Z)/dt, is bounded by 1: g is the projection onto the unit disc of
+    `before` + tau (u, v)/d_y, the force of an elastic slip, and d(Y, Z)/dt = (g - before)/tau. With tau = 0 it is the
+    limit: elastic inside the disc, and without the outward component on its edge.
+    """
+    zero, before = sp.Integer(0), shear.before
+    trial = tuple(p.let(f + shear.tau * w / dy) for f, w in zip(before, (u, v), strict=True))
+    square = p.let(trial[0] ** 2 + trial[1] ** 2)
+    root = p.let(sp.sqrt(p.let(1 + Step(p.let(square - 1)) * (square - 1))))
+    along = p.let(before[0] * u + before[1] * v)
+    edge = p.let(Step(p.let(square - 1 + ON_THE_EDGE)))
+    timed = p.let(Step(shear.tau))
+    slipping = p.let(
+        timed * dy * (root - 1) / (shear.tau + 1 - timed) + (1 - timed) * edge * Step(along) * along, "slipping"
+    )
+    return {
+        "dY": p.let((u - p.let(trial[0] / root) * slipping) / dy, "dY"),
+        "dZ": p.let((v - p.let(trial[1] / root) * slipping) / dy, "dZ"),
+        **dict.fromkeys(("YY", "YZ", "ZY", "ZZ", "plastic_Y", "plastic_Z"), zero),
+        "plastic": slipping,
     }
 
 
 def slip(
-    p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, f: Symbols, dw: Vector
+    p: Program, friction_model: FrictionModel, par: Symbols, base: Basis, shear: Shear, dw: Vector
 ) -> tuple[sp.Expr, Symbols]:
-    """Signed radius sign R, and the slip velocity u, v (3.19), (2.98) with the Bouc-Wen rates (3.18)."""
+    """Signed radius sign R, and the slip velocity u, v (3.19), (2.98) with the rates of the friction state (3.18)."""
     t1, t2, _ = base
     signed_radius = p.let(par["sign"] * par["R"])
     # (3.19): v~ = -sign R dw x t~_3; its components (2.98) by the triple product.
     u, v = p.let(-signed_radius * dot(dw, t2), "u"), p.let(signed_radius * dot(dw, t1), "v")
-    rates = bouc_wen_rates(p, friction_model, f["Y"], f["Z"], u, v, par["dy"])
+    if is_plastic(friction_model.bouc_wen):
+        rates = plastic_rates(p, shear, u, v, par["dy"])
+    else:
+        rates = bouc_wen_rates(p, friction_model.bouc_wen, shear, u, v, par["dy"])
     return signed_radius, {**rates, "u": u, "v": v}
 
 
@@ -95,15 +155,18 @@ def friction(
     par: Symbols,
     base: Basis,
     N: sp.Expr,
-    f: Symbols,
+    g: Symbols,
     dw: Vector,
     signed_radius: sp.Expr,
 ) -> Symbols:
-    """Moment M of the contact force about the sphere centre [N m], and power of the drilling moment [W]."""
+    """Moment M of the contact force about the sphere centre [N m], and power of the drilling moment [W].
+
+    g: friction force over -mu N along t~_1, t~_2.
+    """
     t1, t2, t3 = base
     # (3.14)-(3.17): the normal force has no moment about the sphere centre, friction has -sign R t~_3 x F_f.
     arm = p.let(signed_radius * par["mu"] * N)
-    moment = add(scale(p.let(arm * f["Y"]), t2), scale(p.let(-arm * f["Z"]), t1))
+    moment = add(scale(p.let(arm * g["Y"]), t2), scale(p.let(-arm * g["Z"]), t1))
     drill = sp.Integer(0)
     if friction_model.patch:
         spin = p.let(dot(dw, t3))
@@ -120,13 +183,15 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     x: Symbols = p.read(b.unknowns, "x")
     f: Symbols = p.read(b.friction, "f")
     loc: Symbols = p.read(b.local, "loc", active=("dw",))
-    base = contact_basis(p, *(p.let(g(x[a])) for a in ("psi", "theta") for g in (sp.sin, sp.cos)))
-    signed_radius, rates = slip(p, friction_model, par, base, f, loc["dw"])
-    par, heat = laws.evaluate_law(p, b, friction_model.coefficient, par, loc, x["N"], f, rates)
-    out = {**rates, **friction(p, friction_model, par, base, x["N"], f, loc["dw"], signed_radius)}
+    base = contact_basis(p, *(p.let(function(x[a])) for a in ("psi", "theta") for function in (sp.sin, sp.cos)))
+    shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"], sp.Integer(1))
+    signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
+    par, heat = laws.evaluate_law(p, b, friction_model.coefficient, par, loc, x["N"], rates)
+    g = {name: p.let(f[name] + par["td"] * rates[f"d{name}"]) for name in ("Y", "Z")}
+    out = {**rates, **friction(p, friction_model, par, base, x["N"], g, loc["dw"], signed_radius)}
     t1, t2, t3 = base
     mu_n = p.let(-par["mu"] * x["N"])
-    force = add(scale(x["N"], t3), scale(p.let(mu_n * f["Y"]), t1), scale(p.let(mu_n * f["Z"]), t2))  # (3.15)-(3.17)
+    force = add(scale(x["N"], t3), scale(p.let(mu_n * g["Y"]), t1), scale(p.let(mu_n * g["Z"]), t2))  # (3.15)-(3.17)
     p.write(
         b.report_contact,
         {"p": force, "M": out["M"], "dY": out["dY"], "dZ": out["dZ"], **heat},
@@ -135,14 +200,14 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     return p
 
 
-def closed_form(p: Program, par: Symbols, force: Vector, f: Symbols) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+def closed_form(p: Program, par: Symbols, force: Vector, g: Symbols) -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
     """N and (sin psi~, cos psi~, sin theta~, cos theta~) at a given contact force: the inverse of (3.15)-(3.17).
 
-    The contact force is P = N e with e = (-mu Y, -mu Z, 1) along t~_i. Let p = P/N. The rotation theta~ about axis 2
+    The contact force is P = N e with e = (-mu g_Y, -mu g_Z, 1) along t~_i. Let p = P/N. The rotation theta~ about axis 2
     takes the first component e_1 to p_1 and the third to w. The rotation psi~ about axis 1 then takes (e_2, w) to
     (p_2, p_3).
     """
-    ex, ey = p.let(-par["mu"] * f["Y"]), p.let(-par["mu"] * f["Z"])
+    ex, ey = p.let(-par["mu"] * g["Y"]), p.let(-par["mu"] * g["Z"])
     length = p.let(sp.sqrt(1 + ex**2 + ey**2))
     N = p.let(sp.sqrt(dot(force, force)) / length, "N")
     px, py, pz = p.let_vector(scale(1 / N, force), "p")
@@ -162,18 +227,23 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         "contact", "contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19)"
     )
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    stage: Symbols = p.read(b.stage, "h", active=False)
     loc: Symbols = p.read(b.local, "loc")
-    f: Symbols = p.read(b.friction, "f")
+    g: Symbols = p.read(b.shear, "g")
+    f = {name: p.let(g[name] - stage["rest"] * (g[name] - stage[name])) for name in ("Y", "Z")}
+    shear = Shear(f["Y"], f["Z"], (stage["Y"], stage["Z"]), stage["tau"], p.let(1 - stage["rest"]))
     given = laws.read_unknown_coefficient(p, b, friction_model.coefficient, par)
-    N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], f)
+    N, (sp_, cp_, st_, ct_) = closed_form(p, given, loc["p"], g)
     base = contact_basis(p, sp_, cp_, st_, ct_)
-    signed_radius, rates = slip(p, friction_model, par, base, f, loc["dw"])
-    out = {**rates, **friction(p, friction_model, given, base, N, f, loc["dw"], signed_radius)}
-    out |= laws.law_results(p, friction_model.coefficient, par, given, loc, N, f, rates)
+    signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
+    out = {**rates, **friction(p, friction_model, given, base, N, g, loc["dw"], signed_radius)}
+    law = friction_model.coefficient
+    out |= laws.law_results(p, law, par, given, loc, N, shear.kept, rates)
+    values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,
-        {**out, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_},
-        tangents=("M", "dY", "dZ", "N") if friction_model.coefficient is None else ("M", "dY", "dZ", "mu", "N"),
+        {name: values[name] for name in b.contact.quantities},
+        tangents=("M", "dY", "dZ", "N") if law is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_LOCAL",
     )
     p.lanes = True

@@ -9,6 +9,7 @@ from importlib import resources
 import sympy as sp
 
 from msfp_gen.specification import contract
+from msfp_gen.specification.hysteresis import is_plastic
 from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
@@ -255,8 +256,9 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "separations": equations.separations,
         "vectors": vector_quantities,
         "scalars": scalar_quantities,
-        "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.friction.fields) + (law is not None),
+        "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.shear.fields) + (law is not None),
         "law": law,
+        "plastic": is_plastic(spec.effects.bouc_wen),
         "flows": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL if law is not None and law.depends_on_temperature else (),
         "values": value_enums(spec.effects),

@@ -21,7 +21,6 @@ from .functions import Modulus, Step
 from .program import Block, Field, Program
 
 Symbols = dict[str, Any]
-SlidingVelocity = tuple[sp.Expr, sp.Expr, sp.Expr]
 COVER_TRANSITION = sp.Rational(1, 10)
 """Half-width of the transition, in (x/reach)^2 about 1, over which the patch uncovers the centre of the surface: x is
 within 5 % of `reach`."""
@@ -80,12 +79,12 @@ def read_unknown_coefficient(p: Program, b: Blocks, law: Law | None, par: Symbol
 
 
 def law_results(
-    p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, f: Symbols, slip: Symbols
+    p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, kept: sp.Expr, slip: Symbols
 ) -> Symbols:
     """Results that a law adds to `contact`; empty for constant friction.
 
-    They are mu by the law and its derivatives with respect to Y and Z at constant N and slip velocity. With heating
-    they include the flux, the temperature and the derivative of the law with respect to the unknown mu.
+    They are mu by the law and its derivatives with respect to the friction force over -mu N at constant N and slip
+    velocity. With heating they include the flux, the temperature and the derivative of the law with respect to the unknown mu.
 
     Args:
         p: program of the contact.
@@ -94,13 +93,13 @@ def law_results(
         given: the result of `read_unknown_coefficient`.
         loc: symbols of the block `local`.
         N: normal force.
-        f: friction state Y, Z.
-        slip: slip velocity u, v.
+        kept: derivative of the friction state with respect to the friction force over -mu N.
+        slip: slip velocity with the velocity of plastic slip and its derivatives, of `contact.slip`.
     """
     if law is None:
         return {}
-    c, velocity = given["law"], sliding_velocity(p, f, slip)
-    variables = law_variables(p, law, par, N, velocity)
+    c = given["law"]
+    variables = law_variables(p, law, par, N, slip["plastic"])
     results: Symbols = {}
     if law.depends_on_temperature:
         share = flux_per_coefficient(p, par, variables, loc)
@@ -110,15 +109,12 @@ def law_results(
     mu = results["mu"] = coefficient(p, law, par, variables)
     if law.depends_on_temperature:
         results["law_mu"] = p.let(partial_derivative(p, mu, variables["T"]) * c["warming"] * share)
-    slope, (square, along, positive) = partial_derivative(p, mu, variables["v"]), velocity
-    for name, component in (("Y", slip["u"]), ("Z", slip["v"])):
-        if f[name] != 0:
-            results[f"law_{name}"] = p.let(slope * positive * (2 * f[name] * along + square * component))
-    return results
+    slope = p.let(partial_derivative(p, mu, variables["v"]) * kept)
+    return results | {f"law_{name}": p.let(slope * slip[f"plastic_{name}"]) for name in ("Y", "Z")}
 
 
 def evaluate_law(
-    p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, f: Symbols, slip: Symbols
+    p: Program, b: Blocks, law: Law | None, par: Symbols, loc: Symbols, N: sp.Expr, slip: Symbols
 ) -> tuple[Symbols, Symbols]:
     """The law at given N and slip velocity, for `report_contact`; arguments as of `law_results`.
 
@@ -128,32 +124,17 @@ def evaluate_law(
         return par, {}
     assert b.coefficient is not None
     c: Symbols = p.read(b.coefficient, "c", active=False)
-    variables = law_variables(p, law, par, N, sliding_velocity(p, f, slip))
+    variables = law_variables(p, law, par, N, slip["plastic"])
     if not law.depends_on_temperature:
         return {**par, "mu": coefficient(p, law, par, variables)}, {}
     mu = coefficient(p, law, par, {**variables, "T": p.let(par["start_temperature"] + c["rise"], "T")})
     return {**par, "mu": mu}, {"flux": mu * flux_per_coefficient(p, par, variables, loc)}
 
 
-def law_variables(p: Program, law: Law, par: Symbols, N: sp.Expr, velocity: SlidingVelocity) -> Symbols:
+def law_variables(p: Program, law: Law, par: Symbols, N: sp.Expr, velocity: sp.Expr) -> Symbols:
     """Variables of a friction law other than temperature: normal force, sliding velocity and, if needed, pressure."""
-    speed = p.let(sp.Mul(*velocity), "speed")
     pressure = {"p": p.let(N / par["area"], "pressure")} if "patch_radius" in law.parameters else {}
-    return {"N": N, "v": speed, **pressure}
-
-
-def sliding_velocity(p: Program, f: Symbols, slip: Symbols) -> SlidingVelocity:
-    """Factors of the sliding velocity: Y^2 + Z^2, Y u + Z v, and 1 where the latter is positive, else 0.
-
-    Their product is the plastic part of the slip velocity by the isotropic hysteresis law. It is zero where friction
-    unloads elastically and equals |slip velocity| in steady sliding.
-
-    The magnitude of the slip velocity is not used: a law that increases with it would increase friction during elastic
-    unloading, where friction acts along the slip and does work on the sliders, so that light sliders accelerate without
-    bound. The plastic part by the switches per axis has the same defect across the slip.
-    """
-    along = p.let(f["Y"] * slip["u"] + f["Z"] * slip["v"])
-    return p.let(f["Y"] ** 2 + f["Z"] ** 2), along, p.let(Step(along))
+    return {"N": N, "v": velocity, **pressure}
 
 
 def coefficient(p: Program, law: Law, par: Symbols, variables: Symbols) -> sp.Expr:

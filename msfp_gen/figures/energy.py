@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 # Term -> (label, colour), from the bottom of the stack up: dissipated energy first, then stored energy.
 TERMS = {
     "friction_dissipated": ("friction, dissipated", COLOURS[0]),
+    "contact_dissipated": ("contact damping, dissipated", "#B07AA1"),
     "rim_dissipated": ("rims, dissipated", COLOURS[3]),
     "top_dissipated": ("dampers of the top, dissipated", "#7F7F7F"),
     "potential": ("potential (weights and vertical loads)", COLOURS[2]),

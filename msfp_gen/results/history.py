@@ -31,6 +31,7 @@ ENERGY: dict[str, str] = {
     "restraint": "energy stored in the springs of the top",
     "friction_stored": "recoverable energy stored in friction while stuck",
     "friction_dissipated": "energy dissipated by friction",
+    "contact_dissipated": "energy dissipated by the damping of sheared contacts",
     "rim_stored": "energy stored in the rims",
     "rim_dissipated": "energy dissipated at the rims",
     "top_dissipated": "energy dissipated by the dampers of the top",

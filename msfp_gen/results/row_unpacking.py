@@ -39,6 +39,7 @@ def history_of(model: Model, rows: Array, azimuth: float) -> History:
         "restraint": f["restraint"] - f["restraint"][0],
         "friction_stored": work["friction_stored"],
         "friction_dissipated": work["friction_dissipated"],
+        "contact_dissipated": work["contact_dissipated"],
         "rim_stored": f["rim_stored"] - f["rim_stored"][0],
         "rim_dissipated": work["rim_dissipated"],
         "top_dissipated": work["top_dissipated"],

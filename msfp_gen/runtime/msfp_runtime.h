@@ -73,7 +73,7 @@ typedef struct {
 } msfp_point;
 
 /* Derivatives of q, v, a with respect to the unknowns of a step (the columns of the tangent), and the stage formula
- * of the friction state, f = fp + beta df/dt; beta = 0 keeps f = fp. */
+ * of the friction state f = (Y, Z), f = fp + beta df/dt; beta = 0 keeps f = fp. */
 typedef struct {
     double cq, cv, ca;
     double beta;           /* [s] */
@@ -116,9 +116,10 @@ typedef struct {
 
 /* Residual [MSFP_DOF] of the condensed equations: the angular balances [N m], with interface forces summed from the top
  * down and the contact in closed form; with uplift also the linear balances [N]. tangent: [MSFP_DOF][MSFP_DOF], or
- * NULL. f: first guess of Y, Z, on return their values. Returns MSFP_OK or a status. */
+ * NULL. g: first guess of the friction force over -mu N, f + T df/dt, on return its value. Returns MSFP_OK or a
+ * status. */
 int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                   double f[MSFP_NB][2], double *residual, double *tangent);
+                   double g[MSFP_NB][2], double *residual, double *tangent);
 
 typedef struct {
     int iterations;
@@ -164,6 +165,9 @@ int msfp_surface_in_tension(const msfp_work *w);
 
 /* Surface, counted from 1, whose friction law gives a coefficient that is negative or not finite. 0: none. */
 int msfp_invalid_friction(const msfp_work *w);
+
+/* Y, Z [-] of the evaluation in `w`. */
+void msfp_friction_state(const msfp_work *w, double f[MSFP_NB][2]);
 
 /* dY/dt, dZ/dt [1/s] of the evaluation in `w`. */
 void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2]);

@@ -33,7 +33,8 @@ class Surface:
     friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
-    k s (1 + c ds/dt) at compression s (docs/uplift.md). The remaining fields are parameters of friction laws
+    k s (1 + c ds/dt) at compression s (docs/uplift.md). contact_damping: T [s]; the friction force is mu N (Y + T dY/dt)
+    in place of mu N Y (docs/contact_damping.md). The remaining fields are parameters of friction laws
     (docs/friction.md): each is given if, and only if, the law of `Effects.friction` has it. Raises InputError.
     """
 
@@ -45,6 +46,7 @@ class Surface:
     rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
     seat_stiffness: Annotated[float, Quantity("N/m", above=0.0)] = 5e9
     seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 1.0
+    contact_damping: Annotated[float, Quantity("s", least=0.0)] = 0.0
     friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
     velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None
     velocity_drop: Annotated[float | None, Quantity("", least=0.0)] = None
@@ -114,6 +116,7 @@ _SURFACE_ARRAYS = (
     "rim_damping",
     "seat_stiffness",
     "seat_damping",
+    "contact_damping",
 )
 
 
@@ -218,7 +221,7 @@ class Bearing:
         """All values as float64 arrays.
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
-        seat_stiffness, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height, centroid, mass,
+        seat_stiffness, seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height, centroid, mass,
         inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
         """
         base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid

@@ -37,6 +37,7 @@ SURFACE = (  # of each surface, the lowest first
     Value("capacity", "m", "sliding capacity s_c"),
     Value("friction", "-", "friction coefficient mu"),
     Value("yield_displacement", "m", "yield displacement d_y"),
+    Value("contact_damping", "s", "damping time T of the sheared contact"),
     Value("rim_stiffness", "N/m", "stiffness k_c of the rim"),
     Value("rim_damping", "N s/m", "damping c_c of the rim"),
 )
@@ -138,6 +139,7 @@ WORKS = (  # [J]; what each is called in `History.energy`
     Word("input", "work done on the bearing and its top by the base motion and the loads"),
     Word("friction_stored", "recoverable energy stored in friction while stuck"),
     Word("friction_dissipated", "energy dissipated by friction"),
+    Word("contact_dissipated", "energy dissipated by the damping of sheared contacts"),
     Word("rim_dissipated", "energy dissipated at the rims"),
     Word("top_dissipated", "energy dissipated by the dampers of the top"),
     Word("seat_dissipated", "energy dissipated in the unilateral contacts"),

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
 from msfp_gen.specification.friction_laws import FRICTION, Law, law_of
-from msfp_gen.specification.hysteresis import HYSTERESIS, integrates_to_tanh
+from msfp_gen.specification.hysteresis import HYSTERESIS, has_closed_form
 
 _COUNT = Quantity("", least=0, whole=True)
 
@@ -169,7 +169,7 @@ class Effects:
         state Y is a closed-form function of the slip.
         """
         quasistatic = self.dimension == "planar" and self.sliders == "massless" and not self.uplift
-        return quasistatic and self.law is None and integrates_to_tanh(self.bouc_wen)
+        return quasistatic and self.law is None and has_closed_form(self.bouc_wen)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ static const double *moment_above(const msfp_work *w, int k)
 }
 
 MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double f[MSFP_NB][2], double *residual, double *tangent)
+                             double g[MSFP_NB][2], double *residual, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE];
     msfp_surface_jacobians jacobians;
@@ -50,7 +50,7 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
 #if MSFP_LAW
     msfp_friction_conditions(at, w);
 #endif
-    const int status = msfp_surfaces(p, w, seed, f, tangent ? &jacobians : NULL);
+    const int status = msfp_surfaces(p, w, seed, g, tangent ? &jacobians : NULL);
     if (status)
         return status;
     for (int k = 1; k <= NB; ++k) {
@@ -113,6 +113,14 @@ void msfp_friction_rates(const msfp_work *w, double rates[MSFP_NB][2])
     }
 }
 
+void msfp_friction_state(const msfp_work *w, double f[MSFP_NB][2])
+{
+    for (int j = 0; j < NB; ++j) {
+        f[j][0] = w->contact[j][MSFP_CONTACT_Y];
+        f[j][1] = msfp_contact_Z(w->contact[j]);
+    }
+}
+
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst)
 {
     double scale[DOF], size = 0.0;
@@ -132,15 +140,15 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
  * hundredfold. */
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out)
 {
-    double residual[DOF], tangent[DOF * DOF], f[NB][2], last = INFINITY;
+    double residual[DOF], tangent[DOF * DOF], g[NB][2], last = INFINITY;
     int pivots[DOF], good = 0, worst;
     msfp_seed seed = { .ca = 1.0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
-    memcpy(f, at->f, sizeof f);
+    memcpy(g, at->f, sizeof g);
     out->determinant = 1;
     for (out->iterations = 0; out->iterations < 50; ++out->iterations) {
         const int first = out->iterations == 0;
-        int status = msfp_condensed(p, at, &seed, w, f, residual, first ? tangent : NULL);
+        int status = msfp_condensed(p, at, &seed, w, g, residual, first ? tangent : NULL);
         if (status)
             return status;
         seed.same_base = 1;
@@ -152,7 +160,7 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
             return MSFP_OK;
         good = out->residual < 1e-2 * last;
         last = out->residual;
-        if (!first && !good && (status = msfp_condensed(p, at, &seed, w, f, residual, tangent)))
+        if (!first && !good && (status = msfp_condensed(p, at, &seed, w, g, residual, tangent)))
             return status;
         if (first || !good) {
             out->determinant = msfp_lu(tangent, DOF, pivots);

@@ -1,7 +1,9 @@
 /* contact.c: friction and contact of all surfaces at once, one surface in each lane of a vector.
  *
- * For each surface, Newton's method solves the stage formula f = fp + beta df/dt of Y, Z, and mu from its law: two or
- * three local unknowns. They are eliminated from the tangent of the moment and of N by their consistent tangent.
+ * The friction force over -mu N is g = f + T df/dt, with f = (Y, Z) and the damping time T of the contact. With the
+ * stage formula f = fp + beta df/dt it is g = fp + (beta + T) df/dt. For each surface, Newton's method solves this for
+ * g, and mu from its law: two or three local unknowns, from which f follows. They are eliminated from the tangent of
+ * the moment and of N by their consistent tangent.
  */
 #include <math.h>
 #include <string.h>
@@ -12,8 +14,8 @@ enum {
     NB = MSFP_NB,
     LANES = MSFP_LANES,
     MOMENT = MSFP_MOMENT_SIZE,
-    FRICTION = MSFP_FRICTION_SIZE,
-    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: Y, Z, and mu where it follows a law */
+    FRICTION = MSFP_SHEAR_SIZE,
+    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: g, and mu where it follows a law */
     ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */
     INPUTS = MSFP_LOCAL_SIZE        /* force and slip rotation */
 };
@@ -26,7 +28,7 @@ enum {
 
 /* Fields of all surfaces, [field][lane]; spare lanes repeat the last surface. */
 typedef struct {
-    double local[INPUTS * LANES], f[FRICTION * LANES], before[FRICTION * LANES], out[MSFP_CONTACT_SIZE * LANES];
+    double local[INPUTS * LANES], stage[MSFP_STAGE_SIZE * LANES], g[FRICTION * LANES], out[MSFP_CONTACT_SIZE * LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
 #endif
@@ -50,16 +52,20 @@ void msfp_friction_conditions(const msfp_point *at, msfp_work *w)
 #endif
 
 /* From the blocks of the surfaces to lanes. */
-MSFP_INLINE void gather(const msfp_work *w, const msfp_seed *seed, double f[NB][2], lanes *all)
+MSFP_INLINE void gather(const msfp_parameters *p, const msfp_work *w, const msfp_seed *seed, double g[NB][2],
+                        lanes *all)
 {
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
         for (int k = 0; k < INPUTS; ++k)
             all->local[k * LANES + s] = w->local[j][k];
         for (int k = 0; k < FRICTION; ++k) {
-            all->f[k * LANES + s] = f[j][k];
-            all->before[k * LANES + s] = seed->fp[j][k];
+            all->g[k * LANES + s] = g[j][k];
+            all->stage[k * LANES + s] = seed->fp[j][k];
         }
+        const double damping = p->surface[j][MSFP_SURFACE_PARAMETERS_TD], tau = seed->beta + damping;
+        all->stage[MSFP_STAGE_TAU * LANES + s] = tau;
+        all->stage[MSFP_STAGE_REST * LANES + s] = tau > 0.0 ? damping / tau : 1.0;
 #if MSFP_LAW
         for (int k = 0; k < MSFP_COEFFICIENT_SIZE; ++k)
             all->x[k * LANES + s] = w->coefficient[j][k];
@@ -68,13 +74,13 @@ MSFP_INLINE void gather(const msfp_work *w, const msfp_seed *seed, double f[NB][
 }
 
 /* From lanes to the blocks of the surfaces. */
-MSFP_INLINE void scatter(const lanes *all, msfp_work *w, double f[NB][2])
+MSFP_INLINE void scatter(const lanes *all, msfp_work *w, double g[NB][2])
 {
     for (int j = 0; j < NB; ++j) {
         for (int k = 0; k < MSFP_CONTACT_SIZE; ++k)
             w->contact[j][k] = all->out[k * LANES + j];
         for (int k = 0; k < FRICTION; ++k)
-            f[j][k] = all->f[k * LANES + j];
+            g[j][k] = all->g[k * LANES + j];
 #if MSFP_LAW
         w->coefficient[j][MSFP_COEFFICIENT_MU] = all->x[MSFP_COEFFICIENT_MU * LANES + j];
 #endif
@@ -96,23 +102,23 @@ MSFP_INLINE void solve_small(const double *a, double *b)
     }
 }
 
-/* One Newton step on Y, Z (and mu) of every surface that has not converged, with derivatives at constant slip velocity
+/* One Newton step on g (and mu) of every surface that has not converged, with derivatives at constant slip velocity
  * and N, on which they depend weakly. Where the residual has grown, past a switch of the hysteresis law, half of the
  * last step is taken back. Returns how many surfaces have not converged, -1 if a value is not finite. */
 MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *step, double *best)
 {
     double a[FRICTION * FRICTION * LANES], newton[FRICTION * LANES], size[LANES], sum[LANES];
-    const double *out = all->out;
+    const double *out = all->out, *tau = all->stage + MSFP_STAGE_TAU * LANES;
     int unconverged = 0, not_finite = 0;
     for (int s = 0; s < LANES; ++s)
         size[s] = sum[s] = 0.0;
     for (int r = 0; r < FRICTION; ++r)
         for (int s = 0; s < LANES; ++s) {
-            const double g =
-                all->f[r * LANES + s] - all->before[r * LANES + s] - beta * out[(MSFP_CONTACT_DY + r) * LANES + s];
-            newton[r * LANES + s] = g;
-            size[s] = fabs(g) > size[s] ? fabs(g) : size[s];
-            sum[s] += fabs(g);
+            const double rest = all->g[r * LANES + s] - all->stage[r * LANES + s] -
+                                tau[s] * out[(MSFP_CONTACT_DY + r) * LANES + s];
+            newton[r * LANES + s] = rest;
+            size[s] = fabs(rest) > size[s] ? fabs(rest) : size[s];
+            sum[s] += fabs(rest);
         }
 #if MSFP_LAW
     double excess[LANES];
@@ -124,7 +130,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
 #endif
     for (int s = 0; s < LANES; ++s) {
         not_finite += !(sum[s] < INFINITY);
-        unconverged += size[s] > accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+        unconverged += size[s] > accuracy * (1.0 + fabs(tau[s] * out[MSFP_CONTACT_DY * LANES + s]));
     }
     if (not_finite || !unconverged)
         return not_finite ? -1 : 0;
@@ -133,7 +139,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
             a[i * LANES + s] = (i % (FRICTION + 1) == 0) - beta * out[(MSFP_CONTACT_YY + i) * LANES + s];
     solve_small(a, newton);
     for (int s = 0; s < LANES; ++s) {
-        const int converged = size[s] <= accuracy * (1.0 + fabs(beta * out[MSFP_CONTACT_DY * LANES + s]));
+        const int converged = size[s] <= accuracy * (1.0 + fabs(tau[s] * out[MSFP_CONTACT_DY * LANES + s]));
         const int overshot = size[s] > best[s];
         const double sign = converged ? 0.0 : overshot ? 1.0 : -1.0;
 #if MSFP_LAW
@@ -146,21 +152,21 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
 #endif
         for (int r = 0; r < FRICTION; ++r) {
             step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
-            all->f[r * LANES + s] += sign * step[r * LANES + s];
+            all->g[r * LANES + s] += sign * step[r * LANES + s];
         }
         best[s] = overshot ? best[s] : size[s];
     }
     return unconverged;
 }
 
-/* Y, Z (and mu) of all surfaces by Newton's method on their stage formula. */
+/* g (and mu) of all surfaces by Newton's method on their stage formula. */
 MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, double accuracy)
 {
     double step[UNKNOWNS * LANES] = { 0 }, best[LANES];
     for (int s = 0; s < LANES; ++s)
         best[s] = INFINITY;
     for (int i = 0; i < 60; ++i) {
-        msfp_contact_lanes(par, all->local, all->f MSFP_IF_LAW(all->x), all->out);
+        msfp_contact_lanes(par, all->stage, all->local, all->g MSFP_IF_LAW(all->x), all->out);
         const int unconverged = newton_step(all, beta, accuracy, step, best);
         if (unconverged <= 0)
             return unconverged == 0 ? MSFP_OK : i == 0 ? MSFP_E_FINITE : MSFP_E_NEWTON;
@@ -169,20 +175,25 @@ MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, doubl
 }
 
 #if MSFP_CLOSED_FORM
-/* Y of all surfaces after the slip of the step, and their contacts; slope: dY/d(angular velocity of the body)
+/* Y of all surfaces after the slip of the step, and their contacts; slope: dg/d(angular velocity of the body)
  * [s/rad]. */
 MSFP_INLINE int closed_form_stage(const msfp_parameters *p, lanes *all, const msfp_seed *seed, double *slope)
 {
     double finite = 0.0;
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
-        const double per_turn = msfp_slip_per_turn(p->surface[j]);
-        const double slip = per_turn * (seed->beta * all->local[MSFP_LOCAL_DWY * LANES + s] + seed->turn[j]);
-        const double Y = all->f[s] = msfp_friction_after_slip(all->before[s], slip);
-        slope[s] = per_turn * seed->beta * (Y * slip > 0.0 ? 1.0 - Y * Y : 1.0);
+        const double per_turn = msfp_slip_per_turn(p->surface[j]), T = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
+        const double rate = per_turn * all->local[MSFP_LOCAL_DWY * LANES + s];
+        const double slip = seed->beta * rate + per_turn * seed->turn[j];
+        const double Y = msfp_friction_after_slip(all->stage[s], slip);
+        const double turned = per_turn * seed->beta * msfp_friction_slope(Y, slip);
+        all->g[s] = msfp_sheared(Y, rate, T, turned, per_turn, &slope[s]);
+        all->stage[s] = Y; /* the kernel leaves Y as it is, and gives its rate */
+        all->stage[MSFP_STAGE_TAU * LANES + s] = T;
+        all->stage[MSFP_STAGE_REST * LANES + s] = 1.0;
         finite += Y;
     }
-    msfp_contact_lanes(&p->lanes[0][0], all->local, all->f, all->out);
+    msfp_contact_lanes(&p->lanes[0][0], all->stage, all->local, all->g, all->out);
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
 }
 
@@ -190,7 +201,7 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, lanes *all, const ms
 MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const double *slope, double *condensed)
 {
     double jacobian[ROWS * MSFP_LOCAL * LANES];
-    msfp_contact_jacobian(par, all->local, all->f, all->out, jacobian);
+    msfp_contact_jacobian(par, all->stage, all->local, all->g, all->out, jacobian);
     for (int r = 0; r <= MOMENT; ++r) {
         const double *row = jacobian + (r < MOMENT ? r : MOMENT + UNKNOWNS) * MSFP_LOCAL * LANES;
         for (int k = 0; k < INPUTS; ++k)
@@ -201,19 +212,20 @@ MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const doubl
 }
 #endif
 
-/* Jacobian of the moment and of N with Y, Z and mu eliminated: [MOMENT + 1][INPUTS][lane]. The matrix of the local
+/* Jacobian of the moment and of N with g and mu eliminated: [MOMENT + 1][INPUTS][lane]. The matrix of the local
  * unknowns is close to the identity plus a dissipative part, so that elimination needs no pivots. */
-MSFP_INLINE void condense(const double *par, lanes *all, double beta, double *condensed)
+MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
 {
     double jacobian[ROWS * MSFP_LOCAL * LANES], a[UNKNOWNS][UNKNOWNS + INPUTS][LANES];
-    msfp_contact_jacobian(par, all->local, all->f MSFP_IF_LAW(all->x), all->out, jacobian);
+    msfp_contact_jacobian(par, all->stage, all->local, all->g MSFP_IF_LAW(all->x), all->out, jacobian);
     for (int r = 0; r < UNKNOWNS; ++r)
         for (int c = 0; c < UNKNOWNS + INPUTS; ++c) {
             const double *from =
                 jacobian + ((MOMENT + r) * MSFP_LOCAL + (c < UNKNOWNS ? INPUTS + c : c - UNKNOWNS)) * LANES;
-            const double factor = r < FRICTION ? beta : 1.0;
-            for (int s = 0; s < LANES; ++s)
-                a[r][c][s] = c < UNKNOWNS ? (r == c) - factor * from[s] : factor * from[s];
+            for (int s = 0; s < LANES; ++s) {
+                const double scaled = (r < FRICTION ? all->stage[MSFP_STAGE_TAU * LANES + s] : 1.0) * from[s];
+                a[r][c][s] = c < UNKNOWNS ? (r == c) - scaled : scaled;
+            }
         }
     for (int k = 0; k < UNKNOWNS; ++k) /* Gauss-Jordan elimination */
         for (int r = 0; r < UNKNOWNS; ++r) {
@@ -237,24 +249,24 @@ MSFP_INLINE void condense(const double *par, lanes *all, double beta, double *co
     }
 }
 
-MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2],
+MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[NB][2],
                             double *condensed)
 {
     lanes all;
-    gather(w, seed, f, &all);
+    gather(p, w, seed, g, &all);
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
         double slope[LANES];
         const int status = closed_form_stage(p, &all, seed, slope);
         if (status == MSFP_OK && condensed)
             condense_closed_form(&p->lanes[0][0], &all, slope, condensed);
-        scatter(&all, w, f);
+        scatter(&all, w, g);
         return status;
     }
 #endif
     const int status = friction_stage(&p->lanes[0][0], &all, seed->beta, fmax(seed->accuracy, 1e-12));
     if (status == MSFP_OK && condensed)
-        condense(&p->lanes[0][0], &all, seed->beta, condensed);
-    scatter(&all, w, f);
+        condense(&p->lanes[0][0], &all, condensed);
+    scatter(&all, w, g);
     return status;
 }

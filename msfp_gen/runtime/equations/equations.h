@@ -39,8 +39,9 @@ static inline int msfp_unknown_field(int order, int i)
 }
 
 #if MSFP_CLOSED_FORM
-/* Friction in closed form over a slip s (over d_y) in one direction. While friction opposes the slip, dY/ds = 1 - Y^2
- * (3.18), so Y is a hyperbolic tangent of s; while it unloads, dY/ds = 1. */
+/* Friction in closed form over a slip s (over d_y) in one direction. By the plastic law it is Y + s, between -1 and 1.
+ * By (3.18), dY/ds = 1 - Y^2 while friction opposes the slip, so Y is a hyperbolic tangent of s; while it unloads,
+ * dY/ds = 1. */
 
 /* Take the unloading part of a slip from `slip` and add it to `Y`. Returns 0 if friction does not reach zero in it. */
 MSFP_INLINE int msfp_unload_to_zero(double *Y, double *slip)
@@ -59,6 +60,8 @@ MSFP_INLINE int msfp_unload_to_zero(double *Y, double *slip)
 /* Y after a slip over d_y: (3.18) integrated. */
 MSFP_INLINE double msfp_friction_after_slip(double Y, double slip)
 {
+    if (MSFP_PLASTIC)
+        return fmax(-1.0, fmin(1.0, Y + slip));
     const double sign = slip < 0.0 ? -1.0 : 1.0;
     double y = sign * Y, rest = fabs(slip);
     if (!msfp_unload_to_zero(&y, &rest) || y == 1.0) /* at 1 friction is saturated and stays so */
@@ -67,11 +70,35 @@ MSFP_INLINE double msfp_friction_after_slip(double Y, double slip)
     return sign * (1.0 + y - left) / (1.0 + y + left);
 }
 
+/* dY/ds at the end of a slip. */
+MSFP_INLINE double msfp_friction_slope(double Y, double slip)
+{
+    if (MSFP_PLASTIC)
+        return fabs(Y) < 1.0;
+    return Y * slip > 0.0 ? 1.0 - Y * Y : 1.0;
+}
+
+/* Friction force over -mu N: Y + T dY/dt at the rate of slip `rate` (over d_y) [1/s]. slope: its derivative with respect
+ * to the angular velocity that causes the slip, from those of Y, `turned`, and of the rate, `per_turn`. */
+MSFP_INLINE double msfp_sheared(double Y, double rate, double T, double turned, double per_turn, double *slope)
+{
+    if (MSFP_PLASTIC) {
+        const double g = Y + T * rate;
+        *slope = fabs(g) < 1.0 ? turned + T * per_turn : 0.0;
+        return fmax(-1.0, fmin(1.0, g));
+    }
+    const double left = msfp_friction_slope(Y, rate);
+    *slope = turned + T * (per_turn * left - (Y * rate > 0.0 ? 2.0 * Y * turned * rate : 0.0));
+    return Y + T * rate * left;
+}
+
 /* Work that friction dissipates over that slip, over mu N d_y: the integral of Y^3 ds while friction opposes the
- * slip. */
+ * slip. By the plastic law it is the slip beyond the edge. */
 MSFP_INLINE double msfp_friction_loss(double Y, double slip)
 {
     double y = slip < 0.0 ? -Y : Y, rest = fabs(slip);
+    if (MSFP_PLASTIC)
+        return fmax(0.0, y + rest - 1.0);
     if (!msfp_unload_to_zero(&y, &rest))
         return 0.0;
     if (y == 1.0)
@@ -137,17 +164,18 @@ void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, doubl
 double msfp_rim_share(const msfp_work *w, int j);
 /* Moment of surface j on the body above, in the basis of the body below [N m]. */
 void msfp_surface_moment(const msfp_work *w, int j, double *moment);
-/* Contact force, slip, friction and moment of all surfaces; jacobians: for the tangent, or NULL. Returns a status. */
-int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[MSFP_NB][2],
+/* Contact force, slip, friction and moment of all surfaces; g as of msfp_condensed; jacobians: for the tangent, or NULL.
+ * Returns a status. */
+int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   msfp_surface_jacobians *jacobians);
 /* Sliding displacements and gaps (3.20), (3.21) [m] at given coordinates. */
 void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
 /* ---- contact.c ---- */
 
-/* Y, Z and the contact of all surfaces. condensed: Jacobian of moment and N with respect to the inputs of a surface,
- * with Y, Z (and mu) eliminated, lane by lane; or NULL. Returns a status. */
-int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[MSFP_NB][2],
+/* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian of moment and N with respect to the
+ * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
+int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);
 #if MSFP_LAW
 /* Temperatures of the surfaces for the friction law, and a finite first guess of mu. */
@@ -168,10 +196,13 @@ void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_see
 
 /* ---- observe.c ---- */
 
-/* Power of friction at one surface, added: `stored` recoverable, `lost` dissipated [W]. par, contact: blocks of the
- * surface; f: Y, Z. */
-void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost);
-/* Integrands of all integrals but those of friction [W]. */
+/* Powers of friction at one surface [W]: stored and recoverable, dissipated by contact damping, dissipated otherwise. */
+typedef struct {
+    double stored, damped, lost;
+} msfp_friction_powers;
+/* par, contact: blocks of the surface. */
+msfp_friction_powers msfp_friction_power(const double *par, const double *contact);
+/* Integrands of all integrals but friction stored and dissipated [W]. */
 void msfp_powers_without_friction(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                                   const msfp_mechanical *mechanical, double power[MSFP_WORKS]);
 /* Power of the load on the top plate, relative to the moving base [W]. */

@@ -41,6 +41,7 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
         out[MSFP_SURFACE_PARAMETERS_SC] = s[MSFP_SURFACE_VALUE_CAPACITY];
         out[MSFP_SURFACE_PARAMETERS_MU] = s[MSFP_SURFACE_VALUE_FRICTION];
         out[MSFP_SURFACE_PARAMETERS_DY] = s[MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT];
+        out[MSFP_SURFACE_PARAMETERS_TD] = s[MSFP_SURFACE_VALUE_CONTACT_DAMPING];
         out[MSFP_SURFACE_PARAMETERS_KC] = s[MSFP_SURFACE_VALUE_RIM_STIFFNESS];
         out[MSFP_SURFACE_PARAMETERS_CC] = s[MSFP_SURFACE_VALUE_RIM_DAMPING];
         out[MSFP_SURFACE_PARAMETERS_RS] = slider[MSFP_BODY_VALUE_RIM_RADIUS];
@@ -82,7 +83,7 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 /* The block of coordinates from q, v, a of a body; separated: with the separation, which the base has not. */
 static void load_coordinates(double *x, const double *q, const double *v, const double *a, int separated)
 {
-    const double *orders[MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT] = { q, v, a };
+    const double *orders[3] = { q, v, a };
     for (int order = 0; order < 3; ++order)
         for (int i = 0; i < (MSFP_PLANAR ? 1 : 3); ++i)
             x[msfp_coordinate_field(order, i)] = orders[order][MSFP_PLANAR ? 1 : i];

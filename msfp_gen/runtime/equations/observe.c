@@ -51,14 +51,23 @@ static double friction_coefficient(const double *par, const double *contact)
 #endif
 }
 
-void msfp_friction_power(const double *par, const double f[2], const double *contact, double *stored, double *lost)
+/* Friction stores mu N d_y |f|^2/2; a sheared contact with the damping time T dissipates mu N d_y T |df/dt|^2; plastic
+ * slip and the drilling moment dissipate the rest. */
+msfp_friction_powers msfp_friction_power(const double *par, const double *contact)
 {
-    const double u = contact[MSFP_CONTACT_U], v = msfp_contact_v(contact);
-    const double yu = f[0] * u, zv = f[1] * v, square = f[0] * f[0] + f[1] * f[1];
-    const double drive = MSFP_ISOTROPIC ? fmax(yu + zv, 0.0) : fmax(yu, 0.0) + fmax(zv, 0.0);
-    const double force = friction_coefficient(par, contact) * contact[MSFP_CONTACT_N];
-    *lost += force * square * drive - msfp_contact_drill(contact);
-    *stored += force * (yu + zv - square * drive);
+    const double f[2] = { contact[MSFP_CONTACT_Y], msfp_contact_Z(contact) },
+                 df[2] = { contact[MSFP_CONTACT_DY], msfp_contact_dZ(contact) },
+                 slip[2] = { contact[MSFP_CONTACT_U], msfp_contact_v(contact) };
+    const double limit = friction_coefficient(par, contact) * contact[MSFP_CONTACT_N];
+    const double T = par[MSFP_SURFACE_PARAMETERS_TD], dy = par[MSFP_SURFACE_PARAMETERS_DY];
+    msfp_friction_powers power = { 0.0, 0.0, -msfp_contact_drill(contact) };
+    for (int i = 0; i < 2; ++i) {
+        const double stored = limit * dy * f[i] * df[i], damped = limit * dy * T * df[i] * df[i];
+        power.stored += stored;
+        power.damped += damped;
+        power.lost += limit * (f[i] + T * df[i]) * slip[i] - stored - damped;
+    }
+    return power;
 }
 
 /* Power dissipated in the unilateral contacts; a contact that lets go dissipates what its spring releases. */
@@ -180,18 +189,22 @@ void msfp_powers_without_friction(const msfp_parameters *p, const msfp_point *at
     power[MSFP_WORK_INPUT] =
         mechanical->power + drive_power(p, at, w, &power[MSFP_WORK_TOP_DISSIPATED]) + lock_power(w);
     power[MSFP_WORK_SEAT_DISSIPATED] = unilateral_power(w);
-    for (int j = 0; j < NB; ++j)
+    for (int j = 0; j < NB; ++j) {
+        power[MSFP_WORK_CONTACT_DISSIPATED] += msfp_friction_power(p->surface[j], w->contact[j]).damped;
         if (w->rim_sum[j] != 0.0)
             power[MSFP_WORK_RIM_DISSIPATED] += rim_power(p, w, j);
+    }
 }
 
 void msfp_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,
                  double power[MSFP_WORKS])
 {
     msfp_powers_without_friction(p, at, w, mechanical, power);
-    for (int j = 0; j < NB; ++j)
-        msfp_friction_power(p->surface[j], at->f[j], w->contact[j], &power[MSFP_WORK_FRICTION_STORED],
-                            &power[MSFP_WORK_FRICTION_DISSIPATED]);
+    for (int j = 0; j < NB; ++j) {
+        const msfp_friction_powers friction = msfp_friction_power(p->surface[j], w->contact[j]);
+        power[MSFP_WORK_FRICTION_STORED] += friction.stored;
+        power[MSFP_WORK_FRICTION_DISSIPATED] += friction.lost;
+    }
 }
 
 static double restraint_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
@@ -250,14 +263,14 @@ double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const 
 
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row)
 {
-    double residual[MSFP_DOF], f[NB][2];
+    double residual[MSFP_DOF], g[NB][2];
     msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
-    memcpy(f, at->f, sizeof f);
+    memcpy(g, at->f, sizeof g);
 #if MSFP_LAW
     memset(w->coefficient, 0, sizeof w->coefficient);
 #endif
-    msfp_condensed(p, at, &seed, w, f, residual, NULL);
+    msfp_condensed(p, at, &seed, w, g, residual, NULL);
     const msfp_mechanical mechanical = msfp_mechanical_energy(p, at, w);
     msfp_record(p, at, w, &mechanical, row);
 }

@@ -106,13 +106,13 @@ void msfp_surface_moment(const msfp_work *w, int j, double *moment)
         moment[r] = w->contact[j][r] + w->rim[j][FORCE + r];
 }
 
-MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double f[NB][2],
+MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[NB][2],
                             msfp_surface_jacobians *jacobians)
 {
     double moment[MOMENT];
     for (int j = 0; j < NB; ++j)
         contact_inputs(p, w, j, jacobians ? jacobians->rim[j] : NULL);
-    const int status = msfp_contacts(p, w, seed, f, jacobians ? jacobians->contact : NULL);
+    const int status = msfp_contacts(p, w, seed, g, jacobians ? jacobians->contact : NULL);
     if (status)
         return status;
     for (int j = 0; j < NB; ++j) {

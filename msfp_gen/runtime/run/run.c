@@ -19,7 +19,7 @@ static int consistent_initial_state(msfp_run *run)
 {
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
-    double f[NB][2], residual[MSFP_DOF];
+    double g[NB][2], residual[MSFP_DOF];
     msfp_seed seed = { 0 };
     msfp_to_point(run, &run->now, &at);
     memset(at.a, 0, sizeof at.a);
@@ -31,8 +31,8 @@ static int consistent_initial_state(msfp_run *run)
             run->determinant = solution.determinant;
     }
     memcpy(seed.fp, at.f, sizeof seed.fp);
-    memcpy(f, at.f, sizeof f);
-    const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, f, residual, NULL);
+    memcpy(g, at.f, sizeof g);
+    const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, g, residual, NULL);
     if (status)
         return status;
     memcpy(run->now.a, at.a, sizeof at.a);

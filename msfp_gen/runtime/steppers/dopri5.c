@@ -78,17 +78,17 @@ static int integrals(msfp_run *run, double h)
     msfp_state middle, *next = &run->next;
     msfp_point at;
     msfp_work w;
-    double f[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
+    double g[NB][2], residual[MSFP_DOF], power[MSFP_WORKS];
     msfp_seed seed = { 0 };
     memcpy(next->work, run->now.work, sizeof next->work); /* not used at the middle of the step */
     msfp_interpolate(run, 0.5, &middle);
     msfp_to_point(run, &middle, &at);
     memcpy(seed.fp, at.f, sizeof seed.fp);
-    memcpy(f, at.f, sizeof f);
+    memcpy(g, at.f, sizeof g);
 #if MSFP_LAW
     memcpy(w.coefficient, run->work.coefficient, sizeof w.coefficient);
 #endif
-    const int status = msfp_condensed(&run->parameters, &at, &seed, &w, f, residual, NULL);
+    const int status = msfp_condensed(&run->parameters, &at, &seed, &w, g, residual, NULL);
     if (status)
         return status;
     const msfp_mechanical mechanical = msfp_mechanical_energy(&run->parameters, &at, &w);
@@ -116,11 +116,11 @@ static int at_stability_limit(const slope *sixth, const slope *last, const msfp_
 static int finish(msfp_run *run, const msfp_point *at, const slope *last, double h)
 {
     msfp_state *next = &run->next;
-    double f[NB][2], residual[MSFP_DOF];
+    double g[NB][2], residual[MSFP_DOF];
     msfp_seed seed = { 0 };
     memcpy(seed.fp, at->f, sizeof seed.fp);
-    memcpy(f, at->f, sizeof f);
-    const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, f, residual, NULL);
+    memcpy(g, at->f, sizeof g);
+    const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, g, residual, NULL);
     if (status)
         return status;
     next->t = run->now.t + h;

@@ -69,8 +69,10 @@ static void guess(const msfp_run *run, stages *s, int i, double h, int extrapola
 {
     const int sampled = run->options.sampled;
     memcpy(s->now.at.v, run->now.v, sizeof s->now.at.v);
-    if (i == 1)
-        memcpy(s->now.f, run->now.f, sizeof s->now.f);
+    for (int k = 0; k < NB && i == 1; ++k)
+        for (int d = 0; d < 2; ++d)
+            s->now.g[k][d] =
+                run->now.f[k][d] + run->parameters.surface[k][MSFP_SURFACE_PARAMETERS_TD] * run->now.df[k][d];
     for (int k = 0; k < NB && extrapolate; ++k)
         for (int d = 0; d < ND; ++d)
             s->now.at.v[k][unknown[d]] =

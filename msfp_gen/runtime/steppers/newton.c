@@ -70,9 +70,10 @@ static int evaluate(msfp_run *run, msfp_stage *s, msfp_work *w, double *residual
 {
     ++run->counts[MSFP_COUNT_EVALUATIONS];
     int worst = -1;
-    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->f, residual, tangent);
+    const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, w, s->g, residual, tangent);
     if (status)
         return status;
+    msfp_friction_state(w, s->f);
     s->seed.same_base = 1;
     *size = msfp_residual_size(&run->parameters, w, residual, &worst);
     run->worst_surface = worst < 0 ? run->worst_surface : worst / ND + 1;

@@ -72,7 +72,6 @@ static void guess(const msfp_run *run, msfp_stage *s, double h, int extrapolate)
         const double turn =
             extrapolate ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) + cubic_term(run, k, h) : 0.0;
         s->at.v[k][ANGLE] = (turn - s->seed.turn[k]) / s->beta;
-        s->f[k][0] = run->now.f[k][0];
     }
 }
 

@@ -50,14 +50,15 @@ double msfp_friction_jump_error(const msfp_state *now, const msfp_state *next);
 
 /* ---- newton.c: the equations of one stage ---- */
 
-/* Unknowns are the rates at.v; q = Q + beta v and a = inertia (v - V)/beta follow, Y and Z from the seed. */
+/* Unknowns are the rates at.v; q = Q + beta v and a = inertia (v - V)/beta follow, g, Y and Z from the seed. */
 typedef struct {
     double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
     double beta;    /* [s] */
     double inertia; /* 1; 0 leaves out all inertia */
     msfp_seed seed;
     msfp_point at;
-    double f[MSFP_NB][2];
+    double g[MSFP_NB][2]; /* friction force over -mu N; its first guess before the stage is solved */
+    double f[MSFP_NB][2]; /* Y, Z */
 } msfp_stage;
 
 /* First guesses of Newton's method, in the order in which they are tried. */
