@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,6 +58,41 @@ def test_condensed_form_equals_full_newton_and_reference(layout, spin, seed):
         assert np.abs(condensed.contact_angles - other.contact_angles).max() < 1e-9
     if spin == "locked":
         assert not condensed.acceleration[:, 2].any()
+
+
+def sheared(values: Any) -> Any:
+    """A reference stack with contact damping whose force is a tenth to a half of mu N at the slip of these states."""
+    times = np.linspace(2e-4, 1e-3, len(values.surfaces))
+    surfaces = tuple(replace(s, contact_damping=float(T)) for s, T in zip(values.surfaces, times, strict=True))
+    return replace(values, surfaces=surfaces)
+
+
+LAWS = ("report", "isotropic", "plastic")
+DAMPED = [((2, 0, 1), "report"), *(((5, 2, 2), law) for law in LAWS)]
+
+
+@pytest.mark.parametrize("damped", [True, False], ids=("damped", "undamped"))
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("layout", "law"), DAMPED)
+def test_laws_of_hysteresis_and_contact_damping_equal_the_reference(layout, law, seed, damped):
+    """Condensed and full equations and rates of friction; in the plastic law some of the surfaces slip."""
+    values, state, h, load = sensible(layout, seed)
+    values = sheared(values) if damped else values
+    h = h / np.maximum(1.0, np.linalg.norm(h, axis=1, keepdims=True))
+    h[0] /= np.linalg.norm(h[0])  # on the edge of the disc, where the plastic law slips or lets go
+    bearing, model = bearing_of(values), model_of(layout, bouc_wen=law)
+    found = model.evaluate(bearing, state.q, state.v, h, **inputs(state, load))
+    full = model.evaluate(bearing, state.q, state.v, h, formulation="report", **inputs(state, load))
+    want = stack.solve(values, replace(state, a=np.zeros_like(state.a)), h, load, "locked", law=law)
+    scale = 1.0 + np.abs(want.acceleration).max()
+    for other in (full, want):
+        assert np.abs(found.acceleration - other.acceleration).max() < 1e-9 * scale
+        assert np.abs(found.normal_force - other.normal_force).max() < 1e-9 * found.normal_force.max()
+    turn = kinematics.rotation(state)
+    touch = forces.contact(values, turn, kinematics.points(values, state, turn).r, found.contact_angles)
+    rates = forces.friction_rates(values, h, touch.slip, law)
+    for other in (found, full):
+        assert np.abs(other.friction_rate - rates).max() < 1e-8 * np.abs(rates).max()
 
 
 @pytest.mark.parametrize(("layout", "law"), [*((layout, "report") for layout in LAYOUTS), ((5, 2, 2), "isotropic")])
@@ -180,14 +216,16 @@ def test_report_jacobians_against_differences(layout, spin):
         {"spin": "patch"},
         {"spin": "free"},
         {"bouc_wen": "isotropic"},
+        {"bouc_wen": "plastic"},
         {"sliders": "massless"},
         {"dimension": "planar"},
     ],
     ids=str,
 )
-def test_combined_tangent_of_the_condensed_step(effects, beta):
+@pytest.mark.parametrize("damped", [False, True], ids=("undamped", "damped"))
+def test_combined_tangent_of_the_condensed_step(effects, beta, damped):
     """The tangent of the implicit step, seeded with its own factors, against differences of its residual."""
-    tangent, want, _ = tangents((5, 2, 2), effects, beta)
+    tangent, want, _ = tangents((5, 2, 2), effects, beta, damped=damped)
     assert np.abs(tangent - want).max() < 1e-7 * np.abs(want).max()
 
 
@@ -211,9 +249,10 @@ def test_tangent_in_any_stack_below_any_top(layout, effects, top):
     assert np.abs(away - tangent).max() > 1e-5 * np.abs(tangent).max(), "rims are met"
 
 
-def tangents(layout, effects, beta, top=None, base_moves=False, capacity=None):
+def tangents(layout, effects, beta, top=None, base_moves=False, capacity=None, damped=False):
     """The tangent, the same by differences of the residual, and the tangent with every rim far away."""
     values, state, h, load = sensible(layout, 7)
+    values = sheared(values) if damped else values
     model = model_of(layout, **effects)
     bearing = bearing_of(values)
     if capacity:

@@ -66,9 +66,11 @@ def normal_forces(normal: Array, touch: Contact) -> Array:
     return normal[:, None] * touch.basis[:, 2]
 
 
-def friction_forces(bearing: Any, normal: Array, h: Array, touch: Contact) -> Array:
-    """-mu N (Y t~_1 + Z t~_2): (3.16), (3.17); h = (Y, Z), shape (n-1, 2)."""
+def friction_forces(bearing: Any, normal: Array, h: Array, touch: Contact, law: str = "report") -> Array:
+    """-mu N (Y t~_1 + Z t~_2): (3.16), (3.17), and T times the rates of Y, Z beside them; h = (Y, Z), (n-1, 2)."""
     mu = np.array([s.friction for s in bearing.surfaces])
+    T = np.array([s.contact_damping for s in bearing.surfaces])
+    h = h + T[:, None] * friction_rates(bearing, h, touch.slip, law)
     direction = h[:, :1] * touch.basis[:, 0] + h[:, 1:] * touch.basis[:, 1]
     force: Array = -(mu * normal)[:, None] * direction
     return force
@@ -83,10 +85,23 @@ def switches(h: Array, slip: Array, law: str) -> Array:
 
 
 def friction_rates(bearing: Any, h: Array, slip: Array, law: str = "report") -> Array:
-    """(Y', Z') of (3.18) with 1/d_y for the printed factor, shape (n-1, 2) [1/s]."""
+    """(Y', Z') of (3.18) with 1/d_y for the printed factor, shape (n-1, 2) [1/s]; "plastic": see below."""
+    if law == "plastic":
+        return np.array([_plastic_rate(s, f, v) for s, f, v in zip(bearing.surfaces, h, slip, strict=True)])
     (Y, Z), (u, v), (a, b) = h.T, slip.T, switches(h, slip, law).T
     d_y = np.array([s.yield_displacement for s in bearing.surfaces])
     return np.stack([((1 - a * Y**2) * u - b * Y * Z * v) / d_y, ((1 - b * Z**2) * v - a * Y * Z * u) / d_y], axis=1)
+
+
+def _plastic_rate(surface: Any, h: Array, slip: Array) -> Array:
+    """A spring of stiffness 1/d_y and a damper T/d_y beside it, in line with a slider that slips at |h + T h'| = 1."""
+    elastic, T = slip / surface.yield_displacement, surface.contact_damping
+    if T > 0:
+        force = h + T * elastic
+        size = np.sqrt(force @ force)
+        return (force / size - h) / T if size.real > 1 else elastic
+    outward = h @ elastic
+    return elastic - h * outward if (h @ h).real > 1 - 1e-9 and outward.real > 0 else elastic
 
 
 def rim(bearing: Any, turn: Rotation, r: dict[str, Array]) -> Rim:

@@ -22,7 +22,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Surface:
-    """R [m], s_c [m], mu, d_y [m], k_c [N/m], c_c [N s/m]."""
+    """R [m], s_c [m], mu, d_y [m], k_c [N/m], c_c [N s/m], T [s]."""
 
     radius: float
     capacity: float
@@ -30,6 +30,7 @@ class Surface:
     yield_displacement: float
     rim_stiffness: float
     rim_damping: float
+    contact_damping: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,15 @@ class Solution(NamedTuple):
 
 
 def interfaces(
-    bearing: Any, turn: Rotation, at: Points, h: Array, angles: Array, normal: Array, spin: str, rims: bool = True
+    bearing: Any,
+    turn: Rotation,
+    at: Points,
+    h: Array,
+    angles: Array,
+    normal: Array,
+    spin: str,
+    rims: bool = True,
+    law: str = "report",
 ) -> Interfaces:
     """Contact, friction, rim and drilling action at every surface; spin is "free", "locked" or "patch"."""
     touch, rim = forces.contact(bearing, turn, at.r, angles), forces.rim(bearing, turn, at.r)
@@ -59,7 +67,7 @@ def interfaces(
         touch,
         rim if rims else rim._replace(force=np.zeros_like(rim.force)),
         forces.normal_forces(normal, touch),
-        forces.friction_forces(bearing, normal, h, touch),
+        forces.friction_forces(bearing, normal, h, touch, law),
         drilling if spin == "patch" else np.zeros_like(drilling),
     )
 
@@ -81,11 +89,12 @@ def balances(
     load: Load,
     spin: str = "free",
     rims: bool = True,
+    law: str = "report",
 ) -> Balances:
     """(3.26)-(3.29) at given unknowns: state.a, contact angles (n-1, 2) [rad], normal (n-1,) [N]."""
     turn = rotation(state)
     at = points(bearing, state, turn)
-    act = interfaces(bearing, turn, at, h, angles, normal, spin, rims)
+    act = interfaces(bearing, turn, at, h, angles, normal, spin, rims, law)
     linear, angular = [], []
     for k in range(2, bearing.layout.n + 1):
         force, moment = _applied(bearing, at, act, load, k)
@@ -115,7 +124,9 @@ def _applied(bearing: Any, at: Points, act: Interfaces, load: Load, k: int) -> t
     return force, moment
 
 
-def solve(bearing: Any, state: State, h: Array, load: Load, spin: str = "free", rims: bool = True) -> Solution:
+def solve(
+    bearing: Any, state: State, h: Array, load: Load, spin: str = "free", rims: bool = True, law: str = "report"
+) -> Solution:
     """The unknowns (2.119) at a state (its `a` is the first guess), by a damped Newton with complex-step Jacobian.
 
     spin="locked" replaces the angular balance about t_3^k by phi_k'' = 0.
@@ -132,7 +143,7 @@ def solve(bearing: Any, state: State, h: Array, load: Load, spin: str = "free", 
 
     def residual(x: Array) -> Array:
         trial, angles, normal = parts(x)
-        left = balances(bearing, trial, h, angles, normal, load, spin, rims)
+        left = balances(bearing, trial, h, angles, normal, load, spin, rims, law)
         angular = left.angular_body / size
         if spin == "locked":
             angular[:, 2] = trial.a[:, 2]
@@ -141,7 +152,8 @@ def solve(bearing: Any, state: State, h: Array, load: Load, spin: str = "free", 
     start = np.concatenate([state.a.ravel(), np.zeros(2 * count), np.ones(count)])
     x, iterations = newton(residual, start)
     trial, angles, normal = parts(x)
-    return Solution(trial.a, angles, normal, balances(bearing, trial, h, angles, normal, load, spin, rims), iterations)
+    left = balances(bearing, trial, h, angles, normal, load, spin, rims, law)
+    return Solution(trial.a, angles, normal, left, iterations)
 
 
 def newton(

@@ -16,116 +16,126 @@ static inline double msfp_heaviside(double x) { return x > 0.0 ? 1.0 : 0.0; }
 static inline double msfp_angle(double sine, double cosine) { return cosine > 0.7 ? asin(sine) : atan2(sine, cosine); }
 
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
- * 42 operations; out: contact. All surfaces at once: [field][MSFP_LANES]. */
+ * 45 operations; out: contact. All surfaces at once: [field][MSFP_LANES]. */
 MSFP_INLINED
-static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict loc /* local */, const double *restrict f /* friction */, double *restrict out)
+static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* local */, const double *restrict g /* shear */, double *restrict out)
 {
     for (int s = 0; s < MSFP_LANES; ++s) {
         const double par_sign = par[0 * MSFP_LANES + s];
         const double par_R = par[1 * MSFP_LANES + s];
         const double par_mu = par[3 * MSFP_LANES + s];
         const double par_dy = par[4 * MSFP_LANES + s];
+        const double h_Y = h[0 * MSFP_LANES + s];
+        const double h_rest = h[2 * MSFP_LANES + s];
         const double loc_px = loc[0 * MSFP_LANES + s];
         const double loc_pz = loc[1 * MSFP_LANES + s];
         const double loc_dwy = loc[2 * MSFP_LANES + s];
-        const double f_Y = f[0 * MSFP_LANES + s];
-        const double s_1 = -f_Y*par_mu;
-        const double s_2 = sqrt((s_1*s_1) + 1);
-        const double N_3 = sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/s_2;
-        const double px_4 = loc_px/N_3;
-        const double s_6 = (s_1*s_1) + 1;
-        const double s_7 = sqrt(-(px_4*px_4) + s_6);
-        const double s_8 = (px_4 - s_1*s_7)/s_6;
-        const double s_9 = (px_4*s_1 + s_7)/s_6;
-        const double s_10 = par_R*par_sign;
-        const double u_11 = -loc_dwy*s_10;
-        const double s_12 = f_Y*u_11;
-        const double s_13 = msfp_heaviside(s_12);
-        const double s_15 = s_12*s_13;
-        const double s_16 = s_13*u_11;
-        const double dY_17 = (-f_Y*s_15 + u_11)/par_dy;
-        const double s_18 = N_3*par_mu*s_10;
-        const double s_19 = f_Y*s_18;
-        const double out_20 = (-f_Y*s_16 - s_15)/par_dy;
-        out[0 * MSFP_LANES + s] = s_19; /* My */
-        out[1 * MSFP_LANES + s] = dY_17; /* dY */
-        out[2 * MSFP_LANES + s] = N_3; /* N */
-        out[3 * MSFP_LANES + s] = s_8; /* st */
-        out[4 * MSFP_LANES + s] = s_9; /* ct */
-        out[5 * MSFP_LANES + s] = u_11; /* u */
-        out[6 * MSFP_LANES + s] = out_20; /* YY */
+        const double g_Y = g[0 * MSFP_LANES + s];
+        const double s_1 = g_Y - h_rest*(g_Y - h_Y);
+        const double s_3 = -g_Y*par_mu;
+        const double s_4 = sqrt((s_3*s_3) + 1);
+        const double N_5 = sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/s_4;
+        const double px_6 = loc_px/N_5;
+        const double s_8 = (s_3*s_3) + 1;
+        const double s_9 = sqrt(-(px_6*px_6) + s_8);
+        const double s_10 = (px_6 - s_3*s_9)/s_8;
+        const double s_11 = (px_6*s_3 + s_9)/s_8;
+        const double s_12 = par_R*par_sign;
+        const double u_13 = -loc_dwy*s_12;
+        const double s_14 = s_1*u_13;
+        const double s_15 = msfp_heaviside(s_14);
+        const double s_17 = s_14*s_15;
+        const double s_18 = s_15*u_13;
+        const double dY_21 = (-s_1*s_17 + u_13)/par_dy;
+        const double s_23 = N_5*par_mu*s_12;
+        const double s_24 = g_Y*s_23;
+        const double out_25 = (-s_1*s_18 - s_17)/par_dy;
+        out[0 * MSFP_LANES + s] = s_24; /* My */
+        out[1 * MSFP_LANES + s] = dY_21; /* dY */
+        out[2 * MSFP_LANES + s] = N_5; /* N */
+        out[3 * MSFP_LANES + s] = s_1; /* Y */
+        out[4 * MSFP_LANES + s] = s_10; /* st */
+        out[5 * MSFP_LANES + s] = s_11; /* ct */
+        out[6 * MSFP_LANES + s] = u_13; /* u */
+        out[7 * MSFP_LANES + s] = out_25; /* YY */
     }
 }
 MSFP_INLINED
-static inline void msfp_contact_jacobian(const double *restrict par /* surface_parameters */, const double *restrict loc /* local */, const double *restrict f /* friction */, double *restrict out, double *restrict jacobian /* [row][input] */)
+static inline void msfp_contact_jacobian(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* local */, const double *restrict g /* shear */, double *restrict out, double *restrict jacobian /* [row][input] */)
 {
     for (int s = 0; s < MSFP_LANES; ++s) {
         const double par_sign = par[0 * MSFP_LANES + s];
         const double par_R = par[1 * MSFP_LANES + s];
         const double par_mu = par[3 * MSFP_LANES + s];
         const double par_dy = par[4 * MSFP_LANES + s];
+        const double h_Y = h[0 * MSFP_LANES + s];
+        const double h_rest = h[2 * MSFP_LANES + s];
         const double loc_px = loc[0 * MSFP_LANES + s];
         const double loc_pz = loc[1 * MSFP_LANES + s];
         const double loc_dwy = loc[2 * MSFP_LANES + s];
-        const double f_Y = f[0 * MSFP_LANES + s];
-        const double s_1 = -f_Y*par_mu;
-        const double s_2 = sqrt((s_1*s_1) + 1);
-        const double N_3 = sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/s_2;
-        const double px_4 = loc_px/N_3;
-        const double s_6 = (s_1*s_1) + 1;
-        const double s_7 = sqrt(-(px_4*px_4) + s_6);
-        const double s_8 = (px_4 - s_1*s_7)/s_6;
-        const double s_9 = (px_4*s_1 + s_7)/s_6;
-        const double s_10 = par_R*par_sign;
-        const double u_11 = -loc_dwy*s_10;
-        const double s_12 = f_Y*u_11;
-        const double s_13 = msfp_heaviside(s_12);
-        const double s_15 = s_12*s_13;
-        const double s_16 = s_13*u_11;
-        const double dY_17 = (-f_Y*s_15 + u_11)/par_dy;
-        const double s_18 = N_3*par_mu*s_10;
-        const double s_19 = f_Y*s_18;
-        const double out_20 = (-f_Y*s_16 - s_15)/par_dy;
-        out[0 * MSFP_LANES + s] = s_19; /* My */
-        out[1 * MSFP_LANES + s] = dY_17; /* dY */
-        out[2 * MSFP_LANES + s] = N_3; /* N */
-        out[3 * MSFP_LANES + s] = s_8; /* st */
-        out[4 * MSFP_LANES + s] = s_9; /* ct */
-        out[5 * MSFP_LANES + s] = u_11; /* u */
-        out[6 * MSFP_LANES + s] = out_20; /* YY */
-        const double p_s_2_s_1 = s_1/sqrt((s_1*s_1) + 1);
-        const double p_N_3_loc_px = loc_px/(s_2*sqrt((loc_px*loc_px) + (loc_pz*loc_pz)));
-        const double p_N_3_loc_pz = loc_pz/(s_2*sqrt((loc_px*loc_px) + (loc_pz*loc_pz)));
-        const double p_N_3_s_2 = -sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/(s_2*s_2);
-        const double p_dY_17_f_Y = -s_15/par_dy;
-        const double p_dY_17_s_15 = -f_Y/par_dy;
-        const double p_dY_17_u_11 = 1.0/par_dy;
-        const double p_s_18_N_3 = par_mu*s_10;
-        const double j_s_18_loc_px = p_N_3_loc_px*p_s_18_N_3;
-        const double j_s_19_loc_px = f_Y*j_s_18_loc_px;
-        const double j_s_18_loc_pz = p_N_3_loc_pz*p_s_18_N_3;
-        const double j_s_19_loc_pz = f_Y*j_s_18_loc_pz;
-        const double j_s_12_loc_dwy = -f_Y*s_10;
-        const double j_s_15_loc_dwy = j_s_12_loc_dwy*s_13;
-        const double j_dY_17_loc_dwy = j_s_15_loc_dwy*p_dY_17_s_15 - p_dY_17_u_11*s_10;
-        const double j_s_2_f_Y = -p_s_2_s_1*par_mu;
-        const double j_N_3_f_Y = j_s_2_f_Y*p_N_3_s_2;
-        const double j_s_15_f_Y = s_13*u_11;
-        const double j_dY_17_f_Y = j_s_15_f_Y*p_dY_17_s_15 + p_dY_17_f_Y;
-        const double j_s_18_f_Y = j_N_3_f_Y*p_s_18_N_3;
-        const double j_s_19_f_Y = f_Y*j_s_18_f_Y + s_18;
-        jacobian[0 * MSFP_LANES + s] = j_s_19_loc_px;
+        const double g_Y = g[0 * MSFP_LANES + s];
+        const double s_1 = g_Y - h_rest*(g_Y - h_Y);
+        const double s_3 = -g_Y*par_mu;
+        const double s_4 = sqrt((s_3*s_3) + 1);
+        const double N_5 = sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/s_4;
+        const double px_6 = loc_px/N_5;
+        const double s_8 = (s_3*s_3) + 1;
+        const double s_9 = sqrt(-(px_6*px_6) + s_8);
+        const double s_10 = (px_6 - s_3*s_9)/s_8;
+        const double s_11 = (px_6*s_3 + s_9)/s_8;
+        const double s_12 = par_R*par_sign;
+        const double u_13 = -loc_dwy*s_12;
+        const double s_14 = s_1*u_13;
+        const double s_15 = msfp_heaviside(s_14);
+        const double s_17 = s_14*s_15;
+        const double s_18 = s_15*u_13;
+        const double dY_21 = (-s_1*s_17 + u_13)/par_dy;
+        const double s_23 = N_5*par_mu*s_12;
+        const double s_24 = g_Y*s_23;
+        const double out_25 = (-s_1*s_18 - s_17)/par_dy;
+        out[0 * MSFP_LANES + s] = s_24; /* My */
+        out[1 * MSFP_LANES + s] = dY_21; /* dY */
+        out[2 * MSFP_LANES + s] = N_5; /* N */
+        out[3 * MSFP_LANES + s] = s_1; /* Y */
+        out[4 * MSFP_LANES + s] = s_10; /* st */
+        out[5 * MSFP_LANES + s] = s_11; /* ct */
+        out[6 * MSFP_LANES + s] = u_13; /* u */
+        out[7 * MSFP_LANES + s] = out_25; /* YY */
+        const double p_s_1_g_Y = 1 - h_rest;
+        const double p_s_4_s_3 = s_3/sqrt((s_3*s_3) + 1);
+        const double p_N_5_loc_px = loc_px/(s_4*sqrt((loc_px*loc_px) + (loc_pz*loc_pz)));
+        const double p_N_5_loc_pz = loc_pz/(s_4*sqrt((loc_px*loc_px) + (loc_pz*loc_pz)));
+        const double p_N_5_s_4 = -sqrt((loc_px*loc_px) + (loc_pz*loc_pz))/(s_4*s_4);
+        const double p_dY_21_s_1 = -s_17/par_dy;
+        const double p_dY_21_s_17 = -s_1/par_dy;
+        const double p_dY_21_u_13 = 1.0/par_dy;
+        const double p_s_23_N_5 = par_mu*s_12;
+        const double j_s_23_loc_px = p_N_5_loc_px*p_s_23_N_5;
+        const double j_s_24_loc_px = g_Y*j_s_23_loc_px;
+        const double j_s_23_loc_pz = p_N_5_loc_pz*p_s_23_N_5;
+        const double j_s_24_loc_pz = g_Y*j_s_23_loc_pz;
+        const double j_s_14_loc_dwy = -s_1*s_12;
+        const double j_s_17_loc_dwy = j_s_14_loc_dwy*s_15;
+        const double j_dY_21_loc_dwy = j_s_17_loc_dwy*p_dY_21_s_17 - p_dY_21_u_13*s_12;
+        const double j_s_4_g_Y = -p_s_4_s_3*par_mu;
+        const double j_N_5_g_Y = j_s_4_g_Y*p_N_5_s_4;
+        const double j_s_14_g_Y = p_s_1_g_Y*u_13;
+        const double j_s_17_g_Y = j_s_14_g_Y*s_15;
+        const double j_dY_21_g_Y = j_s_17_g_Y*p_dY_21_s_17 + p_dY_21_s_1*p_s_1_g_Y;
+        const double j_s_23_g_Y = j_N_5_g_Y*p_s_23_N_5;
+        const double j_s_24_g_Y = g_Y*j_s_23_g_Y + s_23;
+        jacobian[0 * MSFP_LANES + s] = j_s_24_loc_px;
         jacobian[4 * MSFP_LANES + s] = 0;
-        jacobian[8 * MSFP_LANES + s] = p_N_3_loc_px;
-        jacobian[1 * MSFP_LANES + s] = j_s_19_loc_pz;
+        jacobian[8 * MSFP_LANES + s] = p_N_5_loc_px;
+        jacobian[1 * MSFP_LANES + s] = j_s_24_loc_pz;
         jacobian[5 * MSFP_LANES + s] = 0;
-        jacobian[9 * MSFP_LANES + s] = p_N_3_loc_pz;
+        jacobian[9 * MSFP_LANES + s] = p_N_5_loc_pz;
         jacobian[2 * MSFP_LANES + s] = 0;
-        jacobian[6 * MSFP_LANES + s] = j_dY_17_loc_dwy;
+        jacobian[6 * MSFP_LANES + s] = j_dY_21_loc_dwy;
         jacobian[10 * MSFP_LANES + s] = 0;
-        jacobian[3 * MSFP_LANES + s] = j_s_19_f_Y;
-        jacobian[7 * MSFP_LANES + s] = j_dY_17_f_Y;
-        jacobian[11 * MSFP_LANES + s] = j_N_3_f_Y;
+        jacobian[3 * MSFP_LANES + s] = j_s_24_g_Y;
+        jacobian[7 * MSFP_LANES + s] = j_dY_21_g_Y;
+        jacobian[11 * MSFP_LANES + s] = j_N_5_g_Y;
     }
 }
 
@@ -494,7 +504,7 @@ static inline void msfp_surface_local_tangent(const double *restrict b, const do
 }
 
 /* contact force and moment at given psi~, theta~, N: (3.13)-(3.19).
- * 23 operations; out: report_contact. */
+ * 25 operations; out: report_contact. */
 MSFP_INLINED
 static inline void msfp_report_contact(const double *restrict par /* surface_parameters */, const double *restrict x /* unknowns */, const double *restrict f /* friction */, const double *restrict loc /* local */, double *restrict out)
 {
@@ -502,6 +512,7 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double par_R = par[1];
     const double par_mu = par[3];
     const double par_dy = par[4];
+    const double par_td = par[5];
     const double x_theta = x[0];
     const double x_N = x[1];
     const double f_Y = f[0];
@@ -513,17 +524,18 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double s_5 = f_Y*u_4;
     const double s_6 = msfp_heaviside(s_5);
     const double s_8 = s_5*s_6;
-    const double dY_10 = (-f_Y*s_8 + u_4)/par_dy;
-    const double s_11 = par_mu*s_3*x_N;
-    const double s_12 = f_Y*s_11;
-    const double s_13 = -par_mu*x_N;
-    const double s_14 = f_Y*s_13;
-    const double out_15 = s_1*x_N + s_14*s_2;
-    const double out_16 = -s_1*s_14 + s_2*x_N;
-    out[0] = out_15; /* px */
-    out[1] = out_16; /* pz */
-    out[2] = s_12; /* My */
-    out[3] = dY_10; /* dY */
+    const double dY_12 = (-f_Y*s_8 + u_4)/par_dy;
+    const double s_14 = dY_12*par_td + f_Y;
+    const double s_15 = par_mu*s_3*x_N;
+    const double s_16 = s_14*s_15;
+    const double s_17 = -par_mu*x_N;
+    const double s_18 = s_14*s_17;
+    const double out_19 = s_1*x_N + s_18*s_2;
+    const double out_20 = -s_1*s_18 + s_2*x_N;
+    out[0] = out_19; /* px */
+    out[1] = out_20; /* pz */
+    out[2] = s_16; /* My */
+    out[3] = dY_12; /* dY */
 }
 
 MSFP_INLINED
@@ -533,6 +545,7 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double par_R = par[1];
     const double par_mu = par[3];
     const double par_dy = par[4];
+    const double par_td = par[5];
     const double x_theta = x[0];
     const double x_N = x[1];
     const double f_Y = f[0];
@@ -544,23 +557,24 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double s_5 = f_Y*u_4;
     const double s_6 = msfp_heaviside(s_5);
     const double s_8 = s_5*s_6;
-    const double dY_10 = (-f_Y*s_8 + u_4)/par_dy;
-    const double s_11 = par_mu*s_3*x_N;
-    const double s_12 = f_Y*s_11;
-    const double s_13 = -par_mu*x_N;
-    const double s_14 = f_Y*s_13;
-    const double out_15 = s_1*x_N + s_14*s_2;
-    const double out_16 = -s_1*s_14 + s_2*x_N;
-    out[0] = out_15; /* px */
-    out[1] = out_16; /* pz */
-    out[2] = s_12; /* My */
-    out[3] = dY_10; /* dY */
+    const double dY_12 = (-f_Y*s_8 + u_4)/par_dy;
+    const double s_14 = dY_12*par_td + f_Y;
+    const double s_15 = par_mu*s_3*x_N;
+    const double s_16 = s_14*s_15;
+    const double s_17 = -par_mu*x_N;
+    const double s_18 = s_14*s_17;
+    const double out_19 = s_1*x_N + s_18*s_2;
+    const double out_20 = -s_1*s_18 + s_2*x_N;
+    out[0] = out_19; /* px */
+    out[1] = out_20; /* pz */
+    out[2] = s_16; /* My */
+    out[3] = dY_12; /* dY */
     const double p_s_1_x_theta = cos(x_theta);
     const double p_s_2_x_theta = -sin(x_theta);
-    const double p_dY_10_f_Y = -s_8/par_dy;
-    const double p_dY_10_s_8 = -f_Y/par_dy;
-    const double p_dY_10_u_4 = 1.0/par_dy;
-    const double p_s_11_x_N = par_mu*s_3;
+    const double p_dY_12_f_Y = -s_8/par_dy;
+    const double p_dY_12_s_8 = -f_Y/par_dy;
+    const double p_dY_12_u_4 = 1.0/par_dy;
+    const double p_s_15_x_N = par_mu*s_3;
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_x_theta = dx[0 * MSFP_DOF + c];
         const double d_x_N = dx[1 * MSFP_DOF + c];
@@ -571,17 +585,18 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
         const double d_u_4 = -s_3*d_loc_dwy;
         const double d_s_5 = u_4*d_f_Y + f_Y*d_u_4;
         const double d_s_8 = s_6*d_s_5;
-        const double d_dY_10 = p_dY_10_f_Y*d_f_Y + p_dY_10_s_8*d_s_8 + p_dY_10_u_4*d_u_4;
-        const double d_s_11 = p_s_11_x_N*d_x_N;
-        const double d_s_12 = s_11*d_f_Y + f_Y*d_s_11;
-        const double d_s_13 = -par_mu*d_x_N;
-        const double d_s_14 = s_13*d_f_Y + f_Y*d_s_13;
-        const double d_out_15 = x_N*d_s_1 + s_2*d_s_14 + s_14*d_s_2 + s_1*d_x_N;
-        const double d_out_16 = -s_14*d_s_1 - s_1*d_s_14 + x_N*d_s_2 + s_2*d_x_N;
-        dout[0 * MSFP_DOF + c] = d_out_15;
-        dout[1 * MSFP_DOF + c] = d_out_16;
-        dout[2 * MSFP_DOF + c] = d_s_12;
-        dout[3 * MSFP_DOF + c] = d_dY_10;
+        const double d_dY_12 = p_dY_12_f_Y*d_f_Y + p_dY_12_s_8*d_s_8 + p_dY_12_u_4*d_u_4;
+        const double d_s_14 = par_td*d_dY_12 + d_f_Y;
+        const double d_s_15 = p_s_15_x_N*d_x_N;
+        const double d_s_16 = s_15*d_s_14 + s_14*d_s_15;
+        const double d_s_17 = -par_mu*d_x_N;
+        const double d_s_18 = s_17*d_s_14 + s_14*d_s_17;
+        const double d_out_19 = x_N*d_s_1 + s_2*d_s_18 + s_18*d_s_2 + s_1*d_x_N;
+        const double d_out_20 = -s_18*d_s_1 - s_1*d_s_18 + x_N*d_s_2 + s_2*d_x_N;
+        dout[0 * MSFP_DOF + c] = d_out_19;
+        dout[1 * MSFP_DOF + c] = d_out_20;
+        dout[2 * MSFP_DOF + c] = d_s_16;
+        dout[3 * MSFP_DOF + c] = d_dY_12;
     }
 }
 
@@ -1036,9 +1051,9 @@ static inline void msfp_rim(const double *restrict par /* surface_parameters */,
     const double par_sign = par[0];
     const double par_R = par[1];
     const double par_sc = par[2];
-    const double par_kc = par[5];
-    const double par_cc = par[6];
-    const double par_pr = par[8];
+    const double par_kc = par[6];
+    const double par_cc = par[7];
+    const double par_pr = par[9];
     const double x_theta = x[0];
     const double x_theta1 = x[1];
     const double s_1 = sin(x_theta);
@@ -1075,9 +1090,9 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     const double par_sign = par[0];
     const double par_R = par[1];
     const double par_sc = par[2];
-    const double par_kc = par[5];
-    const double par_cc = par[6];
-    const double par_pr = par[8];
+    const double par_kc = par[6];
+    const double par_cc = par[7];
+    const double par_pr = par[9];
     const double x_theta = x[0];
     const double x_theta1 = x[1];
     const double s_1 = sin(x_theta);

@@ -30,7 +30,7 @@
 #define MSFP_UPLIFT 0
 #define MSFP_CLOSED_FORM 0 /* friction is a function of the slip of a step: planar, massless, constant coefficient */
 #define MSFP_TOP_ROTATION 0 /* the support of the top plate rotates as prescribed */
-#define MSFP_ISOTROPIC 0
+#define MSFP_PLASTIC 0 /* friction is elastic-perfectly plastic */
 #define MSFP_LAW 0 /* mu = constant */
 #define MSFP_LAW_VALUES 0 /* numbers of the friction law, the last ones of a surface */
 #define MSFP_HEAT 0 /* exponential states of the temperature of a surface */
@@ -117,15 +117,16 @@ enum {
     MSFP_SURFACE_PARAMETERS_SC = 2, /* [m] s_c, sliding capacity (3.21) */
     MSFP_SURFACE_PARAMETERS_MU = 3, /* [-] friction coefficient (3.16) */
     MSFP_SURFACE_PARAMETERS_DY = 4, /* [m] yield displacement, R_0/R of (3.18) */
-    MSFP_SURFACE_PARAMETERS_KC = 5, /* [N/m] rim stiffness (3.23) */
-    MSFP_SURFACE_PARAMETERS_CC = 6, /* [N s/m] rim damping (3.23) */
-    MSFP_SURFACE_PARAMETERS_RS = 7, /* [m] radius of the slider that carries the contact patch */
-    MSFP_SURFACE_PARAMETERS_PR = 8, /* [m] p, height of the rim contact above the slider's face (3.25) */
-    MSFP_SURFACE_PARAMETERS_KS = 9, /* [N/m] stiffness of the unilateral contact, along the interface force (docs/uplift.md) */
-    MSFP_SURFACE_PARAMETERS_CS = 10, /* [s/m] damping of the unilateral contact, over its stiffness and compression */
-    MSFP_SURFACE_PARAMETERS_CA = 11, /* [-] cosine of the half-angle of the footprint, friction angle included */
-    MSFP_SURFACE_PARAMETERS_SA = 12, /* [-] sine of that angle */
-    MSFP_SURFACE_PARAMETERS_SIZE = 13
+    MSFP_SURFACE_PARAMETERS_TD = 5, /* [s] T, damping time of the sheared contact (docs/contact_damping.md) */
+    MSFP_SURFACE_PARAMETERS_KC = 6, /* [N/m] rim stiffness (3.23) */
+    MSFP_SURFACE_PARAMETERS_CC = 7, /* [N s/m] rim damping (3.23) */
+    MSFP_SURFACE_PARAMETERS_RS = 8, /* [m] radius of the slider that carries the contact patch */
+    MSFP_SURFACE_PARAMETERS_PR = 9, /* [m] p, height of the rim contact above the slider's face (3.25) */
+    MSFP_SURFACE_PARAMETERS_KS = 10, /* [N/m] stiffness of the unilateral contact, along the interface force (docs/uplift.md) */
+    MSFP_SURFACE_PARAMETERS_CS = 11, /* [s/m] damping of the unilateral contact, over its stiffness and compression */
+    MSFP_SURFACE_PARAMETERS_CA = 12, /* [-] cosine of the half-angle of the footprint, friction angle included */
+    MSFP_SURFACE_PARAMETERS_SA = 13, /* [-] sine of that angle */
+    MSFP_SURFACE_PARAMETERS_SIZE = 14
 };
 static inline double msfp_surface_parameters_sign(const double *block)
 {
@@ -147,37 +148,41 @@ static inline double msfp_surface_parameters_dy(const double *block)
 {
     return block[4];
 }
-static inline double msfp_surface_parameters_kc(const double *block)
+static inline double msfp_surface_parameters_td(const double *block)
 {
     return block[5];
 }
-static inline double msfp_surface_parameters_cc(const double *block)
+static inline double msfp_surface_parameters_kc(const double *block)
 {
     return block[6];
 }
-static inline double msfp_surface_parameters_rs(const double *block)
+static inline double msfp_surface_parameters_cc(const double *block)
 {
     return block[7];
 }
-static inline double msfp_surface_parameters_pr(const double *block)
+static inline double msfp_surface_parameters_rs(const double *block)
 {
     return block[8];
 }
-static inline double msfp_surface_parameters_ks(const double *block)
+static inline double msfp_surface_parameters_pr(const double *block)
 {
     return block[9];
 }
-static inline double msfp_surface_parameters_cs(const double *block)
+static inline double msfp_surface_parameters_ks(const double *block)
 {
     return block[10];
 }
-static inline double msfp_surface_parameters_ca(const double *block)
+static inline double msfp_surface_parameters_cs(const double *block)
 {
     return block[11];
 }
-static inline double msfp_surface_parameters_sa(const double *block)
+static inline double msfp_surface_parameters_ca(const double *block)
 {
     return block[12];
+}
+static inline double msfp_surface_parameters_sa(const double *block)
+{
+    return block[13];
 }
 
 /* top_parameters */
@@ -556,6 +561,46 @@ static inline double msfp_friction_Z(const double *block)
     return 0.0;
 }
 
+/* shear */
+enum {
+    MSFP_SHEAR_Y = 0, /* [-] friction force along t~1 over -mu N: Y + T dY/dt */
+    MSFP_SHEAR_SIZE = 1
+};
+static inline double msfp_shear_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_shear_Z(const double *block)
+{
+    (void)block;
+    return 0.0;
+}
+
+/* stage */
+enum {
+    MSFP_STAGE_Y = 0, /* [-] Y that the earlier stages of the step give; Y itself outside of a step */
+    MSFP_STAGE_TAU = 1, /* [s] beta + T, with beta the diagonal entry of the stage formula; 0 outside of a step */
+    MSFP_STAGE_REST = 2, /* [-] T/(beta + T) */
+    MSFP_STAGE_SIZE = 3
+};
+static inline double msfp_stage_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_stage_Z(const double *block)
+{
+    (void)block;
+    return 0.0;
+}
+static inline double msfp_stage_tau(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_stage_rest(const double *block)
+{
+    return block[2];
+}
+
 /* unknowns */
 enum {
     MSFP_UNKNOWNS_THETA = 0, /* [rad] theta~, second angle of the normal's position */
@@ -581,11 +626,12 @@ enum {
     MSFP_CONTACT_MY = 0, /* [N m] moment about the sphere centre, basis of the body below */
     MSFP_CONTACT_DY = 1, /* [1/s] dY/dt (3.18) */
     MSFP_CONTACT_N = 2, /* [N] normal force */
-    MSFP_CONTACT_ST = 3, /* [-] sin theta~ */
-    MSFP_CONTACT_CT = 4, /* [-] cos theta~ */
-    MSFP_CONTACT_U = 5, /* [m/s] slip velocity along t~1 (2.98) */
-    MSFP_CONTACT_YY = 6, /* [1/s] d(dY/dt)/dY at constant slip velocity */
-    MSFP_CONTACT_SIZE = 7
+    MSFP_CONTACT_Y = 3, /* [-] Y (3.18) */
+    MSFP_CONTACT_ST = 4, /* [-] sin theta~ */
+    MSFP_CONTACT_CT = 5, /* [-] cos theta~ */
+    MSFP_CONTACT_U = 6, /* [m/s] slip velocity along t~1 (2.98) */
+    MSFP_CONTACT_YY = 7, /* [1/s] d(dY/dt)/dY at constant slip velocity */
+    MSFP_CONTACT_SIZE = 8
 };
 static inline void msfp_contact_M_get(const double *block, double vector[3])
 {
@@ -610,6 +656,15 @@ static inline double msfp_contact_N(const double *block)
 {
     return block[2];
 }
+static inline double msfp_contact_Y(const double *block)
+{
+    return block[3];
+}
+static inline double msfp_contact_Z(const double *block)
+{
+    (void)block;
+    return 0.0;
+}
 static inline double msfp_contact_sp(const double *block)
 {
     (void)block;
@@ -622,15 +677,15 @@ static inline double msfp_contact_cp(const double *block)
 }
 static inline double msfp_contact_st(const double *block)
 {
-    return block[3];
+    return block[4];
 }
 static inline double msfp_contact_ct(const double *block)
 {
-    return block[4];
+    return block[5];
 }
 static inline double msfp_contact_u(const double *block)
 {
-    return block[5];
+    return block[6];
 }
 static inline double msfp_contact_v(const double *block)
 {
@@ -644,7 +699,7 @@ static inline double msfp_contact_drill(const double *block)
 }
 static inline double msfp_contact_YY(const double *block)
 {
-    return block[6];
+    return block[7];
 }
 static inline double msfp_contact_YZ(const double *block)
 {
@@ -1516,6 +1571,7 @@ enum msfp_surface_value {
     MSFP_SURFACE_VALUE_CAPACITY, /* [m] sliding capacity s_c */
     MSFP_SURFACE_VALUE_FRICTION, /* [-] friction coefficient mu */
     MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT, /* [m] yield displacement d_y */
+    MSFP_SURFACE_VALUE_CONTACT_DAMPING, /* [s] damping time T of the sheared contact */
     MSFP_SURFACE_VALUE_RIM_STIFFNESS, /* [N/m] stiffness k_c of the rim */
     MSFP_SURFACE_VALUE_RIM_DAMPING, /* [N s/m] damping c_c of the rim */
     MSFP_SURFACE_VALUES
@@ -1565,6 +1621,7 @@ enum msfp_integral {
     MSFP_WORK_INPUT, /* work done on the bearing and its top by the base motion and the loads */
     MSFP_WORK_FRICTION_STORED, /* recoverable energy stored in friction while stuck */
     MSFP_WORK_FRICTION_DISSIPATED, /* energy dissipated by friction */
+    MSFP_WORK_CONTACT_DISSIPATED, /* energy dissipated by the damping of sheared contacts */
     MSFP_WORK_RIM_DISSIPATED, /* energy dissipated at the rims */
     MSFP_WORK_TOP_DISSIPATED, /* energy dissipated by the dampers of the top */
     MSFP_WORK_SEAT_DISSIPATED, /* energy dissipated in the unilateral contacts */
@@ -1572,7 +1629,7 @@ enum msfp_integral {
 };
 static inline const char *msfp_integral_name(int value)
 {
-    static const char *const names[] = { "input", "friction_stored", "friction_dissipated", "rim_dissipated", "top_dissipated", "seat_dissipated" };
+    static const char *const names[] = { "input", "friction_stored", "friction_dissipated", "contact_dissipated", "rim_dissipated", "top_dissipated", "seat_dissipated" };
     return value >= 0 && value < MSFP_WORKS ? names[value] : "unknown";
 }
 

@@ -30,7 +30,7 @@
 #define MSFP_UPLIFT 0
 #define MSFP_CLOSED_FORM 0 /* friction is a function of the slip of a step: planar, massless, constant coefficient */
 #define MSFP_TOP_ROTATION 0 /* the support of the top plate rotates as prescribed */
-#define MSFP_ISOTROPIC 0
+#define MSFP_PLASTIC 0 /* friction is elastic-perfectly plastic */
 #define MSFP_LAW 1 /* mu = mu - (mu - friction_slow) * exp(-velocity_rate * v) */
 #define MSFP_LAW_VALUES 2 /* numbers of the friction law, the last ones of a surface */
 #define MSFP_HEAT 0 /* exponential states of the temperature of a surface */
@@ -117,17 +117,18 @@ enum {
     MSFP_SURFACE_PARAMETERS_SC = 2, /* [m] s_c, sliding capacity (3.21) */
     MSFP_SURFACE_PARAMETERS_MU = 3, /* [-] friction coefficient (3.16) */
     MSFP_SURFACE_PARAMETERS_DY = 4, /* [m] yield displacement, R_0/R of (3.18) */
-    MSFP_SURFACE_PARAMETERS_KC = 5, /* [N/m] rim stiffness (3.23) */
-    MSFP_SURFACE_PARAMETERS_CC = 6, /* [N s/m] rim damping (3.23) */
-    MSFP_SURFACE_PARAMETERS_RS = 7, /* [m] radius of the slider that carries the contact patch */
-    MSFP_SURFACE_PARAMETERS_PR = 8, /* [m] p, height of the rim contact above the slider's face (3.25) */
-    MSFP_SURFACE_PARAMETERS_KS = 9, /* [N/m] stiffness of the unilateral contact, along the interface force (docs/uplift.md) */
-    MSFP_SURFACE_PARAMETERS_CS = 10, /* [s/m] damping of the unilateral contact, over its stiffness and compression */
-    MSFP_SURFACE_PARAMETERS_CA = 11, /* [-] cosine of the half-angle of the footprint, friction angle included */
-    MSFP_SURFACE_PARAMETERS_SA = 12, /* [-] sine of that angle */
-    MSFP_SURFACE_PARAMETERS_FRICTION_SLOW = 13, /* [-] friction coefficient at rest */
-    MSFP_SURFACE_PARAMETERS_VELOCITY_RATE = 14, /* [s/m] rate a of the exponential increase of friction with the slip velocity */
-    MSFP_SURFACE_PARAMETERS_SIZE = 15
+    MSFP_SURFACE_PARAMETERS_TD = 5, /* [s] T, damping time of the sheared contact (docs/contact_damping.md) */
+    MSFP_SURFACE_PARAMETERS_KC = 6, /* [N/m] rim stiffness (3.23) */
+    MSFP_SURFACE_PARAMETERS_CC = 7, /* [N s/m] rim damping (3.23) */
+    MSFP_SURFACE_PARAMETERS_RS = 8, /* [m] radius of the slider that carries the contact patch */
+    MSFP_SURFACE_PARAMETERS_PR = 9, /* [m] p, height of the rim contact above the slider's face (3.25) */
+    MSFP_SURFACE_PARAMETERS_KS = 10, /* [N/m] stiffness of the unilateral contact, along the interface force (docs/uplift.md) */
+    MSFP_SURFACE_PARAMETERS_CS = 11, /* [s/m] damping of the unilateral contact, over its stiffness and compression */
+    MSFP_SURFACE_PARAMETERS_CA = 12, /* [-] cosine of the half-angle of the footprint, friction angle included */
+    MSFP_SURFACE_PARAMETERS_SA = 13, /* [-] sine of that angle */
+    MSFP_SURFACE_PARAMETERS_FRICTION_SLOW = 14, /* [-] friction coefficient at rest */
+    MSFP_SURFACE_PARAMETERS_VELOCITY_RATE = 15, /* [s/m] rate a of the exponential increase of friction with the slip velocity */
+    MSFP_SURFACE_PARAMETERS_SIZE = 16
 };
 static inline double msfp_surface_parameters_sign(const double *block)
 {
@@ -149,45 +150,49 @@ static inline double msfp_surface_parameters_dy(const double *block)
 {
     return block[4];
 }
-static inline double msfp_surface_parameters_kc(const double *block)
+static inline double msfp_surface_parameters_td(const double *block)
 {
     return block[5];
 }
-static inline double msfp_surface_parameters_cc(const double *block)
+static inline double msfp_surface_parameters_kc(const double *block)
 {
     return block[6];
 }
-static inline double msfp_surface_parameters_rs(const double *block)
+static inline double msfp_surface_parameters_cc(const double *block)
 {
     return block[7];
 }
-static inline double msfp_surface_parameters_pr(const double *block)
+static inline double msfp_surface_parameters_rs(const double *block)
 {
     return block[8];
 }
-static inline double msfp_surface_parameters_ks(const double *block)
+static inline double msfp_surface_parameters_pr(const double *block)
 {
     return block[9];
 }
-static inline double msfp_surface_parameters_cs(const double *block)
+static inline double msfp_surface_parameters_ks(const double *block)
 {
     return block[10];
 }
-static inline double msfp_surface_parameters_ca(const double *block)
+static inline double msfp_surface_parameters_cs(const double *block)
 {
     return block[11];
 }
-static inline double msfp_surface_parameters_sa(const double *block)
+static inline double msfp_surface_parameters_ca(const double *block)
 {
     return block[12];
 }
-static inline double msfp_surface_parameters_friction_slow(const double *block)
+static inline double msfp_surface_parameters_sa(const double *block)
 {
     return block[13];
 }
-static inline double msfp_surface_parameters_velocity_rate(const double *block)
+static inline double msfp_surface_parameters_friction_slow(const double *block)
 {
     return block[14];
+}
+static inline double msfp_surface_parameters_velocity_rate(const double *block)
+{
+    return block[15];
 }
 
 /* top_parameters */
@@ -615,6 +620,46 @@ static inline double msfp_friction_Z(const double *block)
     return block[1];
 }
 
+/* shear */
+enum {
+    MSFP_SHEAR_Y = 0, /* [-] friction force along t~1 over -mu N: Y + T dY/dt */
+    MSFP_SHEAR_Z = 1, /* [-] friction force along t~2 over -mu N: Z + T dZ/dt */
+    MSFP_SHEAR_SIZE = 2
+};
+static inline double msfp_shear_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_shear_Z(const double *block)
+{
+    return block[1];
+}
+
+/* stage */
+enum {
+    MSFP_STAGE_Y = 0, /* [-] Y that the earlier stages of the step give; Y itself outside of a step */
+    MSFP_STAGE_Z = 1, /* [-] Z likewise */
+    MSFP_STAGE_TAU = 2, /* [s] beta + T, with beta the diagonal entry of the stage formula; 0 outside of a step */
+    MSFP_STAGE_REST = 3, /* [-] T/(beta + T) */
+    MSFP_STAGE_SIZE = 4
+};
+static inline double msfp_stage_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_stage_Z(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_stage_tau(const double *block)
+{
+    return block[2];
+}
+static inline double msfp_stage_rest(const double *block)
+{
+    return block[3];
+}
+
 /* unknowns */
 enum {
     MSFP_UNKNOWNS_PSI = 0, /* [rad] psi~, first angle of the normal's position (2.85) */
@@ -644,20 +689,22 @@ enum {
     MSFP_CONTACT_DZ = 4, /* [1/s] dZ/dt (3.18) */
     MSFP_CONTACT_MU = 5, /* [-] friction coefficient by its law */
     MSFP_CONTACT_N = 6, /* [N] normal force */
-    MSFP_CONTACT_SP = 7, /* [-] sin psi~ */
-    MSFP_CONTACT_CP = 8, /* [-] cos psi~ */
-    MSFP_CONTACT_ST = 9, /* [-] sin theta~ */
-    MSFP_CONTACT_CT = 10, /* [-] cos theta~ */
-    MSFP_CONTACT_U = 11, /* [m/s] slip velocity along t~1 (2.98) */
-    MSFP_CONTACT_V = 12, /* [m/s] slip velocity along t~2 (2.98) */
-    MSFP_CONTACT_DRILL = 13, /* [W] power of the drilling moment */
-    MSFP_CONTACT_YY = 14, /* [1/s] d(dY/dt)/dY at constant slip velocity */
-    MSFP_CONTACT_YZ = 15, /* [1/s] d(dY/dt)/dZ */
-    MSFP_CONTACT_ZY = 16, /* [1/s] d(dZ/dt)/dY */
-    MSFP_CONTACT_ZZ = 17, /* [1/s] d(dZ/dt)/dZ */
-    MSFP_CONTACT_LAW_Y = 18, /* [-] d mu/dY at constant N and slip */
-    MSFP_CONTACT_LAW_Z = 19, /* [-] d mu/dZ at constant N and slip */
-    MSFP_CONTACT_SIZE = 20
+    MSFP_CONTACT_Y = 7, /* [-] Y (3.18) */
+    MSFP_CONTACT_Z = 8, /* [-] Z (3.18) */
+    MSFP_CONTACT_SP = 9, /* [-] sin psi~ */
+    MSFP_CONTACT_CP = 10, /* [-] cos psi~ */
+    MSFP_CONTACT_ST = 11, /* [-] sin theta~ */
+    MSFP_CONTACT_CT = 12, /* [-] cos theta~ */
+    MSFP_CONTACT_U = 13, /* [m/s] slip velocity along t~1 (2.98) */
+    MSFP_CONTACT_V = 14, /* [m/s] slip velocity along t~2 (2.98) */
+    MSFP_CONTACT_DRILL = 15, /* [W] power of the drilling moment */
+    MSFP_CONTACT_YY = 16, /* [1/s] d(dY/dt)/dY at constant slip velocity */
+    MSFP_CONTACT_YZ = 17, /* [1/s] d(dY/dt)/dZ */
+    MSFP_CONTACT_ZY = 18, /* [1/s] d(dZ/dt)/dY */
+    MSFP_CONTACT_ZZ = 19, /* [1/s] d(dZ/dt)/dZ */
+    MSFP_CONTACT_LAW_Y = 20, /* [-] d mu/dY at constant N and slip */
+    MSFP_CONTACT_LAW_Z = 21, /* [-] d mu/dZ at constant N and slip */
+    MSFP_CONTACT_SIZE = 22
 };
 static inline void msfp_contact_M_get(const double *block, double vector[3])
 {
@@ -683,49 +730,57 @@ static inline double msfp_contact_N(const double *block)
 {
     return block[6];
 }
-static inline double msfp_contact_sp(const double *block)
+static inline double msfp_contact_Y(const double *block)
 {
     return block[7];
 }
-static inline double msfp_contact_cp(const double *block)
+static inline double msfp_contact_Z(const double *block)
 {
     return block[8];
 }
-static inline double msfp_contact_st(const double *block)
+static inline double msfp_contact_sp(const double *block)
 {
     return block[9];
 }
-static inline double msfp_contact_ct(const double *block)
+static inline double msfp_contact_cp(const double *block)
 {
     return block[10];
 }
-static inline double msfp_contact_u(const double *block)
+static inline double msfp_contact_st(const double *block)
 {
     return block[11];
 }
-static inline double msfp_contact_v(const double *block)
+static inline double msfp_contact_ct(const double *block)
 {
     return block[12];
 }
-static inline double msfp_contact_drill(const double *block)
+static inline double msfp_contact_u(const double *block)
 {
     return block[13];
 }
-static inline double msfp_contact_YY(const double *block)
+static inline double msfp_contact_v(const double *block)
 {
     return block[14];
 }
-static inline double msfp_contact_YZ(const double *block)
+static inline double msfp_contact_drill(const double *block)
 {
     return block[15];
 }
-static inline double msfp_contact_ZY(const double *block)
+static inline double msfp_contact_YY(const double *block)
 {
     return block[16];
 }
-static inline double msfp_contact_ZZ(const double *block)
+static inline double msfp_contact_YZ(const double *block)
 {
     return block[17];
+}
+static inline double msfp_contact_ZY(const double *block)
+{
+    return block[18];
+}
+static inline double msfp_contact_ZZ(const double *block)
+{
+    return block[19];
 }
 static inline double msfp_contact_mu(const double *block)
 {
@@ -733,11 +788,11 @@ static inline double msfp_contact_mu(const double *block)
 }
 static inline double msfp_contact_law_Y(const double *block)
 {
-    return block[18];
+    return block[20];
 }
 static inline double msfp_contact_law_Z(const double *block)
 {
-    return block[19];
+    return block[21];
 }
 
 /* report_contact */
@@ -1888,6 +1943,7 @@ enum msfp_surface_value {
     MSFP_SURFACE_VALUE_CAPACITY, /* [m] sliding capacity s_c */
     MSFP_SURFACE_VALUE_FRICTION, /* [-] friction coefficient mu */
     MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT, /* [m] yield displacement d_y */
+    MSFP_SURFACE_VALUE_CONTACT_DAMPING, /* [s] damping time T of the sheared contact */
     MSFP_SURFACE_VALUE_RIM_STIFFNESS, /* [N/m] stiffness k_c of the rim */
     MSFP_SURFACE_VALUE_RIM_DAMPING, /* [N s/m] damping c_c of the rim */
     MSFP_SURFACE_VALUE_FRICTION_SLOW, /* of the friction law */
@@ -1939,6 +1995,7 @@ enum msfp_integral {
     MSFP_WORK_INPUT, /* work done on the bearing and its top by the base motion and the loads */
     MSFP_WORK_FRICTION_STORED, /* recoverable energy stored in friction while stuck */
     MSFP_WORK_FRICTION_DISSIPATED, /* energy dissipated by friction */
+    MSFP_WORK_CONTACT_DISSIPATED, /* energy dissipated by the damping of sheared contacts */
     MSFP_WORK_RIM_DISSIPATED, /* energy dissipated at the rims */
     MSFP_WORK_TOP_DISSIPATED, /* energy dissipated by the dampers of the top */
     MSFP_WORK_SEAT_DISSIPATED, /* energy dissipated in the unilateral contacts */
@@ -1946,7 +2003,7 @@ enum msfp_integral {
 };
 static inline const char *msfp_integral_name(int value)
 {
-    static const char *const names[] = { "input", "friction_stored", "friction_dissipated", "rim_dissipated", "top_dissipated", "seat_dissipated" };
+    static const char *const names[] = { "input", "friction_stored", "friction_dissipated", "contact_dissipated", "rim_dissipated", "top_dissipated", "seat_dissipated" };
     return value >= 0 && value < MSFP_WORKS ? names[value] : "unknown";
 }
 

@@ -1,0 +1,160 @@
+"""Friction before and at sliding: contact damping, and the elastic-perfectly plastic law (docs/hysteresis.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from support import scene_of
+from support.stacks import a_stack
+
+from msfp_gen import (
+    Bearing,
+    Body,
+    Effects,
+    InitialState,
+    Layout,
+    Motion,
+    Scene,
+    Solver,
+    Surface,
+    Top,
+    simulate,
+)
+
+RADIUS, HEIGHT, MU, OFFSET, WEIGHT, GRAVITY = 2.2, 0.1, 0.06, 0.08, 1e6, 9.8
+
+
+def pendulum(d_y: float, T: float) -> Bearing:
+    """A single pendulum whose top plate is the slider."""
+    surface = Surface(RADIUS, 0.5, MU, d_y, contact_damping=T)
+    return Bearing(Layout(2, 1, 0), HEIGHT, [surface], [Body(0.1, 0.05, 200.0, (1.0, 2.0))], gravity=GRAVITY)
+
+
+def off_centre(law: str, d_y: float, T: float, motion: Motion, **solver: Any) -> Scene:
+    """A mass at rest on a single pendulum, held by friction 80 mm off the centre."""
+    angle = np.arcsin(OFFSET / RADIUS)
+    held = float(np.tan(angle) / MU * (RADIUS - HEIGHT) / RADIUS)
+    state = InitialState(q=((0.0, angle, 0.0),), v=((0.0, 0.0, 0.0),), h=((held, 0.0),))
+    effects, top = Effects(bouc_wen=law, rims=False), Top.mass(WEIGHT / GRAVITY, 1.0, 0.0)
+    settings = Solver(**{"rtol": 1e-4, **solver})
+    return Scene(pendulum(d_y, T), motion, top, effects=effects, solver=settings, initial_state=state, output_step=0.05)
+
+
+def shaken_off_centre(law: str, d_y: float) -> float:
+    """How far it has moved after a minute of 0.02 g at 1 Hz, which Coulomb friction holds [m]."""
+    motion = Motion.harmonic(0.02 * 9.81 / (2 * np.pi) ** 2, 1.0, cycles=50, lead_in=10.0)
+    run = simulate(off_centre(law, d_y, 1e-4, motion))
+    assert run.status == "ok"
+    return float(run.history.sliding[-1, 0] - run.history.sliding[0, 0])
+
+
+@pytest.mark.parametrize("d_y", [5e-4, 1e-4])
+def test_a_stuck_bearing_does_not_creep_under_small_cycles(d_y: float) -> None:
+    """The plastic law holds it to a micrometre; the Bouc-Wen law lets it slide back by millimetres."""
+    assert abs(shaken_off_centre("plastic", d_y)) < 1e-6
+    assert shaken_off_centre("report", d_y) < -2e-3
+
+
+def test_a_stuck_mass_rings_down_as_its_damping_says() -> None:
+    """On the spring mu N/d_y a mass has the damping ratio omega T/2: the logarithmic decrement of its free ringing."""
+    T, d_y = 2e-3, 5e-4
+    rest = Motion.harmonic(1e-12, 1.0, cycles=7, lead_in=1.0)
+    scene = off_centre("plastic", d_y, T, rest, rtol=1e-7, method="esdirk4")
+    state = scene.initial_state
+    assert state is not None
+    scene = replace(scene, initial_state=replace(state, h=((0.8 * state.h[0][0], 0.0),)), output_step=1e-3)
+    history = simulate(scene).history
+    slide = history.sliding[:, 0] - history.sliding[-1, 0]
+    peaks = np.flatnonzero((slide[1:-1] > slide[:-2]) & (slide[1:-1] >= slide[2:])) + 1
+    amplitudes, times = slide[peaks[:5]], history.time[peaks[:5]]
+    omega = 2 * np.pi * 4 / (times[-1] - times[0])
+    decrement = np.log(amplitudes[0] / amplitudes[-1]) / 4
+    assert decrement == pytest.approx(np.pi * omega * T, rel=0.01)
+
+
+@cache
+def run_of(name: str, law: str, T: float, method: str, rtol: float) -> Any:
+    scene = scene_of(name, {"bouc_wen": law}, {"method": method, "rtol": rtol}, output_step=0.01)
+    return simulate(replace(scene, bearing=scene.bearing.replace(contact_damping=T)))
+
+
+def distance(one: Any, other: Any) -> float:
+    """RMS of the difference of two forces over the largest force."""
+    a, b = one.history.top_force[:, :2], other.history.top_force[:, :2]
+    return float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=1))) / np.abs(b).max())
+
+
+@pytest.mark.parametrize("law", ["report", "plastic"])
+def test_with_damping_a_tighter_tolerance_converges(law: str) -> None:
+    """Five stages and two rims: the method of order 4 at 1e-6 and the default at 1e-5 agree to 0.005 %."""
+    tight = run_of("fenz-test5", law, 1e-4, "esdirk4", 1e-6)
+    assert distance(run_of("fenz-test5", law, 1e-4, "implicit", 1e-5), tight) < 5e-5
+    assert distance(run_of("fenz-test5", law, 1e-4, "implicit", 1e-4), tight) < 4e-4
+
+
+def test_damping_costs_no_peak_of_the_loop() -> None:
+    """A tenth of a millisecond moves the largest force of test 5 by less than 0.01 %."""
+    peaks = [
+        float(np.abs(run_of("fenz-test5", "report", T, "implicit", 1e-4).history.top_force).max()) for T in (0.0, 1e-4)
+    ]
+    assert peaks[1] == pytest.approx(peaks[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("law", ["report", "isotropic", "plastic"])
+def test_energy_closes_and_contact_damping_only_dissipates(law: str) -> None:
+    run = run_of("fenz-test5", law, 1e-3, "implicit", 1e-5)
+    energy, peak = run.history.energy, np.abs(run.history.energy["input"]).max()
+    assert np.abs(energy["numerical"]).max() < 1e-3 * peak
+    assert np.diff(energy["contact_dissipated"]).min() >= -1e-9 * peak
+    assert 1e-6 * peak < energy["contact_dissipated"][-1] < 0.01 * peak
+
+
+@pytest.mark.parametrize("law", ["report", "plastic"])
+def test_explicit_and_implicit_method_agree(law: str) -> None:
+    """One surface with the damping that dopri5 resolves, through a reversal."""
+    heavy = {"mass": 50.0, "inertia": (1.0, 1.0)}
+    bearing = a_stack(
+        (3, 1, 1), [1.0, 1.0], heavy, yield_displacement=1e-3, friction=[0.05, 0.08], contact_damping=1e-3
+    )
+    motion = Motion.harmonic(0.02, 1.0, cycles=0.6, lead_in=0.3)
+    scene = Scene(
+        bearing,
+        motion,
+        Top.rig(1e5, 1e8, 1e3, 1e7, 1e4),
+        effects=Effects(bouc_wen=law, dimension="planar", rims=False),
+        output_step=0.01,
+        solver=Solver(rtol=1e-6),
+    )
+    explicit = simulate(replace(scene, solver=Solver(method="dopri5", rtol=1e-5, max_steps=2_000_000)))
+    assert explicit.status == "ok"
+    assert distance(simulate(scene), explicit) < 2e-4
+
+
+@pytest.mark.parametrize("law", ["report", "plastic"])
+def test_quasistatic_steps_equal_the_integrated_run(law: str) -> None:
+    """Closed-form steps of a planar model without masses, with contact damping, against the implicit method."""
+    effects = {"bouc_wen": law, "dimension": "planar", "sliders": "massless"}
+    scene = scene_of("fenz-test4", effects, {"rtol": 1e-5}, output_step=0.05)
+    scene = replace(scene, bearing=scene.bearing.replace(contact_damping=1e-3))
+    flows = simulate(scene)
+    spatial = simulate(replace(scene, effects=replace(scene.effects, dimension="spatial")))
+    assert distance(flows, spatial) < 3e-4
+    for term in ("friction_dissipated", "contact_dissipated"):
+        largest = spatial.history.energy["friction_dissipated"][-1]
+        assert flows.history.energy[term][-1] == pytest.approx(spatial.history.energy[term][-1], abs=1e-3 * largest)
+
+
+def test_plastic_friction_is_along_the_slip() -> None:
+    """On a circle the friction state turns with the slip and stays on the edge of the unit disc."""
+    run = simulate(replace(scene_of("becker-circle-50", {"bouc_wen": "plastic"}), output_step=0.05))
+    state, slip = run.history.friction_state[:, 0], run.history.slip_velocity[:, 0]
+    size, speed = np.linalg.norm(state, axis=1), np.linalg.norm(slip, axis=1)
+    assert size.max() < 1 + 1e-9
+    slides = (size > 0.999) & (speed > 0.2 * speed.max())
+    assert slides.mean() > 0.3
+    cosine = np.sum(state * slip, axis=1)[slides] / speed[slides]
+    assert np.median(cosine) > 0.9999 and cosine.min() > 0.99
