@@ -84,7 +84,8 @@ def law_results(
     """Results that a law adds to `contact`; empty for constant friction.
 
     They are mu by the law and its derivatives with respect to the friction force over -mu N at constant N and slip
-    velocity. With heating they include the flux, the temperature and the derivative of the law with respect to the unknown mu.
+    velocity. With heating they include the flux, the temperature and the derivative of the law with respect to the
+    unknown mu.
 
     Args:
         p: program of the contact.

@@ -33,9 +33,9 @@ class Surface:
     friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
-    k s (1 + c ds/dt) at compression s (docs/uplift.md). contact_damping: T [s]; the friction force is mu N (Y + T dY/dt)
-    in place of mu N Y (docs/contact_damping.md). The remaining fields are parameters of friction laws
-    (docs/friction.md): each is given if, and only if, the law of `Effects.friction` has it. Raises InputError.
+    k s (1 + c ds/dt) at compression s (docs/uplift.md). contact_damping: T [s]; friction is mu N (Y + T dY/dt) in place
+    of mu N Y (docs/hysteresis.md). The remaining fields are parameters of friction laws (docs/friction.md): each is
+    given if, and only if, the law of `Effects.friction` has it. Raises InputError.
     """
 
     radius: Annotated[float, _LENGTH]
@@ -221,8 +221,9 @@ class Bearing:
         """All values as float64 arrays.
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
-        seat_stiffness, seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height, centroid, mass,
-        inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in the fields.
+        seat_stiffness, seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height,
+        centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in
+        the fields.
         """
         base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
         base = (self.base_height, base_centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
