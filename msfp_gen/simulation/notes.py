@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.results.note import Note
+from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.friction_parameters import RANGES
 from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
+from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
     from msfp_gen.results.history import History
@@ -18,6 +20,11 @@ if TYPE_CHECKING:
 
 _MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
+DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
+CREEP_TIME, CREEP_SHARE = (
+    10.0,
+    0.01,
+)  # time spent stuck off the centre [s], and creep over the peak displacement, likewise
 TEXTS = {
     "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
     "uplift": "the normal force of surface {surface} is only {value:.4g} N; the model has no separation",
@@ -30,6 +37,10 @@ TEXTS = {
     "plane": "motion or loads leave the vertical plane of the model",
     "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
     "give a smaller solver.rtol",
+    "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; give a smaller "
+    "contact_damping",
+    "creep": "the bearing moved by {value:.3g} m while no surface slid: Bouc-Wen friction creeps under small cycles; "
+    "give bouc_wen = 'plastic'",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
 
@@ -59,6 +70,38 @@ def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
         )
         for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
     ]
+
+
+def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
+    return energy_notes(scene, history) + damping_notes(history) + creep_notes(scene, effects, history)
+
+
+def damping_notes(history: History) -> tuple[Note, ...]:
+    """A note where contact damping dissipates more than `DAMPING_LIMIT` of what friction dissipates."""
+    damped, lost = (float(history.energy[f"{name}_dissipated"][-1]) for name in ("contact", "friction"))
+    if not damped > DAMPING_LIMIT * lost:
+        return ()
+    share = damped / lost if lost > 0 else 1.0
+    return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where a bearing with a Bouc-Wen law was stuck off its centre for long and moved nevertheless.
+
+    Stuck surfaces deform by up to their yield displacements; movement beyond that is creep.
+    """
+    across = np.linalg.norm(history.displacement[:, :2], axis=1)
+    off_centre = across > max(CREEP_SHARE * float(across.max()), 1e-12)
+    stuck = intervals(history.time, off_centre & ~sliding_surfaces(history).any(axis=1))
+    long = [(start, start + length) for start, length in stuck if length > 1.0]
+    if is_plastic(effects.bouc_wen) or sum(end - start for start, end in long) < CREEP_TIME:
+        return ()
+    moved = float(sum(np.abs(np.diff(np.interp(pair, history.time, across)))[0] for pair in long))
+    elastic = 2 * sum(surface.yield_displacement for surface in scene.bearing.surfaces)
+    if moved <= max(CREEP_SHARE * float(across.max()), elastic):
+        return ()
+    return (Note(long[0][0], "creep", 0, moved, TEXTS["creep"].format(value=moved)),)
 
 
 def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:

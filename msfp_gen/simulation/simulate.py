@@ -24,7 +24,7 @@ from msfp_gen.results.row_unpacking import events_of, history_of, joined
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
-from msfp_gen.simulation.notes import energy_notes, notes_of
+from msfp_gen.simulation.notes import history_notes, notes_of
 from msfp_gen.simulation.segment import RestartState, Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.version import __version__
@@ -252,5 +252,5 @@ def _result(sequence: RunSequence) -> Result:
         status=last.status,
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
-        notes=tuple(sequence.notes) + energy_notes(scene, history),
+        notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history),
     )

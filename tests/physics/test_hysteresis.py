@@ -158,3 +158,26 @@ def test_plastic_friction_is_along_the_slip() -> None:
     assert slides.mean() > 0.3
     cosine = np.sum(state * slip, axis=1)[slides] / speed[slides]
     assert np.median(cosine) > 0.9999 and cosine.min() > 0.99
+
+
+def test_a_run_that_creeps_says_so() -> None:
+    """A Bouc-Wen law long stuck off the centre, and not a plastic one."""
+    motion = Motion.harmonic(0.02 * 9.81 / (2 * np.pi) ** 2, 1.0, cycles=30, lead_in=10.0)
+    creeping, held = (simulate(off_centre(law, 5e-4, 1e-4, motion)) for law in ("isotropic", "plastic"))
+    assert [note.kind for note in held.notes] == []
+    (note,) = creeping.notes
+    moved = float(np.ptp(creeping.history.sliding))
+    assert note.kind == "creep"
+    assert "bouc_wen = 'plastic'" in note.line
+    assert note.value == pytest.approx(moved, rel=0.2)
+
+
+def test_contact_damping_that_changes_sliding_is_noted() -> None:
+    """At a hundredth of a second the damping dissipates a few per cent of what friction does."""
+    run = run_of("fenz-test5", "report", 1e-4, "implicit", 1e-4)
+    assert not [note for note in run.notes if note.kind == "damping"]
+    scene = scene_of("ridgecrest-clc", {"bouc_wen": "report"}, duration=12.0)
+    run = simulate(replace(scene, bearing=scene.bearing.replace(contact_damping=1e-2)))
+    (note,) = [note for note in run.notes if note.kind == "damping"]
+    energy = run.history.energy
+    assert note.value == energy["contact_dissipated"][-1] / energy["friction_dissipated"][-1] > 0.01

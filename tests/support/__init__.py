@@ -37,7 +37,8 @@ def bearing_of(values: Any) -> Bearing:
 
 @cache
 def model_of(layout: tuple[int, int, int], **effects: Any) -> Model:
-    return build_model(Layout(*layout), Effects(**effects))
+    """The model of a layout, with the hysteresis law of PEER 2017/07 unless another is given."""
+    return build_model(Layout(*layout), Effects(**{"bouc_wen": "report", **effects}))
 
 
 def differences(function: Any, x: Array, steps: Array) -> Array:

@@ -19,7 +19,7 @@ from msfp_gen.scene.parts import InitialState
 from support import Array
 
 LOAD, TILT_STIFFNESS, SIDE_STIFFNESS = 1e5, 1e6, 1e9
-PLANAR = Effects(dimension="planar")
+PLANAR = Effects(dimension="planar", bouc_wen="report")
 
 
 def a_surface(radius: float, **values: Any) -> Surface:
