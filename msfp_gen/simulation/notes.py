@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 _MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
-CREEP_TIME, CREEP_SHARE = (
-    10.0,
-    0.01,
-)  # time spent stuck off the centre [s], and creep over the peak displacement, likewise
+CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
+CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
     "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
     "uplift": "the normal force of surface {surface} is only {value:.4g} N; the model has no separation",
@@ -37,8 +35,8 @@ TEXTS = {
     "plane": "motion or loads leave the vertical plane of the model",
     "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
     "give a smaller solver.rtol",
-    "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; give a smaller "
-    "contact_damping",
+    "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
+    "give a smaller contact_damping",
     "creep": "the bearing moved by {value:.3g} m while no surface slid: Bouc-Wen friction creeps under small cycles; "
     "give bouc_wen = 'plastic'",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
@@ -74,15 +72,20 @@ def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
 
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
-    return energy_notes(scene, history) + damping_notes(history) + creep_notes(scene, effects, history)
+    return energy_notes(scene, history) + damping_notes(scene, history) + creep_notes(scene, effects, history)
 
 
-def damping_notes(history: History) -> tuple[Note, ...]:
-    """A note where contact damping dissipates more than `DAMPING_LIMIT` of what friction dissipates."""
+def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
+    """A note where contact damping dissipates more than `DAMPING_LIMIT` of what friction dissipates.
+
+    A run that hardly slides, by less than ten times the yield displacements, gets none.
+    """
     damped, lost = (float(history.energy[f"{name}_dissipated"][-1]) for name in ("contact", "friction"))
-    if not damped > DAMPING_LIMIT * lost:
+    normal = np.median(history.normal_force, axis=0)
+    elastic = [s.friction * s.yield_displacement for s in scene.bearing.surfaces]
+    if lost < 10 * float(normal @ np.array(elastic)) or not damped > DAMPING_LIMIT * lost:
         return ()
-    share = damped / lost if lost > 0 else 1.0
+    share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
 
 
