@@ -37,7 +37,7 @@ TEXTS = {
     "give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
-    "creep": "the bearing moved by {value:.3g} m while no surface slid: Bouc-Wen friction creeps under small cycles; "
+    "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small cycles; "
     "give bouc_wen = 'plastic'",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }

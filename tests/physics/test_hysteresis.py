@@ -169,7 +169,7 @@ def test_a_run_that_creeps_says_so() -> None:
     moved = float(np.ptp(creeping.history.sliding))
     assert note.kind == "creep"
     assert "bouc_wen = 'plastic'" in note.line
-    assert note.value == pytest.approx(moved, rel=0.2)
+    assert 0.3 * moved < note.value < 1.05 * moved  # part of it in rows where friction is nearly mobilised
 
 
 def test_contact_damping_that_changes_sliding_is_noted() -> None:
