@@ -10,10 +10,10 @@ class Note:
     """Message of a monitor, in one line.
 
     time [s]. kind: "rims", "uplift", "inertia", "heat", "law_speed", "law_load", "law_temperature", "plane", "jammed",
-    "energy", "damping" or "creep". surface: 1..n-1; 0: none. value: the quantity in the text: distance beyond the
-    capacity [m], normal force [N], inertial over normal force [-], bound of the temperature rise [K], slip velocity
-    [m/s], temperature [degC], share of the energy [-], movement [m]. action: the effects with which the run continued;
-    "": it continued unchanged, or ended.
+    "energy", "damping", "creep" or "value". surface: 1..n-1; 0: none. value: the quantity in the text: distance beyond
+    the capacity [m], normal force [N], inertial over normal force [-], bound of the temperature rise [K], slip velocity
+    [m/s], temperature [degC], share of the energy [-], movement [m], value of the scene. action: the effects with which
+    the run continued; "": it continued unchanged, or ended.
     """
 
     time: float

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.errors import InputError
+from msfp_gen.scene.pivot_friction import friction_from_pivot
 from msfp_gen.specification.layout import Layout
 
 _LENGTH = Quantity("m", above=0.0)
@@ -200,8 +201,11 @@ class Bearing:
         """A copy with some values changed: fields of the bearing, or one field of all its surfaces or bodies.
 
         A field of surfaces or bodies takes a list, bottom first (`friction=[0.064, 0.168, 0.168, 0.064]`), or one value
-        for all. Raises InputError: an unknown name, a list of the wrong length, or an invalid value.
+        for all. With `friction_at="pivot"` the coefficients in `friction` are those of a data sheet, which refer to the
+        pivot of the bearing, and are converted: `pivot_friction.friction_from_pivot`. Raises InputError: an unknown
+        name, a list of the wrong length, or an invalid value.
         """
+        at_pivot = _is_at_pivot(changes.pop("friction_at", "surface"), "friction" in changes)
         list_of = {column: name for name, kind in _LISTS.items() for column in _names(kind)}
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **own)
@@ -215,7 +219,12 @@ class Bearing:
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
-        return dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
+        changed = dataclass_replace(base, surfaces=rows["surfaces"], bodies=rows["bodies"])
+        if not at_pivot:
+            return changed
+        radii, friction = zip(*((surface.radius, surface.friction) for surface in changed.surfaces), strict=True)
+        heights = (changed.base_height, *(body.height for body in changed.bodies))
+        return changed.replace(friction=friction_from_pivot(changed.layout, radii, heights, friction))
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All values as float64 arrays.
@@ -237,6 +246,15 @@ class Bearing:
 
 def _names(kind: type) -> list[str]:
     return [field.name for field in dataclass_fields(kind)]
+
+
+def _is_at_pivot(word: Any, friction_given: bool) -> bool:
+    """Whether the coefficients refer to the pivot. Raises InputError for another word, or without coefficients."""
+    if word not in ("surface", "pivot"):
+        raise InputError(f"bearing.friction_at = {word!r}: give 'surface' or 'pivot'")
+    if word == "pivot" and not friction_given:
+        raise InputError("bearing.friction_at = 'pivot': no friction coefficients are given; give friction with it")
+    return bool(word == "pivot")
 
 
 def _expanded(column: str, value: Any, count: int) -> list[Any]:

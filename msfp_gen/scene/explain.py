@@ -12,6 +12,7 @@ from msfp_gen.common.tables import Table, vector, yes
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.effect_selection import GIVEN, damping_share, quasistatic
 from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ SURFACE_COLUMNS = {
     "capacity [mm]": ("capacity", 1e3),
     "friction": ("friction", 1.0),
     "yield [mm]": ("yield_displacement", 1e3),
+    "damping [ms]": ("contact_damping", 1e3),
     "rim [N/m]": ("rim_stiffness", 1.0),
     "rim [N s/m]": ("rim_damping", 1.0),
 }
@@ -54,6 +56,7 @@ def explain(scene: Scene) -> list[Table]:
     """Tables that describe `scene`: bearing, motion, top, histories, effects with their meaning, friction, solver."""
     return [
         _surfaces(scene.bearing),
+        *_doubts(scene.bearing),
         _bodies(scene.bearing),
         _motion(scene.motion),
         _top(scene.top),
@@ -76,6 +79,12 @@ def _surfaces(bearing: Bearing) -> Table:
         f"base {bearing.base_height * 1e3:g} mm high, g = {bearing.gravity:g} m/s^2"
     )
     return Table(title, ("surface", "concave", *SURFACE_COLUMNS), rows)
+
+
+def _doubts(bearing: Bearing) -> Iterator[Table]:
+    rows = [(text,) for _, _, text in doubtful_values(bearing)]
+    if rows:
+        yield Table("values that are hardly meant", ("value",), rows)
 
 
 def _bodies(bearing: Bearing) -> Table:

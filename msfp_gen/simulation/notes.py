@@ -9,6 +9,7 @@ import numpy as np
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.friction_parameters import RANGES
+from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
 from msfp_gen.specification.hysteresis import is_plastic
 
@@ -37,8 +38,8 @@ TEXTS = {
     "give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
-    "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small cycles; "
-    "give bouc_wen = 'plastic'",
+    "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
+    "cycles; give bouc_wen = 'plastic'",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
 
@@ -72,7 +73,8 @@ def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
 
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
-    return energy_notes(scene, history) + damping_notes(scene, history) + creep_notes(scene, effects, history)
+    doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
+    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + creep_notes(scene, effects, history)
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:

@@ -155,7 +155,10 @@ def _bearing(given: Mapping[str, Any]) -> Bearing:
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
         changes[name] = [_row(kind, row, word, f"bearing.{name}[{index}]") for index, row in enumerate(changes[name])]
-    return Bearing(**changes)
+    if changes.pop("friction_at", "surface") == "surface":
+        return Bearing(**changes)
+    bearing = Bearing(**changes)
+    return bearing.replace(friction=[surface.friction for surface in bearing.surfaces], friction_at="pivot")
 
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:

@@ -107,11 +107,20 @@ def _auto(model: Model) -> Any:
 
 
 _SURFACE, _BODY, _LAYOUT = _model(Surface), _model(Body), _model(Layout)
-_BEARING = _model(Bearing, layout=(_LAYOUT, ...), surfaces=(_rows(_SURFACE), ...), bodies=(_rows(_BODY), ...))
+_FRICTION_AT: Any = (Literal["surface", "pivot"], "surface")
+_BEARING = _model(
+    Bearing,
+    friction_at=_FRICTION_AT,
+    layout=(_LAYOUT, ...),
+    surfaces=(_rows(_SURFACE), ...),
+    bodies=(_rows(_BODY), ...),
+)
 _CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fields(Bearing)} | {
     name: (_read(partial(_column, rule)), None) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
 }
-_PRESET: Model = create_model("PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), **_CHANGES)
+_PRESET: Model = create_model(
+    "PresetBearing", __base__=_Strict, preset=(_read(Text().parse), ...), friction_at=_FRICTION_AT, **_CHANGES
+)
 _EITHER = _bearing_union(_BEARING, _PRESET)
 _ROTATION, _ROTATIONS = _union(ROTATIONS.values())
 _LOAD, _LOADS = _union(LOADS.values())
