@@ -37,9 +37,9 @@ SURFACE = (  # of each surface, the lowest first
     Value("capacity", "m", "sliding capacity s_c"),
     Value("friction", "-", "friction coefficient mu"),
     Value("yield_displacement", "m", "yield displacement d_y"),
-    Value("contact_damping", "s", "damping time T of the sheared contact"),
     Value("rim_stiffness", "N/m", "stiffness k_c of the rim"),
     Value("rim_damping", "N s/m", "damping c_c of the rim"),
+    Value("contact_damping", "s", "damping time T of the sheared contact"),
 )
 SURFACE_UPLIFT = (  # after those, in models with uplift
     Value("seat_stiffness", "N/m", "stiffness of the unilateral contact"),

@@ -61,7 +61,7 @@ def values() -> dict[str, list[list[float]]]:
     base = [bearing.base_height, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     bodies = [[b.height, b.centroid, b.mass, *b.inertia, b.rim_radius, b.rim_offset] for b in bearing.bodies]
     surfaces = [
-        [s.radius, s.capacity, s.friction, s.yield_displacement, s.rim_stiffness, s.rim_damping]
+        [s.radius, s.capacity, s.friction, s.yield_displacement, s.rim_stiffness, s.rim_damping, s.contact_damping]
         for s in bearing.surfaces
     ]
     return {"bodies": [base, *bodies], "surfaces": surfaces, "top": [0.0] * 10}  # type: ignore[list-item]
