@@ -8,7 +8,7 @@ from importlib import resources
 
 import sympy as sp
 
-from msfp_gen.specification import contract
+from msfp_gen.specification import contract, rows
 from msfp_gen.specification.hysteresis import is_plastic
 from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
@@ -165,14 +165,14 @@ def scalar_quantities(block: Block) -> list[tuple[str, int | None, str]]:
     ]
 
 
-def shape_of(spec: ModelSpec) -> Callable[[contract.Quantity], tuple[int, ...]]:
+def shape_of(spec: ModelSpec) -> Callable[[rows.Quantity], tuple[int, ...]]:
     """Shapes of the fields of a row in numbers, for the wrapper."""
     lengths = {
-        contract.Extent.SURFACES: spec.layout.surfaces,
-        contract.Extent.COORDINATES: 6 if spec.effects.uplift else 3,
-        contract.Extent.WORKS: len(contract.WORKS),
+        rows.Extent.SURFACES: spec.layout.surfaces,
+        rows.Extent.COORDINATES: 6 if spec.effects.uplift else 3,
+        rows.Extent.WORKS: len(contract.WORKS),
     }
-    return lambda quantity: tuple(lengths[n] if isinstance(n, contract.Extent) else n for n in quantity.shape)
+    return lambda quantity: tuple(lengths[n] if isinstance(n, rows.Extent) else n for n in quantity.shape)
 
 
 def lanes(surfaces: int) -> int:
@@ -263,7 +263,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "heat": HEAT_KERNEL if law is not None and law.depends_on_temperature else (),
         "values": value_enums(spec.effects),
         "words": word_enums(),
-        "row": contract.row(spec.effects),
+        "row": rows.row(spec.effects),
+        "extremes": rows.extremes(spec.effects),
         "shape": shape_of(spec),
         "columns": {
             "body": contract.names(contract.BODY),

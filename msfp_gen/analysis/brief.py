@@ -23,14 +23,14 @@ def brief_rows(result: RunData) -> list[tuple[str, str]]:
     summary, history = summarise(result), result.history
     displacement, force = summary["peak_displacement"]["radial"], summary["peak_top_force"]["radial"]
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
-    normal = history.normal_force
+    extremes = result.extremes
     rows = [
         ("status", result.status + (f": {result.message}" if result.message else "")),
         ("time", f"{history.time[-1]:.6g} s in {summary['counters']['steps']} steps, {summary['wall_time']:.3g} s"),
         ("peak displacement", f"{1e3 * displacement:.4g} mm"),
         ("peak force", f"{1e-3 * force:.4g} kN{ratio}"),
-        ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in history.sliding.max(axis=0)) + " mm, bottom first"),
-        ("normal force", f"{1e-3 * normal.min():.4g} to {1e-3 * normal.max():.4g} kN"),
+        ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in extremes.sliding) + " mm, bottom first"),
+        ("normal force", f"{1e-3 * extremes.least_normal.min():.4g} to {1e-3 * extremes.most_normal.max():.4g} kN"),
     ]
     notes = [note.line for note in result.notes]
     more = f"; {len(notes) - MAX_NOTES} more in .notes" if len(notes) > MAX_NOTES else ""

@@ -24,7 +24,7 @@ def summarise(result: RunData) -> dict[str, Any]:
         notes: messages of monitors, one line each.
         duration: simulated time [s].
         peak_displacement, peak_top_force: largest magnitude along E1, E2, E3 and in the horizontal plane (`radial`)
-            [m], [N].
+            [m], [N]. These and the other extremes are over all accepted steps, whatever the times of the rows.
         axial_load: constant axial load [N]; None without one.
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
         peak_sliding, minimum_gap: [m].
@@ -42,32 +42,33 @@ def summarise(result: RunData) -> dict[str, Any]:
     duration = float(history.time[-1] - history.time[0])
     wall_time = counters.pop("wall_time")
     load = axial_load(result)
-    force = _peaks(history.top_force)
+    extremes = result.extremes
+    force = _peaks(extremes.top_force)
     summary: dict[str, Any] = {
         "name": result.scene.name,
         "status": result.status,
         "message": result.message,
         "notes": [note.line for note in result.notes],
         "duration": duration,
-        "peak_displacement": _peaks(history.displacement),
+        "peak_displacement": _peaks(extremes.displacement),
         "peak_top_force": force,
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
-        "peak_sliding": history.sliding.max(axis=0).tolist(),
-        "minimum_gap": history.gap.min(axis=0).tolist(),
+        "peak_sliding": extremes.sliding.tolist(),
+        "minimum_gap": extremes.gap.tolist(),
         "rims_met": rims_met(result),
-        "minimum_normal_force": history.normal_force.min(axis=0).tolist(),
-        "maximum_normal_force": history.normal_force.max(axis=0).tolist(),
+        "minimum_normal_force": extremes.least_normal.tolist(),
+        "maximum_normal_force": extremes.most_normal.tolist(),
         "energy": energy_balance(history),
         "counters": counters,
         "wall_time": wall_time,
         "real_time_factor": duration / wall_time if wall_time > 0 else None,
     }
-    if history.friction_coefficient is not None:
-        summary["least_friction"] = history.friction_coefficient.min(axis=0).tolist()
-        summary["most_friction"] = history.friction_coefficient.max(axis=0).tolist()
-    if history.temperature is not None:
-        summary["peak_temperature"] = history.temperature.max(axis=0).tolist()
+    if extremes.least_friction is not None and extremes.most_friction is not None:
+        summary["least_friction"] = extremes.least_friction.tolist()
+        summary["most_friction"] = extremes.most_friction.tolist()
+    if extremes.temperature is not None:
+        summary["peak_temperature"] = extremes.temperature.tolist()
     if is_monotonic(result):
         summary["transitions"] = transitions(result, load)
     return summary
@@ -96,7 +97,7 @@ def energy_balance(history: History) -> dict[str, float | None]:
 def rims_met(result: RunData) -> list[int]:
     """Surfaces (1..n-1) whose slider reached its rim, by an event or by a gap of zero or less in some row."""
     located = {event.surface for event in result.events if event.kind == "rim_contact"}
-    closed = np.flatnonzero((result.history.gap <= 0).any(axis=0)) + 1
+    closed = np.flatnonzero(result.extremes.gap <= 0) + 1
     return sorted(located | set(closed.tolist()))
 
 
@@ -117,8 +118,6 @@ def axial_load(result: RunData) -> float | None:
     return load if load > 0 else None
 
 
-def _peaks(vector: Array) -> dict[str, float]:
-    """Largest magnitude by axis and in the horizontal plane; `vector` has shape (T, 3)."""
-    magnitudes = np.abs(vector).max(axis=0).tolist()
-    radial = float(np.hypot(vector[:, 0], vector[:, 1]).max())
-    return dict(zip(LABELS["axis"], magnitudes, strict=True)) | {"radial": radial}
+def _peaks(largest: Array) -> dict[str, float]:
+    """Largest magnitudes by axis and in the horizontal plane, shape (4,), by name."""
+    return dict(zip((*LABELS["axis"], "radial"), largest.tolist(), strict=True))

@@ -74,6 +74,10 @@ class Run(Protocol):
         """Monitors that tripped: name -> time, surface, value."""
 
     @property
+    def extremes(self) -> Array:
+        """Extremes over all accepted steps, one number after the other."""
+
+    @property
     def counts(self) -> dict[str, int]:
         """Counters."""
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, write_bytes
 from msfp_gen.errors import InputError
+from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import ENERGY, LABELS, Counters, Event, History, quantities
 from msfp_gen.results.note import Note
 from msfp_gen.results.run_data import RunData
@@ -104,6 +105,7 @@ def read_result(path: str | Path, kind: type[R]) -> R:
         attributes["message"],
         _without(PROVENANCE, attributes),
         tuple(Note(**note) for note in json.loads(attributes.get("notes", "[]"))),
+        Extremes.of_table(json.loads(attributes["extremes"])) if "extremes" in attributes else None,
     )
 
 
@@ -153,6 +155,7 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
         "status": result.status,
         "message": result.message,
         "notes": json.dumps([asdict(note) for note in result.notes]),
+        "extremes": json.dumps(result.extremes.table),
         "scene": scene_attribute(result.scene),
         "motion": PIECES if needs_pieces(result.scene) else RECIPE,
         **_prefixed(COUNTER, asdict(result.counters)),

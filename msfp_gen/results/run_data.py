@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, Event, History
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ class RunData:
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
     text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
+    recorded_extremes: of all accepted steps; None where only the rows are known.
     """
 
     scene: Scene
@@ -32,6 +35,13 @@ class RunData:
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+    recorded_extremes: Extremes | None = None
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Extremes over all accepted steps and rows."""
+        rows = Extremes.of_rows(self.history)
+        return rows if self.recorded_extremes is None else rows | self.recorded_extremes
 
     @property
     def succeeded(self) -> bool:

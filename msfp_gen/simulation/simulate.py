@@ -10,6 +10,8 @@ import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,7 @@ import numpy as np
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
+from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters
 from msfp_gen.results.note import Note
 from msfp_gen.results.row_unpacking import events_of, history_of, joined
@@ -229,6 +232,11 @@ def _message(scene: Scene, segment: Segment) -> str:
     return failures.message(scene, segment.model, segment.run, segment.status, cause)
 
 
+def _extremes(segment: Segment) -> Extremes:
+    """Extremes of a segment in the frame of the user."""
+    return Extremes.of_run(segment.model.extension.EXTREMES, segment.run.extremes, segment.azimuth)
+
+
 def _result(sequence: RunSequence) -> Result:
     scene, segments = sequence.given, sequence.segments
     last = segments[-1]
@@ -253,4 +261,5 @@ def _result(sequence: RunSequence) -> Result:
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
         notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history),
+        recorded_extremes=reduce(or_, (_extremes(segment) for segment in segments)),
     )

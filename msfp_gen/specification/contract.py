@@ -7,7 +7,6 @@ docs/glossary.md are made from these tables, or a test holds them against them. 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -63,68 +62,6 @@ def surface_values(effects: Effects) -> tuple[str, ...]:
     """Names of the values of a surface in order: the numbers of a friction law come last."""
     uplift = SURFACE_UPLIFT if effects.uplift else ()
     return (*(value.name for value in SURFACE + uplift), *(() if effects.law is None else effects.law.columns))
-
-
-class Extent(StrEnum):
-    """Length of a dimension of a row's field that the model decides: the macro of the C header."""
-
-    SURFACES = "MSFP_NB"  # n - 1: moving bodies, or surfaces
-    COORDINATES = "MSFP_NQ"  # psi, theta, phi; in models with uplift then the separation along E1, E2, E3
-    WORKS = "MSFP_WORKS"  # integrals over the run, `WORKS`
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One field of a row of output. needs: the feature of a model without which it is absent ("" for none)."""
-
-    name: str
-    shape: tuple[Extent | int, ...]
-    unit: str
-    meaning: str
-    needs: str = ""
-
-
-_N = Extent.SURFACES
-_MOTION = (_N, Extent.COORDINATES)
-_ROW = (
-    Quantity("time", (), "s", "time"),
-    Quantity("q", _MOTION, "rad, m", "coordinates of the moving bodies: psi, theta, phi, then the separation"),
-    Quantity("v", _MOTION, "rad/s, m/s", "their rates"),
-    Quantity("a", _MOTION, "rad/s^2, m/s^2", "their second derivatives"),
-    Quantity("f", (_N, 2), "-", "friction state Y, Z"),
-    Quantity("normal", (_N,), "N", "normal force"),
-    Quantity("angles", (_N, 2), "rad", "contact position psi~, theta~"),
-    Quantity("sliding", (_N,), "m", "sliding displacement (3.20)"),
-    Quantity("gap", (_N,), "m", "gap to the rim (3.21)"),
-    Quantity("rim", (_N,), "N", "rim force, compression positive"),
-    Quantity("force", (_N, 3), "N", "interface force on the body above"),
-    Quantity("slip", (_N, 2), "m/s", "slip velocity u~, v~ (2.98)"),
-    Quantity("compression", (_N,), "m", "compression of the unilateral contact; negative: open", "uplift"),
-    Quantity("base", (3,), "m", "displacement of the base"),
-    Quantity("top", (3,), "m", "position of r_nn at the top plate"),
-    Quantity("top_force", (3,), "N", "force of the bearing on the top support"),
-    Quantity("top_moment", (3,), "N m", "moment of the bearing on the top support at r_nn"),
-    Quantity("kinetic", (), "J", "kinetic energy relative to the base"),
-    Quantity("potential", (), "J", "potential energy"),
-    Quantity("restraint", (), "J", "energy of the springs of the top"),
-    Quantity("rim_stored", (), "J", "energy of the springs of the rims"),
-    Quantity("seat_stored", (), "J", "energy of the springs of the unilateral contacts"),
-    Quantity("work", (Extent.WORKS,), "J", "integrals over the run"),
-    Quantity("mu", (_N,), "-", "friction coefficient", "law"),
-    Quantity("temperature", (_N,), "degC", "temperature of the surface", "heat"),
-)
-
-
-def row(effects: Effects) -> tuple[Quantity, ...]:
-    """Fields of a row of a model with these effects, in order."""
-    law = effects.law
-    has = {
-        "": True,
-        "uplift": effects.uplift,
-        "law": law is not None,
-        "heat": law is not None and law.depends_on_temperature,
-    }
-    return tuple(quantity for quantity in _ROW if has[quantity.needs])
 
 
 @dataclass(frozen=True)

@@ -155,7 +155,7 @@ def characterise(result: RunData) -> Characterisation:
     direction = history.displacement[row, :2] / history.horizontal[row]
     cycles, first = _cycles_and_first_loading(result, direction)
     kind = _kind(result, direction, cycles)
-    demands = surface_demands(result, slice(None))
+    demands = surface_demands(result)
     uplifts = [demand.maximum_uplift for demand in demands if demand.maximum_uplift is not None]
     at_rest = _at_rest(history, peak)
     load = axial_load(result)
@@ -170,8 +170,8 @@ def characterise(result: RunData) -> Characterisation:
         transitions=transitions(result, load) if kind == "monotonic" else None,
         envelope=_envelope(cycles),
         surfaces=demands,
-        peak_displacement=peak,
-        peak_force=float(np.hypot(*history.top_force[:, :2].T).max()),
+        peak_displacement=float(result.extremes.displacement[3]),
+        peak_force=float(result.extremes.top_force[3]),
         secant_stiffness=float(history.top_force[row, :2] @ direction / history.horizontal[row]),
         energy_dissipated=float(_dissipated(history)[-1]),
         residual_displacement=float(history.horizontal[-1]),

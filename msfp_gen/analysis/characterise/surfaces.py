@@ -40,22 +40,24 @@ class SurfaceDemand:
     maximum_uplift: float | None
 
 
-def surface_demands(result: RunData, rows: slice) -> tuple[SurfaceDemand, ...]:
-    """Demands on every surface over `rows`, bottom first."""
-    history, bearing = result.history, result.scene.bearing
+def surface_demands(result: RunData, rows: slice | None = None) -> tuple[SurfaceDemand, ...]:
+    """Demands on every surface over `rows`, bottom first; over the whole run, its steps included, without them."""
+    whole, rows = rows is None, slice(None) if rows is None else rows
+    history, bearing, extremes = result.history, result.scene.bearing, result.extremes
     speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
     has_uplift = result.scene.modelled.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
     found = []
     for i, surface in enumerate(bearing.surfaces):
-        gap, area = float(history.gap[rows, i].min()), _contact_area(result, i)
+        gap = float(extremes.gap[i] if whole else history.gap[rows, i].min())
+        area = _contact_area(result, i)
         found.append(
             SurfaceDemand(
                 i + 1,
                 gap,
                 gap / surface.capacity,
-                float(speed[:, i].max()),
+                float(extremes.slip_speed[i] if whole else speed[:, i].max()),
                 float(power[:, i].max()) / area if area else None,
                 float(heat[i]) / area if area else None,
                 area,

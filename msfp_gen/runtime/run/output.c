@@ -99,34 +99,53 @@ int msfp_write_now(msfp_run *run)
     return msfp_write_row(run, &run->now);
 }
 
+/* Rows at the ends of the last step and at its interpolation nodes, where it has some. */
+static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
+{
+    msfp_state s;
+    if (!run->node_count)
+        return;
+    msfp_observe_state(run, &run->now, &rows[0]);
+    for (int i = 0; i < run->node_count; ++i) {
+        msfp_interpolate(run, run->node[i].share, &s);
+        msfp_observe_state(run, &s, &rows[i + 1]);
+    }
+    msfp_observe_state(run, &run->next, &rows[run->node_count + 1]);
+}
+
+/* The row at a share of the last step; rows: of its nodes. */
+static void row_between(msfp_run *run, const msfp_row *rows, double share, msfp_row *row)
+{
+    msfp_state s;
+    msfp_interpolate(run, share, &s);
+    if (run->node_count) {
+        const msfp_weights w = msfp_weights_at(run, share);
+        blend(rows, &w, row);
+        limit_friction(rows, w.count, row);
+        restore_bounds(run, row);
+    } else
+        msfp_observe_state(run, &s, row);
+    memcpy(row->work, s.work, sizeof row->work);
+}
+
+void msfp_row_inside(msfp_run *run, double share, msfp_row *row)
+{
+    msfp_row rows[MSFP_NODES + 2];
+    observe_nodes(run, rows);
+    row_between(run, rows, share, row);
+}
+
 /* Rows at even times up to `last`, inside the last step. */
 static int write_between(msfp_run *run, double last)
 {
     msfp_row rows[MSFP_NODES + 2], *row;
-    msfp_state s;
     const double h = run->next.t - run->now.t;
-    if (run->node_count) {
-        msfp_observe_state(run, &run->now, &rows[0]);
-        for (int i = 0; i < run->node_count; ++i) {
-            msfp_interpolate(run, run->node[i].share, &s);
-            msfp_observe_state(run, &s, &rows[i + 1]);
-        }
-        msfp_observe_state(run, &run->next, &rows[run->node_count + 1]);
-    }
+    observe_nodes(run, rows);
     for (; run->output_time <= last; run->output_time = msfp_next_output(run)) {
-        const double share = fmin(1.0, (run->output_time - run->now.t) / h);
         if (!(row = new_row(run)))
             return MSFP_E_MEMORY;
-        msfp_interpolate(run, share, &s);
-        if (run->node_count) {
-            const msfp_weights w = msfp_weights_at(run, share);
-            blend(rows, &w, row);
-            limit_friction(rows, w.count, row);
-            restore_bounds(run, row);
-        } else
-            msfp_observe_state(run, &s, row);
+        row_between(run, rows, fmin(1.0, (run->output_time - run->now.t) / h), row);
         row->time = run->output_time;
-        memcpy(row->work, s.work, sizeof row->work);
     }
     return MSFP_OK;
 }

@@ -92,6 +92,7 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
         run->start[i] = options->origin ? options->origin[i] : row.base[i] - row.top[i];
     run->h = options->first_step > 0.0 ? options->first_step : fmin(1e-4, 1e-3 * (options->duration - run->now.t));
     run->previous_error = 1.0;
+    msfp_extremes_begin(run, &row);
     msfp_event_values(run, &run->now, run->events_now);
     msfp_monitor_begin(run);
     run->status = msfp_write_row(run, &run->now);
@@ -193,6 +194,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->restart = run->retry_after_newton = 0;
     if (run->stability_limit_steps >= STABILITY_LIMIT_STEPS)
         run->status = msfp_classify_failure(run, MSFP_E_STIFF);
+    msfp_extremes_step(run);
     const int stop = msfp_record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);

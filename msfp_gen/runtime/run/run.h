@@ -26,6 +26,13 @@ int msfp_monitor_step(msfp_run *run, const double *gaps);
 /* Velocities of the bodies at the start, for the monitor of inertia. */
 void msfp_monitor_begin(msfp_run *run);
 
+/* ---- extremes.c ---- */
+
+/* Extremes of the first row. */
+void msfp_extremes_begin(msfp_run *run, const msfp_row *row);
+/* Extremes with those of the accepted step, from the evaluation that ended it. */
+void msfp_extremes_step(msfp_run *run);
+
 /* ---- energy_balance.c ---- */
 
 /* Whether the last step neither creates energy nor loses most of it. */
@@ -48,6 +55,8 @@ double msfp_next_output(const msfp_run *run);
 int msfp_write_row(msfp_run *run, const msfp_state *s);
 /* Rows of the accepted step. */
 int msfp_write_step(msfp_run *run);
+/* The row at a share of the last step, 0 to 1, but for its time. */
+void msfp_row_inside(msfp_run *run, double share, msfp_row *row);
 /* kind: enum msfp_event_kind; surface counted from 1, 0: none. */
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 

@@ -14,7 +14,7 @@ from support.emitted_c import text
 from msfp_gen import Effects, Solver, Surface
 from msfp_gen.model.evaluation import FAILURES
 from msfp_gen.results.history import ENERGY, Counters, Event
-from msfp_gen.specification import contract
+from msfp_gen.specification import contract, rows
 from msfp_gen.specification.contract import names
 
 PAGE = ROOT / "docs" / "glossary.md"
@@ -55,7 +55,7 @@ def test_header_lays_out_values_and_rows_in_order(effects: dict[str, object]) ->
     ):
         expected = [f"MSFP_{kind}_VALUE_{name}".upper() for name in columns]
         assert enum(header, f"{kind}_value") == [*expected, f"MSFP_{kind.upper()}_VALUES"]
-    row = [quantity.name for quantity in contract.row(given)]
+    row = [quantity.name for quantity in rows.row(given)]
     assert enum(header, "row_field") == [*(f"MSFP_ROW_{name.upper()}" for name in row), "MSFP_ROW_SIZE"]
     asserted = re.findall(r"^MSFP_STATIC_ASSERT\(offsetof\(msfp_row, (\w+)\)", header, flags=re.MULTILINE)
     assert asserted == row and "MSFP_STATIC_ASSERT(sizeof(msfp_row) ==" in header
@@ -66,7 +66,7 @@ def test_compiled_module_has_the_tables() -> None:
     effects = Effects()
     assert (names(contract.BODY), names(contract.TOP)) == (extension.BODY_VALUES, extension.TOP_VALUES)
     assert contract.surface_values(effects) == extension.SURFACE_VALUES
-    assert [name for name, _ in extension.ROW] == [quantity.name for quantity in contract.row(effects)]
+    assert [name for name, _ in extension.ROW] == [quantity.name for quantity in rows.row(effects)]
     assert dict(extension.ROW)["q"] == (4, 3) and dict(extension.ROW)["work"] == (len(contract.WORKS),)
     assert sum(int(np.prod(shape)) for _, shape in extension.ROW) == extension.ROW_SIZE
     assert names(contract.EVENT_KINDS) == extension.EVENT_KINDS and names(contract.COUNTERS) == extension.COUNTS

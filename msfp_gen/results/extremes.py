@@ -1,0 +1,97 @@
+"""Extremes of a run over all of its accepted steps, which do not depend on the times of the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.results.history import History
+from msfp_gen.results.sliding import separated
+
+LEAST = ("gap", "least_normal", "least_friction")  # of these the least value counts, of all others the largest
+
+
+@dataclass(frozen=True, eq=False)
+class Extremes:
+    """Extremes of a run.
+
+    displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
+    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; slip_speed, the largest, while the surface
+    is closed [m/s]; least_normal, most_normal [N]; least_friction, most_friction, where a friction law acts;
+    temperature, the highest, where it heats [degC].
+    """
+
+    displacement: Array
+    top_force: Array
+    sliding: Array
+    gap: Array
+    slip_speed: Array
+    least_normal: Array
+    most_normal: Array
+    least_friction: Array | None = None
+    most_friction: Array | None = None
+    temperature: Array | None = None
+
+    @classmethod
+    def of_rows(cls, history: History) -> Extremes:
+        """Extremes of the rows alone."""
+        mu, temperature = history.friction_coefficient, history.temperature
+        return cls(
+            displacement=_largest(history.displacement),
+            top_force=_largest(history.top_force),
+            sliding=history.sliding.max(axis=0),
+            gap=history.gap.min(axis=0),
+            slip_speed=np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2)).max(axis=0),
+            least_normal=history.normal_force.min(axis=0),
+            most_normal=history.normal_force.max(axis=0),
+            least_friction=None if mu is None else mu.min(axis=0),
+            most_friction=None if mu is None else mu.max(axis=0),
+            temperature=None if temperature is None else temperature.max(axis=0),
+        )
+
+    @classmethod
+    def of_run(cls, numbers: Sequence[tuple[str, tuple[int, ...]]], recorded: Array, azimuth: float) -> Extremes:
+        """Extremes that a compiled run recorded.
+
+        numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other. azimuth: of the
+        frame of a planar model [rad], in which all horizontal vectors are along E1.
+        """
+        found, start = {}, 0
+        for name, shape in numbers:
+            size = int(np.prod(shape, dtype=int))
+            found[name] = recorded[start : start + size]
+            start += size
+        if azimuth:
+            for name in ("displacement", "top_force"):
+                along, _, vertical, radial = found[name]
+                found[name] = np.array([along * abs(np.cos(azimuth)), along * abs(np.sin(azimuth)), vertical, radial])
+        return cls(**found)
+
+    @classmethod
+    def of_table(cls, table: dict[str, Any]) -> Extremes:
+        """The inverse of `table`."""
+        return cls(**{name: np.array(values, dtype=float) for name, values in table.items()})
+
+    @property
+    def table(self) -> dict[str, list[float]]:
+        """As plain data; what was not recorded is left out."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value.tolist() for name, value in values.items() if value is not None}
+
+    def __or__(self, other: Extremes) -> Extremes:
+        """Extremes of both."""
+        found: dict[str, Any] = {}
+        for name in (f.name for f in fields(self)):
+            one, two = getattr(self, name), getattr(other, name)
+            known = [value for value in (one, two) if value is not None]
+            found[name] = (np.min if name in LEAST else np.max)(known, axis=0) if known else None
+        return Extremes(**found)
+
+
+def _largest(vector: Array) -> Array:
+    """Largest magnitude by axis and in the horizontal plane; `vector` has shape (T, 3)."""
+    return np.append(np.abs(vector).max(axis=0), np.hypot(vector[:, 0], vector[:, 1]).max())

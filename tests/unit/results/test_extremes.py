@@ -1,0 +1,67 @@
+"""Extremes of a run over all accepted steps: they do not depend on the times of its rows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import scene_of
+
+from msfp_gen import Motion, Result, simulate
+
+PEAKS = ("peak_displacement", "peak_top_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
+
+
+def summary_of(name: str, output_step: float | None, **effects: object) -> dict[str, object]:
+    scene = scene_of(name, effects, duration=8.0 if name.startswith("ridgecrest") else None)
+    return simulate(replace(scene, output_step=output_step)).summary
+
+
+@pytest.mark.parametrize(
+    ("name", "effects"),
+    [("ridgecrest-clc", {}), ("fenz-test4", {}), ("fenz-test4", {"dimension": "planar", "sliders": "massless"})],
+    ids=str,
+)
+def test_peaks_do_not_depend_on_the_rows(name: str, effects: dict[str, object]) -> None:
+    """Rows at every step, and rows so far apart that they miss the peaks by per cents."""
+    fine, coarse = (summary_of(name, step, **effects) for step in (None, 0.5))
+    for key in PEAKS:
+        one, two = (np.array(list(s[key].values()) if isinstance(s[key], dict) else s[key]) for s in (fine, coarse))
+        if effects.get("sliders") == "massless":  # rows at even times are steps of such a run
+            assert one == pytest.approx(two, rel=2e-3, abs=1e-9 * np.abs(one).max())
+        else:
+            assert one == pytest.approx(two, rel=1e-4, abs=0)  # rows between steps may exceed those at their ends
+
+
+def test_extremes_hold_for_the_rows_and_the_file(tmp_path: Path) -> None:
+    scene = scene_of("ridgecrest-clc", duration=8.0)
+    result = simulate(replace(scene, output_step=0.5))
+    history, extremes = result.history, result.extremes
+    assert extremes.displacement[3] >= np.hypot(*history.displacement[:, :2].T).max()
+    assert (extremes.least_normal <= history.normal_force.min(axis=0)).all()
+    assert extremes.top_force[3] > 1.02 * np.hypot(*history.top_force[:, :2].T).max()
+    again = Result.from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
+    assert again.summary == result.summary
+
+
+def test_a_turning_point_inside_a_step_counts() -> None:
+    """Long steps: the largest displacement is that of rows close together, and the rows of the steps miss it."""
+    scene = scene_of("fenz-test4", {"dimension": "planar"}, {"rtol": 1e-3})
+    steps, rows = (simulate(replace(scene, output_step=step)) for step in (None, 2e-3))
+    exact = np.abs(rows.history.displacement[:, 0]).max()
+    assert steps.extremes.displacement[0] == pytest.approx(exact, rel=1e-6)
+    assert np.abs(steps.history.displacement[:, 0]).max() < exact * (1 - 1e-5)
+
+
+def test_planar_extremes_are_those_of_the_user_in_any_plane() -> None:
+    scene = scene_of("fenz-test2", {"dimension": "planar"}, output_step=0.5)
+    turned = replace(scene, motion=Motion.harmonic(0.025, 0.1, cycles=1.0, direction=0.6))
+    flat, spatial = (
+        simulate(replace(turned, effects=replace(scene.effects, dimension=d, bouc_wen="isotropic"))).extremes
+        for d in ("planar", "spatial")
+    )
+    for name in ("displacement", "top_force"):
+        one, two = getattr(flat, name), getattr(spatial, name)
+        assert one == pytest.approx(two, rel=5e-3, abs=2e-3 * two.max())
