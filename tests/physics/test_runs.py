@@ -30,6 +30,7 @@ from msfp_gen.scene.parts import InitialState, Stop
 
 LOAD, ROTATIONAL_STIFFNESS = 112e3, 1e6
 TESTS = [f"fenz-test{i}" for i in range(1, 6)]
+REPORT = Effects(bouc_wen="report")
 RUNS = [*TESTS, "fenz-monotonic", "unusual-tfp", "becker-circle-50", "becker-eight-125"]
 
 
@@ -256,7 +257,7 @@ def test_declared_jump_of_acceleration_restarts_the_integrator() -> None:
     coefficients[0, 0, 2] = 0.25  # 0.5 m/s^2 for 0.1 s, then the speed reached
     coefficients[1, 0, :2] = 0.25 * 0.1**2, 0.5 * 0.1
     motion = Motion(knots=[0.0, 0.1, 0.3], coefficients=coefficients, jumps=[0.1])
-    scene = Scene(presets.bearing("fenz-tfp"), motion, Top.rig(LOAD, 1e8, 5.0, ROTATIONAL_STIFFNESS), Effects())
+    scene = Scene(presets.bearing("fenz-tfp"), motion, Top.rig(LOAD, 1e8, 5.0, ROTATIONAL_STIFFNESS), REPORT)
     run = simulate(scene).history
     row = int(np.flatnonzero(run.time == 0.1)[0])
     assert run.time[row + 1] - run.time[row] < 2e-4  # it starts anew, with a small step

@@ -55,7 +55,7 @@ def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def scene_for(case: str) -> Scene:
     if case == FLIGHT:
-        return shaken(1.4, sideways=0.03, duration=1.2)
+        return shaken(1.4, sideways=0.03, duration=1.1)
     name, effects, solver, changes = SCENES[case]
     return scene_of(name, effects, solver, **changes)
 
