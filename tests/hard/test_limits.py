@@ -38,7 +38,7 @@ def spun(seed: float, rtol: float = 1e-5, method: str = "implicit", duration: fl
     start = InitialState(np.zeros((4, 3)), rates, np.zeros((4, 2)))
     scene = replace(
         load_scene("becker-circle-50"),
-        effects=Effects(spin="free"),
+        effects=Effects(spin="free", bouc_wen="report"),
         initial_state=start,
         duration=duration,
         output_step=0.5,

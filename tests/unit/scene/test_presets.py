@@ -65,7 +65,9 @@ def test_bearings_are_those_of_appendix_a(name):
     base, surfaces, bodies = TABLES[name]
     bearing = presets.bearing(name)
     assert (bearing.layout, bearing.base_height, bearing.gravity) == (Layout.tfp(), base, 9.8)
-    literal = [Surface(R, s_c, mu, 5e-5 / R, 1e7, 5.0, contact_damping=0.0) for R, s_c, mu in surfaces]  # d_y = R_0/R, numbers in SI
+    literal = [  # d_y = R_0/R, numbers in SI
+        Surface(R, s_c, mu, 5e-5 / R, 1e7, 5.0, contact_damping=0.0) for R, s_c, mu in surfaces
+    ]
     assert list(bearing.surfaces) == literal
     assert list(bearing.bodies) == [Body(*row) for row in bodies]
 
