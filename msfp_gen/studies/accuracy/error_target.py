@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass, replace
+from math import pi
 from typing import TYPE_CHECKING, Any, cast
 
 from msfp_gen.errors import InputError, RunError
@@ -17,8 +18,8 @@ from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.simulation.simulate import Progress, simulate
 from msfp_gen.studies.accuracy.attempt import Attempt
 from msfp_gen.studies.accuracy.effects import effects_for, with_all_effects
-from msfp_gen.studies.accuracy.measure import Errors, errors
-from msfp_gen.studies.accuracy.tables import attempt_table, reason_table, within_table
+from msfp_gen.studies.accuracy.measure import errors, largest_error
+from msfp_gen.studies.accuracy.tables import AFTER_IMPACTS, attempt_table, reason_table, ringing_left_out, within_table
 from msfp_gen.studies.accuracy.trial import CUT_OFF, Trial, dopri5_cost, run_native
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ REFERENCE_METHODS = {"implicit": "esdirk4", "esdirk4": "implicit"}  # other stag
 STEPS_PER_PERIOD = 40  # of a ringing slider, in a reference run that resolves it
 MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
 SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
+DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
 METHODS_BY_TARGET: tuple[tuple[float, str], ...] = ((0.0, "implicit"),)  # (least target, method); the first that fits
@@ -65,16 +67,22 @@ class Within:
     explained: bool
 
     @property
+    def estimate(self) -> float | None:
+        """Estimated error of `result` [-]; None where undamped ringing after impacts leaves it unknown."""
+        return None if AFTER_IMPACTS in self.left_out else self.chosen.estimate
+
+    @property
     def tables(self) -> list[Table]:
         """Tables for the console; with attempts and reasons if an explanation was requested."""
-        tables = [within_table(self.target, self.chosen, self.next_step, self.seconds, self.left_out)]
+        known = self.estimate is not None
+        tables = [within_table(self.target, self.chosen, self.next_step, self.seconds, self.left_out, known)]
         return [*tables, attempt_table(self.attempts), reason_table(self.reasons)] if self.explained else tables
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
         return {
             "target": self.target,
-            "estimate": self.chosen.estimate,
+            "estimate": self.estimate,
             "chosen": asdict(self.chosen),
             "next_step": None if self.next_step is None else asdict(self.next_step),
             "seconds": self.seconds,
@@ -123,9 +131,8 @@ def simulate_within(
     seconds_per_iteration = chosen.seconds / max(chosen.newton, 1)
     tighter = search.next_step(index)
     reasons = (effect_reasons, *search.reasons(index), *(dopri5_cost(scene) if explain else ()))
-    provenance = {"error_target": f"{error:g}", "error_estimate": f"{chosen.estimate:.3g}"}
-    return Within(
-        result=replace(result, provenance=result.provenance | provenance),
+    within = Within(
+        result=result,
         target=error,
         chosen=chosen,
         next_step=None if tighter is None else replace(tighter, seconds=seconds_per_iteration * tighter.newton),
@@ -138,6 +145,9 @@ def simulate_within(
         reasons=reasons,
         explained=explain,
     )
+    stated = "unknown" if within.estimate is None else f"{within.estimate:.3g}"
+    provenance = {"error_target": f"{error:g}", "error_estimate": stated}
+    return replace(within, result=replace(result, provenance=result.provenance | provenance))
 
 
 class _ModelErrorTooLargeError(Exception):
@@ -268,14 +278,11 @@ class _Search:
 
     def left_out(self, result: Result) -> str:
         """What no estimate of the search includes, in words; empty if nothing."""
-        if not self.rings or self.resolves_ringing:
+        damping = min(surface.contact_damping for surface in self.reference_scene.bearing.surfaces)
+        if not self.rings or self.resolves_ringing or pi * damping / self.period > DAMPED:
             return ""
         impact = any(event.kind in ("rim_contact", "landing") for event in result.events)
-        return (
-            f"the ringing of stuck sliders{', and after impacts,' if impact else ''} at {1 / self.period:.0f} Hz and "
-            "above, which has no damping and is filtered: resolved on purpose it moved the force of other scenes by up "
-            "to 1 % (docs/accuracy.md)"
-        )
+        return ringing_left_out(1 / self.period, impact)
 
     def _target_missed(self) -> str:
         """Message that the target was not reached, with the best run so far."""
@@ -289,8 +296,3 @@ class _Search:
             f"an error of {self.target:g} was not reached in the time given: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
         )
-
-
-def largest_error(found: Errors) -> float:
-    """The error that a target bounds: the largest of the RMS and peak errors of force and sliding, relative [-]."""
-    return max(found.force_rms, found.sliding_rms, found.force_peak, found.sliding_peak)

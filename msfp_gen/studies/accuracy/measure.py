@@ -90,6 +90,11 @@ def errors(trial: Trial, reference: Trial) -> Errors | None:
     )
 
 
+def largest_error(found: Errors) -> float:
+    """The error that a target bounds: the largest of the RMS and peak errors of force and sliding, relative [-]."""
+    return max(found.force_rms, found.sliding_rms, found.force_peak, found.sliding_peak)
+
+
 def _peaks(trial: Trial) -> tuple[float, float]:
     """Peak horizontal force [N] and largest sliding displacement [m]; NaN for sliding that a run does not give."""
     sliding = float(trial.sliding.max()) if trial.sliding.size else float("nan")

@@ -122,6 +122,10 @@ def test_what_the_estimate_leaves_out_is_stated(monkeypatch):
     monkeypatch.setattr(error_target, "MOST_STEPS", 1000)  # as for a long scene
     found = simulate_within(load_scene("fenz-monotonic"), 0.02)
     assert "after impacts" in found.left_out and any("not in the estimate" in row for row in found.tables[0].rows)
+    assert found.estimate is None and any("not known" in row[1] for row in found.tables[0].rows)
+    damped = load_scene("fenz-monotonic")
+    damped = replace(damped, bearing=damped.bearing.replace(contact_damping=1e-4))
+    assert not simulate_within(damped, 0.02).left_out
     calm = simulate_within(load_scene("fenz-test1"), 0.02)
     assert "Hz and above, which has no damping" in calm.left_out
     massless = replace(load_scene("fenz-test1"), effects=Effects(sliders="massless", dimension="planar", rims=False))
