@@ -46,9 +46,12 @@ def run_under(word: str) -> Result:
 # ---- effects --------------------------------------------------------------------------------------------------------
 
 
+UPLIFT = Effects(dimension="planar", uplift=True, bouc_wen="report")  # the law of the reference of heat below
+
+
 @cache
 def flight(word: str, **values: Any) -> Result:
-    scene = shaken(1.4, sideways=0.03, duration=1.0, effects=Effects(dimension="planar", uplift=True))
+    scene = shaken(1.4, sideways=0.03, duration=1.0, effects=UPLIFT)
     return simulate(lawful(scene, word, **values))
 
 
