@@ -18,9 +18,9 @@ import numpy as np
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
-from msfp_gen.results.history import Counters
+from msfp_gen.results.history import Counters, History
 from msfp_gen.results.note import Note
-from msfp_gen.results.row_unpacking import events_of, history_of, joined
+from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of, joined
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
@@ -120,7 +120,8 @@ class RunSequence:
 
     def start_segment(self, model: Model) -> tuple[Run, float]:
         """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
-        scene, last, selection = self.scene, self.segments[-1:], self.scene.effect_selection
+        scene, selection = self.scene, self.scene.effect_selection
+        last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
         return start_run(scene, model, selection, end, at, stopping_monitors(scene, model.effects, self.strict))
@@ -137,14 +138,18 @@ class RunSequence:
         self.effects = following
 
     def result(self, with_initial_row: bool = False) -> Result:
-        """The result of all segments; raises RunError where there is no row.
+        """The result of all segments; raises RunError where none has a row. A segment that failed at once has none.
 
         with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
         last = self.segments[-1]
-        if not last.run.row_count and not (with_initial_row and _recorded_finite(last.run)):
+        if with_initial_row and not any(segment.run.row_count for segment in self.segments):
+            last.run.record_now()
+        parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
+        if not parts:
             raise RunError(_message(self.scene, last), status=last.status)
-        return _result(self)
+        histories = [history_of(segment.model, rows, segment.azimuth) for segment, rows in parts]
+        return _result(self, joined(histories, self.given.output_step))
 
 
 def settle(scene: Scene) -> Scene:
@@ -216,12 +221,6 @@ def _advance(run: Run, end: float, progress: Progress | None, checkpoint: Checkp
     return status
 
 
-def _recorded_finite(run: Run) -> bool:
-    """Record a row of the current state; whether all of its values are finite."""
-    run.record_now()
-    return bool(np.isfinite(run.rows).all())
-
-
 def _message(scene: Scene, segment: Segment) -> str:
     """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
     stopped = segment.status == "guard"
@@ -229,7 +228,7 @@ def _message(scene: Scene, segment: Segment) -> str:
     return failures.message(scene, segment.model, segment.run, segment.status, cause)
 
 
-def _result(sequence: RunSequence) -> Result:
+def _result(sequence: RunSequence, history: History) -> Result:
     scene, segments = sequence.given, sequence.segments
     last = segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
@@ -243,7 +242,6 @@ def _result(sequence: RunSequence) -> Result:
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
     }
-    history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
     return Result(
         scene=scene,
         history=history,
