@@ -39,6 +39,8 @@ SCENES = {
     "an open text": ("name = 'a", ("no valid TOML", "end of document")),
     "lists without end": ("a = " + "[" * 100000, ("no valid TOML", "nested too deeply")),
     "tables without end": ("a = " + "{b = " * 5000, ("no valid TOML", "nested too deeply")),
+    "a key of 3000 tables": (GOOD + "a." * 3000 + "b = 1", ("no valid TOML", "nested too deeply")),
+    "a row of 3000 tables": (GOOD + "[" + "a." * 3000 + "b]", ("no valid TOML", "nested too deeply")),
     "a number of 5000 digits": (GOOD + "duration = " + "9" * 5000, ("no valid TOML", "digits")),
     "a number of 400 digits": (GOOD + "duration = " + "9" * 400, ("duration = 9", "finite number above 0 [s]")),
     "a count of 400 digits": (GOOD + "solver = {max_steps = " + "9" * 400 + "}", ("solver.max_steps", "whole number")),
