@@ -416,6 +416,7 @@ def test_a_full_disk_leaves_no_file(small_disk: Path, capsys: pytest.CaptureFixt
     assert main(["run", "fenz-test2", "-o", str(small_disk / "run.nc")]) == 1
     error = capsys.readouterr().err
     assert error.startswith("error: ") and error.count("\n") == 1 and "No space left" in error
+    assert str(small_disk / "run.nc") in error
     assert not list(small_disk.iterdir())
 
 

@@ -53,7 +53,7 @@ def scenes(draw: Any) -> Scene:
     motion = Motion.harmonic(draw(st.floats(0.005, 0.16)), draw(between(0.1, 3.0)), cycles=1.5)
     end = motion.duration
     lift = draw(st.floats(0.5, 1.5)) * weight
-    load = pulled(lift, draw(st.floats(0.0, 0.8)) * end, draw(st.floats(1e-3, 0.3)), end)
+    load = pulled(lift, draw(st.sampled_from([0.0, 0.1, 0.3, 0.7])) * end, draw(st.floats(1e-3, 0.3)), end)
     rigs = [Top.rig(weight, 1e3 * weight, 0.0, 10 * weight), Top.rig(weight, 1e8, 5.0, 1e6, 5.0)]
     mass = Top.mass(weight / 9.8, 0.05 * weight / 9.8, 0.5, 100 * weight, weight)
     scene = Scene(
