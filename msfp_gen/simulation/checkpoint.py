@@ -119,8 +119,8 @@ class Checkpoint:
         about = {**vars(self._identity), "time": run.time, "wall": self.wall + start - self._start}
         try:
             write(self.path, about, run.snapshot())
-        except OSError as error:
-            reason = error.strerror or error
+        except (OSError, MemoryError) as error:
+            reason = getattr(error, "strerror", None) or error or "no memory"
             warnings.warn(f"checkpoint {self.path} not written ({reason}); the run continues", RuntimeWarning, 2)
         now = time.monotonic()
         self._due = now + max(self._every, WRITE_INTERVAL * (now - start))

@@ -24,6 +24,7 @@ from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of, j
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
+from msfp_gen.simulation.memory import outgrown, require_memory
 from msfp_gen.simulation.notes import energy_notes, notes_of
 from msfp_gen.simulation.segment import RestartState, Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
@@ -77,7 +78,8 @@ def simulate(
     Raises
     ------
     InputError
-        The method does not support the effects; the checkpoint is damaged, or of another scene or build.
+        The method does not support the effects; the rows do not fit into memory; the checkpoint is damaged, or of
+        another scene or build.
     RunError
         The run failed: the message gives time, surface and cause, `.result` has the rows until then.
 
@@ -115,6 +117,7 @@ class RunSequence:
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
         """The sequence before its first segment. settled: the result of `settle(scene)`; None: it is computed here."""
+        require_memory([scene])
         settled = settle(scene) if settled is None else settled
         return cls(scene, settled, strict, settled.effect_selection.effects, [], [])
 
@@ -187,7 +190,8 @@ def _segment(sequence: RunSequence, progress: Progress | None, options: Checkpoi
     if checkpoint is not None:
         checkpoint.restore(run)
     ready = time.perf_counter()
-    status = _advance(run, scene.end, progress, checkpoint) or run.status[0]
+    earlier = sum(segment.run.row_count for segment in sequence.segments)
+    status = _advance(run, scene, earlier, progress, checkpoint) or run.status[0]
     wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
     return Segment(model, run, azimuth, status, wall, ready - start)
 
@@ -204,15 +208,23 @@ def check(scene: Scene, effects: Effects) -> None:
         )
 
 
-def _advance(run: Run, end: float, progress: Progress | None, checkpoint: Checkpoint | None) -> str | None:
-    """Take all steps; "interrupted" after Ctrl-C, else None."""
-    status = None
+def _advance(
+    run: Run, scene: Scene, earlier: int, progress: Progress | None, checkpoint: Checkpoint | None
+) -> str | None:
+    """Take all steps; "interrupted" after Ctrl-C, "memory" where no more rows fit, else None.
+
+    earlier: number of rows of the segments before.
+    """
+    status, surfaces = None, scene.bearing.layout.surfaces
     try:
         while run.advance(STEPS_PER_CALL):
+            if outgrown(earlier + run.row_count, surfaces):
+                status = "memory"
+                break
             if checkpoint is not None:
                 checkpoint.save_if_due(run)
             if progress is not None:
-                progress(run.time, end)
+                progress(run.time, scene.end)
     except KeyboardInterrupt:
         status = "interrupted"
     # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
