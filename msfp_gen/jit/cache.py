@@ -184,6 +184,8 @@ class Entry:
                 part.mkdir()
             yield part
         finally:
+            with suppress(OSError):  # only an empty folder goes: another process has built the model meanwhile
+                part.rmdir()
             lock.release()
 
     def publish(self, part: Path) -> None:
