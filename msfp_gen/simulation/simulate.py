@@ -86,6 +86,7 @@ def simulate(
     """
     if checkpoint is not None and not resume:
         _require_no_checkpoint(checkpoint)
+    require_memory([scene])
     sequence = RunSequence.of(scene, strict)
     while sequence.effects is not None:
         segments = sequence.segments
@@ -117,7 +118,6 @@ class RunSequence:
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
         """The sequence before its first segment. settled: the result of `settle(scene)`; None: it is computed here."""
-        require_memory([scene])
         settled = settle(scene) if settled is None else settled
         return cls(scene, settled, strict, settled.effect_selection.effects, [], [])
 

@@ -122,7 +122,8 @@ def other_values(file: h5py.File, dice: random.Random) -> None:
     item = any_dataset(file, dice)
     values = item[()]
     at = tuple(dice.randrange(size) for size in values.shape)
-    values[at] = b"x" if values.dtype.kind == "O" else dice.choice([1e300, -1e300, 0, 7, 2**40])
+    others: dict[str, list[Any]] = {"O": [b"x"], "f": [1e300, -1e300, 0.0, 7.0], "i": [-1, 0, 7, 2**30]}
+    values[at] = dice.choice(others[values.dtype.kind])
     item[...] = values
 
 
