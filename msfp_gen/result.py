@@ -107,6 +107,6 @@ class Result(RunData):
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Result:
         """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
-        from msfp_gen.results.dataset import read_result
+        from msfp_gen.results.reading import read_result
 
         return read_result(path, cls)

@@ -57,6 +57,8 @@ def _main(argv: list[str] | None) -> int:
         return fail(str(error), error.exit_code)
     except OSError as error:  # such as a full disk, or a closed pipe on standard output
         return fail(str(error), FAILED)
+    except MemoryError:
+        return fail("no memory is left; give output_step, a shorter duration or fewer scenes", FAILED)
     except typer.Abort:
         code = INTERRUPTED
     except USAGE_ERROR as error:

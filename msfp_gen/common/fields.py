@@ -18,10 +18,12 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from msfp_gen.common.quantities import to_si
 from msfp_gen.errors import InputError
 
+LARGEST = 1e30  # of an input in SI units, and the reciprocal of the smallest positive one: powers of them are finite
+
 
 @dataclass(frozen=True)
 class Quantity:
-    """Rule of a field that holds finite numbers of one unit.
+    """Rule of a field that holds finite numbers of one unit, of at most `LARGEST`.
 
     Attributes:
         unit: SI unit; "" for a plain number.
@@ -30,6 +32,7 @@ class Quantity:
         shape: () for one number, (3,) for three numbers, (None, 3) for any number of triples.
         whole: only integers are accepted.
         pair: a single number is accepted for two equal ones.
+        computed: numbers that another program computed, such as coefficients; they have no bounds but these.
     """
 
     unit: str
@@ -38,6 +41,7 @@ class Quantity:
     shape: tuple[int | None, ...] = ()
     whole: bool = False
     pair: bool = False
+    computed: bool = False
 
     def parse(self, value: object, *, text: bool = False) -> Any:
         """`value` as a float, an int or nested tuples of them [unit]; with `text`, strings with units are accepted.
@@ -65,6 +69,10 @@ class Quantity:
         too_low = (self.above is not None and number <= self.above) or (self.least is not None and number < self.least)
         if too_low or not math.isfinite(_float(number)):
             raise ValueError(self._remedy())
+        if abs(number) > LARGEST and not self.computed:
+            raise ValueError(f"{self._remedy()} and of at most {LARGEST:g}")
+        if self.above == 0 and number < 1 / LARGEST:
+            raise ValueError(f"{self._remedy()} and of at least {1 / LARGEST:g}")
         return number
 
     def _remedy(self) -> str:
@@ -100,13 +108,20 @@ class Choice:
 
 @dataclass(frozen=True)
 class Text:
-    """Rule of a field that takes any text."""
+    """Rule of a field that takes a text, which every file format can hold."""
 
     def parse(self, value: object, *, text: bool = False) -> str:
         """`value` itself if it is a text. Raises ValueError that states the remedy only."""
         if not isinstance(value, str):
             raise ValueError("give a text in quotes")
+        if not is_storable(value):
+            raise ValueError("give a text without the NUL character and without halves of surrogate pairs")
         return value
+
+
+def is_storable(text: str) -> bool:
+    """Whether files can hold a text: HDF5 ends it at a NUL character, and UTF-8 has no lone surrogates."""
+    return "\0" not in text and not any("\ud800" <= letter <= "\udfff" for letter in text)
 
 
 @dataclass(frozen=True)
@@ -116,7 +131,12 @@ class Notes:
     def parse(self, value: object, *, text: bool = False) -> dict[str, str | float]:
         """A copy of `value`. Raises ValueError that states the remedy only."""
         valid = isinstance(value, Mapping) and all(
-            isinstance(key, str) and (isinstance(item, str) or (isinstance(item, Real) and math.isfinite(_float(item))))
+            isinstance(key, str)
+            and is_storable(key)
+            and (
+                (isinstance(item, str) and is_storable(item))
+                or (isinstance(item, Real) and math.isfinite(_float(item)))
+            )
             for key, item in value.items()
         )
         if not valid:

@@ -19,7 +19,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.errors import InputError
+from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
@@ -124,16 +124,15 @@ class Entry:
     @classmethod
     def of(cls, spec: ModelSpec) -> Entry:
         """The entry of a model; reading the sources and asking the compiler for its version takes milliseconds."""
-        compiler = find_compiler()
-        inputs = {
+        inputs: dict[str, Any] = {
             "manifest": 2,
             "spec": spec.key,
             "sources": _digest_sources(),
             "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
-            "compiler": [*compiler.command, compiler.path, compiler.version],
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
         }
+        inputs["compiler"] = _compiler(module_name(spec), inputs)
         key = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
         module = module_name(spec)
         return cls(spec, module, inputs, key, cache_root() / f"{module}-{key[:20]}")
@@ -185,6 +184,8 @@ class Entry:
                 part.mkdir()
             yield part
         finally:
+            with suppress(OSError):  # only an empty folder goes: another process has built the model meanwhile
+                part.rmdir()
             lock.release()
 
     def publish(self, part: Path) -> None:
@@ -228,6 +229,23 @@ def _digest_sources() -> str:
             total.update(f"{folder}/{path.relative_to(PACKAGE / folder).as_posix()}\0{len(data)}\0".encode())
             total.update(data)
     return total.hexdigest()
+
+
+def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
+    """Command, path and version of the compiler. Without one, those with which a model of these inputs was built.
+
+    Raises CompileError where there is neither.
+    """
+    try:
+        compiler = find_compiler()
+    except CompileError:
+        for folder in sorted(cache_root().glob(f"{module}-*[0-9a-f]")):
+            with suppress(OSError, ValueError, TypeError):
+                found = Manifest.read(folder).inputs
+                if all(found.get(name) == value for name, value in inputs.items()):
+                    return list(found["compiler"])
+        raise
+    return [*compiler.command, compiler.path, compiler.version]
 
 
 def _version(tool: str) -> str:

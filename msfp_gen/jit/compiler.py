@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from msfp_gen.errors import CompileError
+from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
 JOBS = 2
 LOG_NAME = "build.log"
@@ -42,7 +43,7 @@ FLAGS: dict[str, tuple[str, ...]] = {
         "-fno-trapping-math",
         "-ffp-contract=off",
     ),
-    "user": tuple(shlex.split(os.environ.get("MSFP_GEN_CFLAGS", ""))),
+    "user": user_flags(),
     # Cython's output causes warnings and takes little of the run time: no warnings, little optimisation.
     "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
     "libraries": ("-lm",),
@@ -85,15 +86,18 @@ def find_compiler() -> Compiler:
     ------
     CompileError
         If none runs; the message lists the names that were tried and how to install one.
+    InputError
+        CC or MSFP_GEN_CFLAGS has an open quote or a flag that is not permitted.
 
     """
-    chosen = os.environ.get("CC", "").strip()
+    words(CFLAGS)
+    chosen = shlex.join(words(COMPILER))
     candidates = [chosen] if chosen else [sysconfig.get_config_var("CC") or "", *PLATFORM_COMPILERS]
     for candidate in filter(None, candidates):
-        words = shlex.split(candidate)
-        path = shutil.which(words[0])
-        if path is not None and (version := _version(words)):
-            return Compiler(tuple(words), path, version)
+        command = shlex.split(candidate)
+        path = shutil.which(command[0])
+        if path is not None and (version := _version(command)):
+            return Compiler(tuple(command), path, version)
     tried = f"CC={chosen}" if chosen else ", ".join(dict.fromkeys(filter(None, candidates)))
     raise CompileError(
         f"no C compiler found (looked for {tried}): install one (apt install gcc, xcode-select --install, "
@@ -152,6 +156,9 @@ def compile_extension(
     objects = [_object_file(name) for name in [*units, f"{module}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
+    if not target.is_file():
+        message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
+        raise CompileError(message, log=log.path)
     for name in objects:
         (folder / name).unlink()
     return target
@@ -239,7 +246,10 @@ def _object_file(name: str) -> str:
     return f"{Path(name).stem}.o"
 
 
-def _version(words: Sequence[str]) -> str:
+def _version(command: Sequence[str]) -> str:
     """First line of `<compiler> --version`; empty if that fails, as for a stub that only offers to install one."""
-    done = subprocess.run([*words, "--version"], text=True, errors="replace", capture_output=True)
+    try:
+        done = subprocess.run([*command, "--version"], text=True, errors="replace", capture_output=True)
+    except OSError:  # a file that is no program
+        return ""
     return done.stdout.partition("\n")[0].strip() if done.returncode == 0 else ""

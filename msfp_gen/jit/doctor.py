@@ -82,7 +82,7 @@ def check_compiler() -> Check:
     """The C compiler that builds would use."""
     try:
         compiler = find_compiler()
-    except CompileError as error:
+    except (CompileError, InputError) as error:
         return Check("C compiler", False, *_found_and_remedy(error))
     return Check("C compiler", True, f"{' '.join(compiler.command)} at {compiler.path}: {compiler.version}")
 
@@ -102,7 +102,7 @@ def check_build() -> Check:
         with tempfile.TemporaryDirectory() as folder:
             path = compile_extension(TEST_SOURCES, "msfp_doctor", Path(folder))
             correct = load_extension(path, "msfp_doctor").answer() == 42
-    except (CompileError, OSError) as error:
+    except (CompileError, InputError, OSError) as error:
         return Check("build a module", False, str(error), "resolve the failed checks above first")
     return Check(
         "build a module", correct, f"{perf_counter() - begin:.1f} s", "the module was built but returns a wrong value"
@@ -151,7 +151,7 @@ def _requires_python() -> tuple[int, ...]:
         return (0,)
 
 
-def _found_and_remedy(error: CompileError) -> Iterator[str]:
+def _found_and_remedy(error: CompileError | InputError) -> Iterator[str]:
     """The two parts of a CompileError of the form `what was found: remedy`."""
     found, _, remedy = str(error).partition(": ")
     yield from (found, remedy)

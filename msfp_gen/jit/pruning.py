@@ -15,7 +15,8 @@ from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.cache import MANIFEST_NAME, Entry, Manifest, cache_root
 from msfp_gen.specification.layout import Layout, ModelSpec
 
-_NAME = re.compile(r"(msfp_\d+_\d+_\d+-[0-9a-f]{20})(\.part-\d+)?")
+# Models, those for batches in vector lanes of earlier versions, and unfinished ones.
+_NAME = re.compile(r"(msfp_\d+_\d+_\d+(?:_lanes\d+)?-[0-9a-f]{20})(\.part-\d+)?")
 DAY = 86400.0
 
 
@@ -129,7 +130,7 @@ def _remove(folder: Path) -> bool:
             with suppress(OSError):  # some systems do not rename a folder with open files
                 folder.rename(renamed)
         shutil.rmtree(renamed, ignore_errors=True)
-        return not folder.exists()
+        return not (folder.exists() or renamed.exists())
 
 
 def _remove_locks() -> None:

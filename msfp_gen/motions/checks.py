@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import LARGEST, Text
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
 
@@ -17,14 +18,24 @@ _JUMPS = (
 
 
 def positive(field: str, value: float) -> float:
-    """`value` as a float. Raises InputError unless it is finite and positive."""
+    """`value` as a float. Raises InputError unless it is positive, and neither it nor its reciprocal above LARGEST."""
     try:
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{field}: {value!r} is not a number; give a positive one") from None
     if not (np.isfinite(number) and number > 0):
         raise InputError(f"{field}: {number!r} is not a positive finite number; give one")
+    if not 1 / LARGEST <= number <= LARGEST:
+        raise InputError(f"{field}: {number!r} is beyond all measure; give {1 / LARGEST:g} to {LARGEST:g}")
     return number
+
+
+def storable(field: str, text: str) -> str:
+    """`text`. Raises InputError where files cannot hold it."""
+    try:
+        return Text().parse(text)
+    except ValueError as error:
+        raise InputError(f"{field} = {text!r}: {error}") from None
 
 
 def finite(field: str, values: ArrayLike) -> Array:
@@ -41,9 +52,9 @@ def finite(field: str, values: ArrayLike) -> Array:
 
 def increasing(field: str, times: Array) -> Array:
     """`times`, shape (k,), [s]. Raises InputError unless they are strictly increasing."""
-    steps = np.diff(times)
-    if np.any(steps <= 0):
-        i = int(np.argmax(steps <= 0))
+    late = np.diff(times) < 1 / LARGEST
+    if np.any(late):
+        i = int(np.argmax(late))
         raise InputError(
             f"{field}[{i + 1}]: {times[i + 1]:g} s does not come after {times[i]:g} s; sort the samples, drop repeats"
         )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
-from msfp_gen.motions.checks import finite, increasing, positive
+from msfp_gen.motions.checks import finite, increasing, positive, storable
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.samples import sampled_linear
 from msfp_gen.motions.time_grid import Resolution
@@ -47,6 +47,7 @@ class Prescribed:
         if knots.ndim != 1 or len(knots) < 2 or knots[0] != 0:
             raise InputError(f"{self.WORD}.knots: shape {knots.shape}; give at least two times, the first of them zero")
         increasing(f"{self.WORD}.knots", knots)
+        storable(f"{self.WORD}.name", self.name)
         shape = (len(knots) - 1, len(self.CHANNELS), ORDER)
         if coefficients.shape != shape:
             raise InputError(f"{self.WORD}.coefficients: shape {coefficients.shape}; give {shape}")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
-from msfp_gen.motions.checks import checked_pieces, positive
+from msfp_gen.motions.checks import checked_pieces, positive, storable
 from msfp_gen.motions.piecewise import Metadata
 from msfp_gen.motions.time_grid import Resolution
 
@@ -40,6 +40,7 @@ class Trajectory:
         knots, coefficients, jumps = checked_pieces(self.knots, self.coefficients, self.jumps, CHANNELS)
         for key, value in (("knots", knots), ("coefficients", coefficients), ("jumps", jumps)):
             object.__setattr__(self, key, value)
+        storable("motion.name", self.name)
         object.__setattr__(self, "metadata", dict(self.metadata))
         if self.max_step is not None:
             positive("max_step", self.max_step)

@@ -58,6 +58,8 @@ def wave_knots(rise: float, duration: float, shortest_period: float) -> Array:
         InputError: more than `MAX_PIECES` pieces would be needed.
     """
     step = shortest_period / 128
+    if not duration > rise:
+        raise InputError(f"cycles: they end with the lead_in of {rise:.4g} s; give more cycles or a shorter lead_in")
     if not duration / step <= MAX_PIECES:
         raise InputError(
             f"cycles: {duration:.4g} s of waves of {shortest_period:.4g} s need more than {MAX_PIECES:.0e} pieces; "

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, write_bytes
-from msfp_gen.errors import InputError
-from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.history import ENERGY, LABELS, Counters, Event, History, quantities
-from msfp_gen.results.note import Note
+from msfp_gen.results.history import ENERGY, LABELS, History, quantities
+from msfp_gen.results.reading import COUNTER, DIGEST, PROVENANCE, digest_of
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
-R = TypeVar("R", bound=RunData)
 Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
 
 
@@ -52,6 +47,8 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
 
     path = check_output(path, DATASET_SUFFIXES)
     dataset = to_dataset(result)
+    pieces = to_pieces(result.scene.motion) if dataset.attrs["motion"] == PIECES else None
+    dataset.attrs[DIGEST] = _digest(dataset, pieces)
     # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     encoding = {
         name: {"zlib": True, "complevel": 1}
@@ -62,51 +59,23 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
     content = BytesIO()
     with h5netcdf.File(content, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
-        if dataset.attrs["motion"] == PIECES:
-            to_pieces(result.scene.motion).dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+        if pieces is not None:
+            pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
     write_bytes(path, [content.getbuffer()])
     return path
 
 
-def read_netcdf(path: str | Path, group: str | None = None) -> xr.Dataset:
-    """The dataset of a file that `Result.to_netcdf` wrote, in memory. Raises InputError for any other file.
+def _digest(dataset: xr.Dataset, pieces: xr.Dataset | None) -> str:
+    """The digest of the values that `read_result` reads."""
+    from msfp_gen.scene.file.stored_motion import GROUP
 
-    group: "motion" for the base motion of files whose scene does not contain it; None: the run.
-    """
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="h5netcdf", group=group) as dataset:
-            return dataset.load()
-    except FileNotFoundError as error:
-        raise InputError(f"path = {str(path)!r}: no such file; give the name of a result") from error
-    except OSError as error:
-        raise InputError(f"path = {str(path)!r}: not a netCDF-4 file that can be read; give the name of one") from error
-
-
-def read_result(path: str | Path, kind: type[R]) -> R:
-    """The result in a file of `Result.to_netcdf`, as an instance of `kind`. Raises InputError for any other file."""
-    from msfp_gen.scene.file.loader import scene_from_table
-    from msfp_gen.scene.file.stored_motion import GROUP, PIECES, from_pieces
-
-    dataset = read_netcdf(path)
-    if dataset.attrs.get("source") != "msfp-gen":
-        raise InputError(f"path = {str(path)!r}: no result of msfp-gen; give a file that `run -o` wrote")
-    attributes = dataset.attrs
-    scene = tomllib.loads(attributes["scene"])
-    if attributes.get("motion") == PIECES:
-        scene["motion"] = from_pieces(read_netcdf(path, GROUP))
-    return kind(
-        scene_from_table(scene),
-        _history(dataset),
-        _event_list(dataset),
-        Counters(**_without(COUNTER, attributes)),
-        attributes["status"],
-        attributes["message"],
-        _without(PROVENANCE, attributes),
-        tuple(Note(**note) for note in json.loads(attributes.get("notes", "[]"))),
-        Extremes.of_table(json.loads(attributes["extremes"])) if "extremes" in attributes else None,
-    )
+    arrays = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
+    arrays["time"] = dataset["time"].to_numpy()
+    about = dict(dataset.attrs)
+    if pieces is not None:
+        arrays |= {f"{GROUP}/{name}": variable.to_numpy() for name, variable in pieces.data_vars.items()}
+        about |= {f"{GROUP}/{name}": value for name, value in pieces.attrs.items()}
+    return digest_of(about, arrays)
 
 
 def _rows(history: History) -> Variables:
@@ -165,30 +134,3 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
 
 def _prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     return {prefix + name: value for name, value in values.items()}
-
-
-def _without(prefix: str, attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """The inverse of `_prefixed`; NumPy scalars become Python numbers."""
-    return {
-        str(name).removeprefix(prefix): value.item() if isinstance(value, np.generic) else value
-        for name, value in attributes.items()
-        if str(name).startswith(prefix)
-    }
-
-
-def _history(dataset: xr.Dataset) -> History:
-    arrays = {}
-    for field, rows in quantities().items():
-        if not set(rows.names or (field,)) <= set(dataset.variables):
-            continue  # a quantity of an effect that the run did not model
-        columns = [dataset[name].to_numpy() for name in rows.names or (field,)]
-        arrays[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
-    return History(**arrays, energy={name: dataset[f"energy_{name}"].to_numpy() for name in ENERGY})
-
-
-def _event_list(dataset: xr.Dataset) -> tuple[Event, ...]:
-    columns = [dataset[f"event_{name}"].to_numpy() for name in ("time", "surface", "kind", "displacement", "top_force")]
-    return tuple(
-        Event(float(time), int(surface), str(kind), displacement, force)  # type: ignore[arg-type]
-        for time, surface, kind, displacement, force in zip(*columns, strict=True)
-    )

@@ -19,13 +19,18 @@ if TYPE_CHECKING:
 _EVENT_KINDS = names(EVENT_KINDS)
 
 
-def history_of(model: Model, rows: Array, azimuth: float) -> History:
-    """The rows of a segment, up to the first that is not finite, in the frame of the user.
-
-    rows: shape (T, row size). azimuth: of the frame of the model [rad].
-    """
+def finite_rows(rows: Array) -> Array:
+    """The rows of a segment, shape (T, row size), up to the first that is not finite."""
     finite = np.isfinite(rows).all(axis=1)
-    f = model.unpack(rows if finite.all() else rows[: int(finite.argmin())])
+    return rows if finite.all() else rows[: int(finite.argmin())]
+
+
+def history_of(model: Model, rows: Array, azimuth: float) -> History:
+    """The rows of a segment in the frame of the user.
+
+    rows: of `finite_rows`, one or more. azimuth: of the frame of the model [rad].
+    """
+    f = model.unpack(rows)
     turn = azimuth
     separation = f["q"][..., 3:] if model.effects.uplift else np.zeros_like(f["force"])
     lift = np.maximum(0.0, -f["compression"]) if model.effects.uplift else np.zeros_like(f["normal"])
@@ -122,7 +127,9 @@ def _extended(column: Array | None, later: Array, part: History) -> Array:
 def _continued(parts: Sequence[History], name: str) -> Array:
     """An energy term that continues from its last value in the segment before."""
     terms = [parts[0].energy[name]]
+    end = terms[0][-1]  # kept apart: a segment that took no step adds no value
     for part in parts[1:]:
         values = part.energy[name]
-        terms.append(terms[-1][-1] + values[1:] - values[0])
+        terms.append(end + values[1:] - values[0])
+        end = end + values[-1] - values[0]
     return np.concatenate(terms)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling
 from msfp_gen.simulation.simulate import RunSequence, check, settle
 
@@ -63,7 +64,7 @@ def simulate_batch(
     ------
     InputError
         An entry is no scene, or its method does not support its effects; the message starts with its index, as in
-        `scenes[3]`. No scene is run.
+        `scenes[3]`; or the rows of all do not fit into memory. No scene is run.
     RunError
         A scene failed at its start, so that it has no rows, or a worker process died. The other runs are ended.
 
@@ -95,6 +96,7 @@ def _checked(scenes: Iterable[Scene]) -> list[Scene]:
             raise InputError(f"scenes[{index}]: a {type(scene).__name__} is no scene; give what load_scene returns")
         with _located(index):
             check(scene, scene.modelled)
+    require_memory(given)
     return given
 
 

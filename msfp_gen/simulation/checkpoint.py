@@ -119,8 +119,8 @@ class Checkpoint:
         about = {**vars(self._identity), "time": run.time, "wall": self.wall + start - self._start}
         try:
             write(self.path, about, run.snapshot())
-        except OSError as error:
-            reason = error.strerror or error
+        except (OSError, MemoryError) as error:
+            reason = getattr(error, "strerror", None) or error or "no memory"
             warnings.warn(f"checkpoint {self.path} not written ({reason}); the run continues", RuntimeWarning, 2)
         now = time.monotonic()
         self._due = now + max(self._every, WRITE_INTERVAL * (now - start))
@@ -153,16 +153,21 @@ def write(path: Path, about: Mapping[str, Any], snapshot: bytes) -> None:
 
 def read(path: Path) -> tuple[dict[str, Any], bytes]:
     """Header and snapshot of a checkpoint file. Raises ValueError where it is incomplete or altered, and OSError."""
+    from msfp_gen.scene.file.loader import toml_table
+
     with path.open("rb") as file:
         magic, expected = file.readline(len(MAGIC)), file.readline(65).strip()
         rest = file.read() if magic == MAGIC else b""
     if not rest or hashlib.sha256(rest).hexdigest().encode() != expected:
         raise ValueError("damaged")
     header, _, snapshot = rest.partition(b"\n")
-    about = json.loads(header)
+    try:
+        about = json.loads(header)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
     if not isinstance(about, dict) or any(type(about.get(name)) is not kind for name, kind in _HEADER.items()):
         raise ValueError("no header of a checkpoint")
-    tomllib.loads(about["scene"])  # raises a ValueError
+    toml_table(about["scene"])
     if not 0 <= about["wall"] < float("inf"):
         raise ValueError("no wall time")
     return about, snapshot

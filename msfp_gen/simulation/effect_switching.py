@@ -38,8 +38,6 @@ def stopping_monitors(scene: Scene, effects: Effects, strict: bool) -> tuple[str
 def next_effects(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
     """The effects with which a run continues after a segment with `effects`; None where the run has ended."""
     run, status = segment.run, segment.status
-    if not run.row_count:
-        return None
     if status == "ok" and run.time < scene.end:
         return _extended(scene, effects, "plane")
     if status == "uplift":

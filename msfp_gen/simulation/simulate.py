@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import or_
@@ -21,12 +21,13 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.history import Counters
+from msfp_gen.results.history import Counters, History
 from msfp_gen.results.note import Note
-from msfp_gen.results.row_unpacking import events_of, history_of, joined
+from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of, joined
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
+from msfp_gen.simulation.memory import outgrown, require_memory
 from msfp_gen.simulation.notes import history_notes, notes_of
 from msfp_gen.simulation.segment import RestartState, Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
@@ -80,13 +81,15 @@ def simulate(
     Raises
     ------
     InputError
-        The method does not support the effects; the checkpoint is damaged, or of another scene or build.
+        The method does not support the effects; the rows do not fit into memory; the checkpoint is damaged, or of
+        another scene or build.
     RunError
         The run failed: the message gives time, surface and cause, `.result` has the rows until then.
 
     """
     if checkpoint is not None and not resume:
         _require_no_checkpoint(checkpoint)
+    require_memory([scene])
     sequence = RunSequence.of(scene, strict)
     while sequence.effects is not None:
         segments = sequence.segments
@@ -123,7 +126,8 @@ class RunSequence:
 
     def start_segment(self, model: Model) -> tuple[Run, float]:
         """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
-        scene, last, selection = self.scene, self.segments[-1:], self.scene.effect_selection
+        scene, selection = self.scene, self.scene.effect_selection
+        last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
         return start_run(scene, model, selection, end, at, stopping_monitors(scene, model.effects, self.strict))
@@ -140,14 +144,18 @@ class RunSequence:
         self.effects = following
 
     def result(self, with_initial_row: bool = False) -> Result:
-        """The result of all segments; raises RunError where there is no row.
+        """The result of all segments; raises RunError where none has a row. A segment that failed at once has none.
 
         with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
         last = self.segments[-1]
-        if not last.run.row_count and not (with_initial_row and _recorded_finite(last.run)):
+        if with_initial_row and not any(segment.run.row_count for segment in self.segments):
+            last.run.record_now()
+        parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
+        if not parts:
             raise RunError(_message(self.scene, last), status=last.status)
-        return _result(self)
+        histories = [history_of(segment.model, rows, segment.azimuth) for segment, rows in parts]
+        return _result(self, joined(histories, self.given.output_step))
 
 
 def settle(scene: Scene) -> Scene:
@@ -185,7 +193,8 @@ def _segment(sequence: RunSequence, progress: Progress | None, options: Checkpoi
     if checkpoint is not None:
         checkpoint.restore(run)
     ready = time.perf_counter()
-    status = _advance(run, scene.end, progress, checkpoint) or run.status[0]
+    earlier = sum(segment.run.row_count for segment in sequence.segments)
+    status = _advance(run, scene, earlier, progress, checkpoint) or run.status[0]
     wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
     return Segment(model, run, azimuth, status, wall, ready - start)
 
@@ -202,27 +211,29 @@ def check(scene: Scene, effects: Effects) -> None:
         )
 
 
-def _advance(run: Run, end: float, progress: Progress | None, checkpoint: Checkpoint | None) -> str | None:
-    """Take all steps; "interrupted" after Ctrl-C, else None."""
-    status = None
+def _advance(
+    run: Run, scene: Scene, earlier: int, progress: Progress | None, checkpoint: Checkpoint | None
+) -> str | None:
+    """Take all steps; "interrupted" after Ctrl-C, "memory" where no more rows fit, else None.
+
+    earlier: number of rows of the segments before.
+    """
+    status, surfaces = None, scene.bearing.layout.surfaces
     try:
         while run.advance(STEPS_PER_CALL):
+            if outgrown(earlier + run.row_count, surfaces):
+                status = "memory"
+                break
             if checkpoint is not None:
                 checkpoint.save_if_due(run)
             if progress is not None:
-                progress(run.time, end)
+                progress(run.time, scene.end)
     except KeyboardInterrupt:
         status = "interrupted"
     # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
     if checkpoint is not None and run.status[0] in ("ok", "stopped"):
         checkpoint.save(run)
     return status
-
-
-def _recorded_finite(run: Run) -> bool:
-    """Record a row of the current state; whether all of its values are finite."""
-    run.record_now()
-    return bool(np.isfinite(run.rows).all())
 
 
 def _message(scene: Scene, segment: Segment) -> str:
@@ -232,12 +243,15 @@ def _message(scene: Scene, segment: Segment) -> str:
     return failures.message(scene, segment.model, segment.run, segment.status, cause)
 
 
-def _extremes(segment: Segment) -> Extremes:
-    """Extremes of a segment in the frame of the user."""
-    return Extremes.of_run(segment.model.extension.EXTREMES, segment.run.extremes, segment.azimuth)
+def _extremes(segments: Sequence[Segment]) -> Extremes | None:
+    """Extremes of all segments in the frame of the user; None where none of them could start."""
+    found = [
+        Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in segments if s.run.row_count
+    ]
+    return reduce(or_, found) if found else None
 
 
-def _result(sequence: RunSequence) -> Result:
+def _result(sequence: RunSequence, history: History) -> Result:
     scene, segments = sequence.given, sequence.segments
     last = segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
@@ -251,7 +265,6 @@ def _result(sequence: RunSequence) -> Result:
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
     }
-    history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
     return Result(
         scene=scene,
         history=history,
@@ -261,5 +274,5 @@ def _result(sequence: RunSequence) -> Result:
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
         notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history),
-        recorded_extremes=reduce(or_, (_extremes(segment) for segment in segments)),
+        recorded_extremes=_extremes(segments),
     )

@@ -39,6 +39,8 @@ SCENES = {
     "an open text": ("name = 'a", ("no valid TOML", "end of document")),
     "lists without end": ("a = " + "[" * 100000, ("no valid TOML", "nested too deeply")),
     "tables without end": ("a = " + "{b = " * 5000, ("no valid TOML", "nested too deeply")),
+    "a key of 3000 tables": (GOOD + "a." * 3000 + "b = 1", ("no valid TOML", "nested too deeply")),
+    "a row of 3000 tables": (GOOD + "[" + "a." * 3000 + "b]", ("no valid TOML", "nested too deeply")),
     "a number of 5000 digits": (GOOD + "duration = " + "9" * 5000, ("no valid TOML", "digits")),
     "a number of 400 digits": (GOOD + "duration = " + "9" * 400, ("duration = 9", "finite number above 0 [s]")),
     "a count of 400 digits": (GOOD + "solver = {max_steps = " + "9" * 400 + "}", ("solver.max_steps", "whole number")),
@@ -67,10 +69,27 @@ SCENES = {
     "a preset that is a path": ("bearing = '../fenz-tfp'\n" + GOOD.split("\n", 1)[1], ("bearing = '../fenz-tfp'",)),
     "waves without end": (motion(kind="harmonic", amplitude=0.1, frequency=0.1, cycles=1e12), ("motion.cycles",)),
     "waves too fast": (motion(kind="circle", amplitude=0.1, angular_frequency=1e9, cycles=1e6), ("motion.cycles",)),
-    "a frequency below all": (motion(kind="harmonic", amplitude=0.1, frequency=1e-320), ("motion.lead_in: inf",)),
+    "a frequency below all": (
+        motion(kind="harmonic", amplitude=0.1, frequency=1e-320),
+        ("motion.frequency = 1e-320", "at least 1e-30"),
+    ),
+    "a frequency above all": (
+        motion(kind="harmonic", amplitude=0.1, frequency=1e300),
+        ("motion.frequency = 1e+300", "at most 1e+30"),
+    ),
+    "a corner below all": (
+        motion(kind="record", bundled="ridgecrest-2019-ci-clc", corner=1e-9),
+        ("motion.corner: 1e-09 Hz", "give a higher one"),
+    ),
+    "no cycle at all": (motion(kind="harmonic", amplitude=0.1, frequency=0.1, cycles=1e-29), ("motion.cycles",)),
     "a rest for ever": (
         motion(kind="harmonic", amplitude=0.1, frequency=0.1, hold=1e300),
-        ("not finite within 1e+300 s",),
+        ("motion.hold = 1e+300", "at most 1e+30"),
+    ),
+    "a name with NUL": (GOOD + 'name = "a\\u0000b"', ("name = 'a\\x00b'", "without the NUL character")),
+    "a motion whose name has NUL": (
+        motion(kind="harmonic", amplitude=0.1, frequency=0.1, name="a\0b"),
+        ("motion.name = 'a\\x00b'", "without the NUL character"),
     ),
     "a bundled path": (motion(kind="record", bundled="../../x"), ("'../../x' does not come with the package",)),
     "a file with NUL": (HEAD + 'motion = {kind = "record", file = "a\\u0000b"}', ("file = 'a\\x00b'", "no path")),

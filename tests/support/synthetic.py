@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from msfp_gen.motions.motion import Motion
 from msfp_gen.result import Result
@@ -105,3 +107,8 @@ def loops(both: bool = False, name: str = "fenz-test5") -> Result:
     met = tuple(contact(rows, surface) for surface in (1, 4))
     counters = Counters(steps=2000, newton_iterations=9000, wall_time=0.25)
     return Result(scene(name), rows, met, counters, provenance={"version": "0"})
+
+
+def opened(path: Path, group: str | None = None) -> xr.Dataset:
+    """The dataset in a netCDF file, as any other program reads it."""
+    return xr.load_dataset(path, engine="h5netcdf", group=group)

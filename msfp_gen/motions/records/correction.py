@@ -15,6 +15,7 @@ from msfp_gen.motions.records.record import Record, sample_times
 from msfp_gen.motions.waveforms import product, smoothstep
 
 _ORDER = 4  # of the Butterworth filter
+_MAX_PAD = 1e7  # samples of rest before and after a record, in which the filter settles
 _DRIFT = 0.1  # permitted velocity at the end of an uncorrected record, as a share of its peak velocity
 
 
@@ -153,7 +154,12 @@ def _integrated(record: Record, corner: float, taper: float) -> tuple[Array, Arr
 
     raw = record.acceleration - record.acceleration.mean(axis=0)
     raw = raw * _taper_window(record.time, min(taper, record.duration / 4))[0][:, None]
-    pad = int(np.ceil(1.5 * _ORDER / corner / record.time_step))
+    samples = 1.5 * _ORDER / corner / record.time_step
+    if samples > _MAX_PAD:
+        raise InputError(
+            f"corner: {corner:g} Hz needs {samples:.1e} samples of rest before the record; give a higher one"
+        )
+    pad = int(np.ceil(samples))
     padded = np.pad(raw, ((pad, pad), (0, 0)))
     filters = butter(_ORDER, corner, "highpass", fs=1 / record.time_step, output="sos")
     filtered = sosfiltfilt(filters, padded, axis=0, padtype=None)

@@ -24,7 +24,10 @@ from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 
 Table = dict[str, Any]
+MAX_DEPTH = 16  # of nested tables and lists; a scene has six
+_TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
+_ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
 _PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
 
 
@@ -49,7 +52,7 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        return scene_from_table(_changed(_toml(path.read_text(encoding="utf-8-sig")), changes), path.parent)
+        return scene_from_table(_changed(toml_table(path.read_text(encoding="utf-8-sig")), changes), path.parent)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
     except UnicodeDecodeError as error:
@@ -74,26 +77,33 @@ def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
     return table
 
 
-def _toml(text: str) -> Table:
-    """The table of a TOML text; raises InputError where the text is not valid."""
+def toml_table(text: str) -> Table:
+    """The table of a TOML text; raises InputError where the text is not valid, or nested more deeply than any scene."""
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
     except RecursionError:
-        raise InputError("no valid TOML: tables or lists are nested too deeply; a scene needs few levels") from None
+        raise InputError(_TOO_DEEP) from None
     except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
         raise InputError(f"no valid TOML: {str(error).partition(';')[0]}") from None
+    level: list[Any] = [table]
+    for _ in range(MAX_DEPTH):  # a dotted key nests without a recursion of the parser
+        values = (each.values() if isinstance(each, dict) else each for each in level)
+        level = [item for each in values for item in each if isinstance(item, dict | list)]
+    if level:
+        raise InputError(_TOO_DEEP)
+    return table
 
 
-def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Scene:
+def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None) -> Scene:
     """The scene of a plain table, as in a scene file.
 
     folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
-    permitted. Raises InputError.
+    permitted. motion: replaces the `[motion]` table. Raises InputError.
     """
-    given = schema.validate_scene(table)
-    motion = dict(given["motion"])
-    if "file" in motion:
-        motion["file"] = resolved(motion["file"], folder)
+    given = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
+    made = dict(given["motion"])
+    if "file" in made:
+        made["file"] = resolved(made["file"], folder)
     top = dict(given["top"])
     parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
     if "effects" in given:
@@ -105,8 +115,8 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None) -> Sc
         parts["effects"] = replace(parts["effects"], top_rotation=True)
     parts["bearing"] = _bearing(given["bearing"])
     parts["top"] = _TOPS[top.pop("kind")](**top)
-    parts["motion"] = _motion(motion)
-    return Scene(**{**given, **parts, "motion_table": motion})
+    parts["motion"] = _motion(made) if motion is None else motion
+    return Scene(**{**given, **parts, "motion_table": made if motion is None else None})
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:

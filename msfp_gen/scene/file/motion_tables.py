@@ -170,7 +170,7 @@ class Pieces(MotionTable):
 
     kind: ClassVar[str] = "pieces"
     knots: Annotated[tuple[float, ...], Quantity("s", shape=(None,))]
-    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6))]
+    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6), computed=True)]
     jumps: Annotated[tuple[float, ...], Quantity("s", shape=(None,))] = ()
     max_step: Annotated[float | None, _TIME] = None
     metadata: Annotated[Mapping[str, str | float] | None, Notes()] = None

@@ -75,7 +75,7 @@ class LoadPieces(HistoryTable):
 
     kind, of, make = "pieces", Load, "of"
     knots: Annotated[tuple[float, ...], _TIMES]
-    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6))]
+    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 6, 6), computed=True)]
     name: str = ""
 
 
@@ -123,7 +123,7 @@ class RotationPieces(HistoryTable):
     kind, of, make = "pieces", Rotation, "of"
     knots: Annotated[tuple[float, ...], _TIMES]
     name: str = ""
-    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 2, 6))]
+    coefficients: Annotated[tuple[Any, ...], Quantity("", shape=(None, 2, 6), computed=True)]
 
 
 LOADS: dict[str, type[HistoryTable]] = {

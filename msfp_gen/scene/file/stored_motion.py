@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.fields import Notes
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.trajectory import CHANNELS
@@ -66,19 +67,15 @@ def to_pieces(motion: Motion) -> xr.Dataset:
     return xr.Dataset(variables, {"channel": ("channel", np.array(CHANNELS))}, attributes)
 
 
-def from_pieces(dataset: xr.Dataset) -> dict[str, Any]:
-    """The inverse of `to_pieces`, as the `[motion]` table of a scene."""
-    attributes = dataset.attrs
-    step = attributes.get("max_step")
-    arrays = {name: dataset[name].to_numpy() for name in ("knots", "coefficients", "jumps")}
-    return Pieces.of(
-        Motion(
-            **arrays,
-            max_step=None if step is None else float(step),
-            name=str(attributes["name"]),
-            metadata=json.loads(attributes["metadata"]),
-        )
-    )
+def from_pieces(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Motion:
+    """The inverse of `to_pieces`: the motion of its arrays and attributes."""
+    step, metadata = attributes.get("max_step"), json.loads(attributes["metadata"])
+    try:
+        metadata = Notes().parse(metadata)
+    except ValueError as error:
+        raise InputError(f"motion.metadata: {error}") from None
+    step = None if step is None else float(step)
+    return Motion(**arrays, max_step=step, name=str(attributes["name"]), metadata=metadata)
 
 
 def _makes(table: Mapping[str, Any], motion: Motion) -> bool:

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import preset_run
-from support.synthetic import loops
+from support.synthetic import loops, opened
 
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError, RunError
@@ -22,7 +22,6 @@ from msfp_gen.report.content import provenance_table, summary_numbers, summary_p
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
 from msfp_gen.report.page import FIGURES
 from msfp_gen.result import Result
-from msfp_gen.results.dataset import read_netcdf
 from msfp_gen.results.geometry.shape import poses
 
 ALL = dict(FIGURES)
@@ -77,7 +76,7 @@ def unpacked(array):
 
 
 def test_numbers_are_those_of_the_data_file(saved, page):
-    data, cells = read_netcdf(saved), Cells(page).cells
+    data, cells = opened(saved), Cells(page).cells
     u, force = data["displacement"].values, data["top_force"].values
     known = {
         "peak_displacement.radial": (np.hypot(u[:, 0], u[:, 1]).max(), 1e3),
@@ -235,8 +234,8 @@ def test_motion_from_python_or_a_file_comes_back_without_its_file(tmp_path):
         path = dataclasses.replace(loops(), scene=scene).to_netcdf(tmp_path / "run.nc")
         table.unlink(missing_ok=True)
         assert Result.from_netcdf(path).scene == scene
-        assert str(tmp_path) not in read_netcdf(path).attrs["scene"]
-    assert read_netcdf(path, "motion")["coefficients"].dims == ("piece", "channel", "power")
+        assert str(tmp_path) not in opened(path).attrs["scene"]
+    assert opened(path, "motion")["coefficients"].dims == ("piece", "channel", "power")
 
 
 def test_command_writes_a_page_of_a_file(saved, tmp_path, capsys, monkeypatch, page):

@@ -8,10 +8,10 @@ import shutil
 import numpy as np
 import pytest
 from support import preset_run
+from support.synthetic import opened
 
 from msfp_gen.report import write_report
 from msfp_gen.result import Result
-from msfp_gen.results.dataset import read_netcdf
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
@@ -158,7 +158,7 @@ def test_the_scene_is_drawn_and_obeys_its_switches(browser):
 
 
 def test_numbers_under_the_cursor_are_those_of_the_file(browser, saved):
-    data = read_netcdf(saved)
+    data = opened(saved)
     last = int(browser.find_element("id", "frame").get_attribute("max"))
     for frame in (last // 4, last // 2):
         move(browser, frame)
@@ -175,7 +175,7 @@ def test_numbers_under_the_cursor_are_those_of_the_file(browser, saved):
 
 def test_summary_shows_what_its_cells_hold(browser, saved):
     cell = browser.find_element("css selector", "[data-key='peak_displacement.radial']")
-    u = read_netcdf(saved)["displacement"].values
+    u = opened(saved)["displacement"].values
     peak = np.hypot(u[:, 0], u[:, 1]).max()
     assert float(cell.get_attribute("data-value")) == peak
     assert cell.text == f"{peak * 1e3:.5g} mm"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
+import os
 import sys
 import tomllib
 
@@ -153,3 +155,17 @@ def test_run_writes_the_format_of_the_suffix(suffix, tmp_path, capsys):
         assert loadmat(path)["time"][-1, 0] == 0.5
     else:
         assert Result.from_netcdf(path).history.time[-1] == 0.5
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_full_disk_names_the_file(result, suffix, tmp_path, monkeypatch):
+    path = tmp_path / f"run{suffix}"
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("os.fsync", full)
+    monkeypatch.setattr("pathlib.Path.replace", full)
+    with pytest.raises(OSError, match=rf"No space left on device: '{path}'$"):
+        result.save(path)
+    assert not list(tmp_path.iterdir())

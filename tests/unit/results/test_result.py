@@ -8,12 +8,11 @@ import json
 import h5netcdf
 import numpy as np
 import pytest
-from support.synthetic import LOAD, history, loops, ramp, scene
+from support.synthetic import LOAD, history, loops, opened, ramp, scene
 
 from msfp_gen.analysis.summary import energy_balance
 from msfp_gen.errors import InputError
 from msfp_gen.result import Counters, Result
-from msfp_gen.results.dataset import read_netcdf
 from msfp_gen.results.history import ENERGY, quantities
 from msfp_gen.scene.top import Top
 
@@ -66,7 +65,7 @@ def test_netcdf_gives_back_what_was_written(result, tmp_path):
     path = result.to_netcdf(tmp_path / "run.nc")
     assert path == tmp_path / "run.nc"
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
-    read = read_netcdf(path)
+    read = opened(path)
     assert read.equals(result.dataset)
     assert read["displacement"].attrs == result.dataset["displacement"].attrs
     assert (read.attrs["status"], read.attrs["title"]) == ("ok", result.scene.name)
@@ -92,7 +91,7 @@ def test_a_file_of_something_else_is_no_result(tmp_path):
 
 def test_failed_run_is_saved_with_its_status(tmp_path):
     failed = dataclasses.replace(loops(), status="singular_matrix", message="t = 3 s, surface 2")
-    read = read_netcdf(failed.to_netcdf(tmp_path / "partial.nc"))
+    read = opened(failed.to_netcdf(tmp_path / "partial.nc"))
     assert (read.attrs["status"], read.attrs["message"]) == ("singular_matrix", "t = 3 s, surface 2")
     assert not failed.succeeded and loops().succeeded
 
@@ -118,7 +117,7 @@ def test_reading_something_else_says_so(tmp_path):
     path = tmp_path / "no.nc"
     path.write_text("no netCDF")
     with pytest.raises(InputError, match=r"no\.nc"):
-        read_netcdf(path)
+        Result.from_netcdf(path)
 
 
 def test_history_refuses_a_wrong_shape_a_nan_and_no_rows():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import errno
+import hashlib
+import json
 import os
 import random
 import re
@@ -24,7 +26,7 @@ from support import hearing, preset_run, scene_of
 from support.flights import shaken
 from support.resuming import assert_same, interrupted, stopping_at
 
-from msfp_gen import InputError, Motion, Scene, build_model, simulate
+from msfp_gen import InputError, Motion, RunError, Scene, build_model, simulate
 from msfp_gen.cli import main
 from msfp_gen.common.output import replacing
 from msfp_gen.result import Result
@@ -269,6 +271,50 @@ def test_a_forged_header_is_refused(saved: Path, tmp_path: Path, name: str, valu
     assert "\n" not in text and ("damaged" in text or "made " in text)
 
 
+HOSTILE = [
+    b"[",
+    b"[[" * 50000,
+    b'"',
+    b"null",
+    b"NaN",
+    b"1e999",
+    b"9" * 5000,
+    b"{",
+    b"\xff",
+    b"a." * 3000,
+    b"\\n",
+    b"-",
+]
+TEXTS: list[Any] = ["a." * 3000 + "b=1", "x=[", "x=" + "[" * 100000, "\ud800", "\x00", {}, [1], None, True, 1e308]
+
+
+def altered(about: dict[str, Any], dice: random.Random) -> bytes:
+    """A header with another value, or with something inserted."""
+    head = json.dumps(
+        {**about, **({dice.choice([*about]): dice.choice(TEXTS)} if dice.random() < 0.5 else {})}
+    ).encode()
+    for _ in range(dice.choice([0, 1, 1, 3])):
+        at, hostile = dice.randrange(len(head)), dice.choice(HOSTILE)
+        head = head[:at] + hostile + head[at + dice.choice([0, 1, len(hostile)]) :]
+    return dice.choice([b"", b"[" * 100000]) + head if dice.random() < 0.1 else head
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(3000, marks=pytest.mark.slow)])
+def test_an_altered_header_with_the_right_digest_is_refused_or_resumed(saved: Path, tmp_path: Path, count: int) -> None:
+    about, snapshot = checkpoint.read(saved)
+    path, ends = tmp_path / "run.ck", set()
+    scenes = [scene_of("fenz-test2"), scene_of("fenz-test2", solver={"rtol": 2e-4})]
+    for seed in range(count):
+        dice = random.Random(seed)
+        rest = altered(about, dice) + b"\n" + snapshot
+        path.write_bytes(checkpoint.MAGIC + hashlib.sha256(rest).hexdigest().encode() + b"\n" + rest)
+        try:
+            simulate(dice.choice(scenes), checkpoint=path, resume=True, progress=stopping_at(-1.0))
+        except (InputError, RunError) as error:
+            ends.add(error.status if isinstance(error, RunError) else "refused")
+    assert ends == {"refused", "interrupted"}
+
+
 # --- processes that are told to end, and processes that are not asked
 
 RUN = """
@@ -370,6 +416,7 @@ def test_a_full_disk_leaves_no_file(small_disk: Path, capsys: pytest.CaptureFixt
     assert main(["run", "fenz-test2", "-o", str(small_disk / "run.nc")]) == 1
     error = capsys.readouterr().err
     assert error.startswith("error: ") and error.count("\n") == 1 and "No space left" in error
+    assert str(small_disk / "run.nc") in error
     assert not list(small_disk.iterdir())
 
 

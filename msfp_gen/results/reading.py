@@ -1,0 +1,176 @@
+"""Reading of the netCDF-4 files of `Result.to_netcdf`: every other file is refused with one InputError.
+
+A file may be damaged, or made by another person. It is data: its scene names no file, its motion lies in it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
+from msfp_gen.results.note import Note
+from msfp_gen.results.run_data import RunData
+from msfp_gen.results.stored_group import Attribute, StoredGroup, digest, stored_groups
+from msfp_gen.scene.scene import Scene
+from msfp_gen.specification.contract import EVENT_KINDS, names
+
+COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
+DIGEST = "digest"  # attribute: of all values that are read
+WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
+# What h5py, json, tomllib and NumPy raise for content that they cannot read.
+DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
+REMEDY = "give a file that `run -o` wrote"
+R = TypeVar("R", bound=RunData)
+Arrays = dict[str, Any]
+
+
+def read_result(path: str | Path, kind: type[R]) -> R:
+    """The result in a file of `Result.to_netcdf`, as an instance of `kind`. Raises InputError for any other file."""
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise InputError("no such file; give the name of a result")
+        with stored_groups(path) as root:
+            return _read(root, kind)
+    except InputError as error:
+        raise InputError(f"path = {str(path)!r}: {error}") from None
+    except MemoryError:
+        raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
+    except DAMAGE as error:
+        raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
+
+
+def digest_of(attributes: dict[str, Attribute], arrays: Arrays) -> str:
+    """The digest of a file with these attributes and arrays; those that are not read do not matter."""
+    return digest({name: value for name, value in attributes.items() if _is_read(name)}, arrays)
+
+
+def _read(root: StoredGroup, kind: type[R]) -> R:
+    about = root.attributes(lambda name: name in ("source", DIGEST) or _is_read(name))
+    if about.pop("source", None) != "msfp-gen":
+        raise InputError(f"no result of msfp-gen; {REMEDY}")
+    if not all(isinstance(about.get(name), str) for name in WORDS):
+        raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
+    written, arrays = about.pop(DIGEST, None), dict[str, Any]()
+    scene = _scene(root, about, arrays)
+    history = _history(root, scene.bearing.layout.surfaces, arrays)
+    events = _events(root, scene.bearing.layout.surfaces, arrays)
+    if not str(about["status"]).isidentifier():
+        raise ValueError(f"status = {about['status']!r} is no word")
+    if written is not None and written != digest_of(about, arrays):  # files of earlier versions have none
+        raise InputError("a value was changed after this file was written; run the scene again")
+    return kind(
+        scene,
+        history,
+        events,
+        _counters(_without(COUNTER, about)),
+        str(about["status"]),
+        str(about["message"]),
+        {name: str(value) for name, value in _without(PROVENANCE, about).items()},
+        tuple(map(_note, json.loads(str(about["notes"])))),
+        _extremes(json.loads(str(about["extremes"])), scene.bearing.layout.surfaces) if "extremes" in about else None,
+    )
+
+
+def _is_read(name: str) -> bool:
+    return name in (*WORDS, "extremes") or name.startswith((COUNTER, PROVENANCE, "motion/"))
+
+
+def _without(prefix: str, attributes: dict[str, Attribute]) -> dict[str, Attribute]:
+    """The attributes with a prefix, by their names without it."""
+    return {name.removeprefix(prefix): value for name, value in attributes.items() if name.startswith(prefix)}
+
+
+def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Scene:
+    """The scene of the file; its motion is in the scene, or as polynomials in a group of the file."""
+    from msfp_gen.scene.file.loader import scene_from_table, toml_table
+    from msfp_gen.scene.file.stored_motion import GROUP, PIECES, RECIPE, from_pieces
+
+    table, motion = toml_table(str(about["scene"])), None
+    if about["motion"] == PIECES:
+        group = root.group(GROUP)
+        count = group.length("knots")
+        shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
+        pieces = {name: group.array(name, shape, compressed=name != "knots") for name, shape in shapes.items()}
+        motion_about = group.attributes(lambda name: name in ("name", "metadata", "max_step"))
+        motion = from_pieces(pieces, motion_about)
+        arrays |= {f"{GROUP}/{name}": values for name, values in pieces.items()}
+        about |= {f"{GROUP}/{name}": value for name, value in motion_about.items()}
+    elif about["motion"] != RECIPE:
+        raise ValueError(f"motion = {about['motion']!r} is unknown")
+    elif isinstance(table.get("motion"), dict) and table["motion"].get("file") is not None:
+        raise InputError(f"motion.file = {table['motion']['file']!r}: a result opens no other file; {REMEDY}")
+    return scene_from_table(table, motion=motion)
+
+
+def _history(root: StoredGroup, surfaces: int, arrays: Arrays) -> History:
+    """The rows; the time, which is stored as it is, gives their number."""
+    count = root.length("time")
+    sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
+    optional = {field.name for field in fields(History) if field.default is not MISSING}
+    found: Arrays = {}
+    for field, rows in quantities().items():
+        parts = rows.names or (field,)
+        if field in optional and not any(name in root for name in parts):
+            continue  # a quantity of an effect that the run did not model
+        dims = rows.dims[:-1] if len(parts) > 1 else rows.dims
+        shape = (count, *(sizes[dim] for dim in dims))
+        columns = [root.array(name, shape, compressed=name != "time") for name in parts]
+        arrays |= dict(zip(parts, columns, strict=True))
+        found[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+    energy = {name: root.array(f"energy_{name}", (count,)) for name in ENERGY}
+    arrays |= {f"energy_{name}": values for name, values in energy.items()}
+    return History(**found, energy=energy)
+
+
+def _events(root: StoredGroup, surfaces: int, arrays: Arrays) -> tuple[Event, ...]:
+    count = root.length("event_time")
+    columns = {
+        "time": root.array("event_time", (count,)),
+        "surface": root.array("event_surface", (count,), np.int64),
+        "kind": np.array(root.texts("event_kind", count, names(EVENT_KINDS)), dtype=object),
+        "displacement": root.array("event_displacement", (count, 3)),
+        "top_force": root.array("event_top_force", (count, 3)),
+    }
+    arrays |= {f"event_{name}": values for name, values in columns.items()}
+    numbers = [columns[name] for name in ("time", "displacement", "top_force")]
+    surface = columns["surface"]
+    if not all(np.isfinite(values).all() for values in numbers) or np.any((surface < 0) | (surface > surfaces)):
+        raise ValueError("an event is not finite, or of no surface")
+    rows = zip(*columns.values(), strict=True)
+    return tuple(Event(float(t), int(s), kind, u, force) for t, s, kind, u, force in rows)
+
+
+def _counters(given: dict[str, Attribute]) -> Counters:
+    for name, value in given.items():
+        if not isinstance(value, float if name == "wall_time" else int) or not 0 <= value < math.inf:
+            raise ValueError(f"attribute {COUNTER}{name} is no count")
+    return Counters(**given)  # type: ignore[arg-type]
+
+
+def _extremes(given: dict[str, list[float]], surfaces: int) -> Extremes:
+    """Extremes of all steps; the numbers are finite."""
+    found = Extremes.of_table(given)
+    for name, values in found.table.items():
+        shape = np.shape(values)
+        if shape != ((4,) if name in ("displacement", "top_force") else (surfaces,)) or not np.isfinite(values).all():
+            raise ValueError(f"extremes: {name} is no list of finite numbers of the right length")
+    return found
+
+
+def _note(given: dict[str, Any]) -> Note:
+    """A note; the numbers in it are finite."""
+    note = Note(**given)
+    texts, numbers = (note.kind, note.text, note.action), (note.time, note.value)
+    valid = all(isinstance(text, str) for text in texts) and type(note.surface) is int
+    if not valid or not all(type(x) in (int, float) and math.isfinite(x) for x in numbers):
+        raise ValueError("a note is damaged")
+    return note

@@ -1,0 +1,148 @@
+"""Groups of an HDF5 file that another person may have made: only data inside the file, of the expected type and size.
+
+HDF5 follows links and external storage to other files, and allocates what a file claims. Here nothing is opened that
+lies elsewhere, and no array is read that is larger than its bytes in the file can hold.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+
+EXPANSION = 1100  # bytes of an array over its bytes in the file, at most; deflate reaches 1032
+SMALLEST_CHUNK = 2**20  # [bytes]; a chunk, which HDF5 allocates whole, may be larger than a smaller array
+BLOCK = 256  # texts read at once
+Attribute = str | int | float
+
+
+class StoredGroup:
+    """A group of a file. Methods raise ValueError with the reason where its content is not as expected.
+
+    size: of the file [bytes].
+    """
+
+    def __init__(self, group: h5py.Group, size: int) -> None:
+        import h5py
+
+        for name in group:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise ValueError(f"{name} is a link to another place")
+        self._group, self._size = group, size
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._group
+
+    def group(self, name: str) -> StoredGroup:
+        """A group in this one."""
+        import h5py
+
+        found = self._group.get(name)
+        if not isinstance(found, h5py.Group):
+            raise ValueError(f"the group {name} is missing")
+        return StoredGroup(found, self._size)
+
+    def attributes(self, wanted: Callable[[str], bool]) -> dict[str, Attribute]:
+        """The attributes with names that are `wanted`, as texts and numbers."""
+        return {name: self._attribute(name) for name in self._group.attrs if wanted(name)}
+
+    def length(self, name: str) -> int:
+        """Number of entries of a list of numbers."""
+        shape = self._dataset(name).shape
+        if shape is None or len(shape) != 1:
+            raise ValueError(f"{name} is no list of numbers")
+        return int(shape[0])
+
+    def array(self, name: str, shape: tuple[int, ...], kind: Any = np.float64, compressed: bool = True) -> Any:
+        """An array of this shape and type, ndarray. compressed: whether it may be stored so."""
+        dataset = self._dataset(name)
+        if dataset.shape != shape or dataset.dtype != np.dtype(kind):
+            raise ValueError(f"{name} has shape {dataset.shape} and type {dataset.dtype}: expected {shape}")
+        self._check_storage(dataset, name, compressed)
+        return dataset[()]
+
+    def texts(self, name: str, count: int, words: Collection[str]) -> list[str]:
+        """A list of texts, each one of `words`."""
+        import h5py
+
+        dataset = self._dataset(name)
+        if dataset.shape != (count,) or h5py.check_string_dtype(dataset.dtype) is None:
+            raise ValueError(f"{name} is no list of {count} texts")
+        self._check_storage(dataset, name, compressed=True)
+        found: list[str] = []
+        for start in range(0, count, BLOCK):  # many texts of the file can be the same long one
+            found += dataset.asstr()[start : start + BLOCK].tolist()
+            if not set(found[start:]) <= set(words):
+                raise ValueError(f"{name} has a word that is none of {', '.join(words)}")
+        return found
+
+    def _dataset(self, name: str) -> h5py.Dataset:
+        import h5py
+
+        found = self._group.get(name)
+        if not isinstance(found, h5py.Dataset):
+            raise ValueError(f"{name} is missing")
+        return found
+
+    def _check_storage(self, dataset: h5py.Dataset, name: str, compressed: bool) -> None:
+        """Raise ValueError unless the data lies in the file and has the size that its bytes there can have."""
+        if dataset.is_virtual or dataset.external:
+            raise ValueError(f"{name} lies in another file")
+        properties = dataset.id.get_create_plist()
+        filters = [properties.get_filter(index)[0] for index in range(properties.get_nfilters())]
+        if len(set(filters)) < len(filters) or not set(filters) <= (_known_filters() if compressed else set()):
+            raise ValueError(f"{name} is compressed, or in an unknown way")
+        stored, size = dataset.id.get_storage_size(), math.prod(dataset.shape) * dataset.dtype.itemsize
+        chunk = math.prod(dataset.chunks or (0,)) * dataset.dtype.itemsize
+        most = stored * (EXPANSION if filters else 1)
+        if stored > self._size or size > most or chunk > max(size, SMALLEST_CHUNK):
+            raise ValueError(f"{name} claims {size} bytes, of which the file has {stored}")
+
+    def _attribute(self, name: str) -> Attribute:
+        import h5py
+
+        stored = self._group.attrs.get_id(name)
+        plain = h5py.check_string_dtype(stored.dtype) is not None or stored.dtype.kind in "if"
+        if stored.shape not in ((), (1,)) or not plain or stored.get_storage_size() > self._size:
+            raise ValueError(f"attribute {name} is no text and no number")
+        value = self._group.attrs[name]
+        value = value.item() if isinstance(value, np.ndarray | np.generic) else value
+        if not isinstance(value, str | int | float):
+            raise ValueError(f"attribute {name} is no text and no number")
+        return value
+
+
+def _known_filters() -> set[int]:
+    from h5py import h5z
+
+    return {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+
+
+@contextmanager
+def stored_groups(path: Path) -> Iterator[StoredGroup]:
+    """The root of an HDF5 file. Raises OSError where the file is none."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        yield StoredGroup(file, path.stat().st_size)
+
+
+def digest(attributes: Mapping[str, Attribute], arrays: Mapping[str, Any]) -> str:
+    """The sha256 of attributes and arrays, with their names; it detects damage, not forgery."""
+    total = hashlib.sha256()
+    for name, value in sorted(attributes.items()):
+        total.update(f"{name}={value!r}\n".encode())
+    for name, values in sorted(arrays.items()):
+        array = np.ascontiguousarray(values)
+        text = array.dtype.kind not in "if"
+        total.update(f"{name}{'' if text else array.dtype}{array.shape}\n".encode())
+        total.update("\n".join(map(str, array.tolist())).encode() if text else array.data)
+    return total.hexdigest()

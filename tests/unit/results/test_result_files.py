@@ -1,0 +1,188 @@
+"""Result files that are damaged, or made by somebody else: one InputError, or the very result that was written."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from support import preset_run
+from support.damaged_records import cut, flip, remove
+from support.damaged_results import forge, virtual
+
+from msfp_gen import InputError, Motion
+from msfp_gen.cli import main
+from msfp_gen.result import Result
+
+COUNTS = [150, pytest.param(5000, marks=pytest.mark.slow)]
+
+
+@pytest.fixture(scope="module", params=["recipe", "pieces"])
+def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a run, whose motion is a table in the scene, or polynomials in a group."""
+    result = preset_run("fenz-test2")
+    history = result.history
+    rows = {name: values[::20] for name, values in history.arrays().items()}
+    history = replace(history, **rows, energy={name: values[::20] for name, values in history.energy.items()})
+    scene = result.scene
+    if request.param == "pieces":
+        scene = replace(scene, motion=Motion.harmonic(0.01, 0.1), duration=None)
+    path = tmp_path_factory.mktemp("saved") / "run.nc"
+    return replace(result, scene=scene, history=history).to_netcdf(path)
+
+
+@pytest.fixture
+def copy(saved: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(saved, tmp_path / "run.nc"))
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        Result.from_netcdf(path)
+    text = str(caught.value)
+    assert text.startswith(f"path = '{path}': ") and text.isprintable() and len(text) <= 500
+    return text
+
+
+def noise(content: bytes, dice: random.Random) -> bytes:
+    at = dice.randrange(len(content))
+    patch = dice.choice([b"\xff" * 8, b"\0" * 8, b"\xff\xff\xff\x7f", dice.randbytes(dice.randrange(1, 64))])
+    return content[:at] + patch + content[at + len(patch) :]
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_damage_is_refused_or_does_not_matter(saved: Path, tmp_path: Path, count: int) -> None:
+    whole, expected, ends = saved.read_bytes(), Result.from_netcdf(saved), set()
+    path = tmp_path / "damaged.nc"
+    for seed in range(count):
+        dice, content = random.Random(seed), whole
+        for _ in range(dice.choice([1, 1, 3, 20])):
+            content = dice.choice([flip, flip, cut, remove, noise, noise])(content, dice) if content else content
+        path.write_bytes(content)
+        try:
+            found = Result.from_netcdf(path)
+        except InputError:
+            ends.add("refused")
+        else:
+            ends.add("read")
+            assert found.dataset.identical(expected.dataset) and found.scene == expected.scene, seed
+    assert ends == {"refused", "read"}
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(5000, marks=pytest.mark.slow)])
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")
+def test_forged_content_is_refused_or_is_a_result(copy: Path, saved: Path, tmp_path: Path, count: int) -> None:
+    ends = set()
+    for seed in range(count):
+        shutil.copy(saved, copy)
+        done = forge(copy, random.Random(seed))
+        try:
+            found = Result.from_netcdf(copy)
+        except InputError:
+            ends.add("refused")
+            continue
+        ends.add("read")
+        assert found.summary and repr(found) and found.dataset and all(note.line for note in found.notes)
+        if seed % 5:
+            continue
+        found.to_netcdf(tmp_path / "again.nc")
+        assert Result.from_netcdf(tmp_path / "again.nc").dataset.identical(found.dataset), (seed, done)
+    assert ends == {"refused", "read"}
+
+
+# ---- what such a file could reach
+
+
+@pytest.mark.parametrize("kind", ["arrays", "record"])
+def test_a_result_opens_no_file_of_the_user(kind: str, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.csv"
+    secret.write_text("time [s], u1 [m]\n" + "".join(f"{0.1 * i}, {1e-4 * i * i}\n" for i in range(60)))
+    path = preset_run("fenz-test2").to_netcdf(tmp_path / "run.nc")
+    with h5py.File(path, "r+") as file:
+        head, _, tail = str(file.attrs["scene"]).partition("[motion]")
+        after = tail[tail.index("\n[") :]
+        file.attrs["scene"] = f"{head}[motion]\nkind = {kind!r}\nfile = {str(secret)!r}\n{after}"
+        del file.attrs["digest"]
+    assert "motion.file = " in refusal(path) and "a result opens no other file" in refusal(path)
+
+
+def test_links_are_refused_wherever_they_lead(copy: Path, tmp_path: Path) -> None:
+    shutil.copy(copy, tmp_path / "other.nc")
+    for link in (h5py.SoftLink("/time"), h5py.ExternalLink("other.nc", "/gap"), h5py.ExternalLink("/etc/passwd", "/")):
+        for name in ("gap", "unknown"):
+            with h5py.File(copy, "r+") as file:
+                if name in file:
+                    del file[name]
+                file[name] = link
+            assert f"{name} is a link to another place" in refusal(copy)
+            with h5py.File(copy, "r+") as file:
+                del file[name]
+
+
+def test_arrays_in_other_files_are_refused(copy: Path, tmp_path: Path) -> None:
+    shutil.copy(copy, tmp_path / "other.nc")
+    for make in (
+        lambda file, shape: file.create_dataset("gap", shape, float, external=[("/dev/zero", 0, h5py.h5f.UNLIMITED)]),
+        lambda file, shape: file.create_virtual_dataset("gap", virtual(shape, "gap")),
+    ):
+        with h5py.File(copy, "r+") as file:
+            shape = file["gap"].shape
+            del file["gap"]
+            make(file, shape)
+        assert "gap lies in another file" in refusal(copy)
+
+
+def bomb(name: str, file: h5py.File) -> None:
+    shape = (10**9, *file[name].shape[1:])
+    del file[name]
+    file.create_dataset(name, shape=shape, dtype=float, chunks=(2**14, *shape[1:]))
+
+
+def test_nothing_is_allocated_that_the_file_cannot_hold(copy: Path, saved: Path) -> None:
+    """Rows that were never written; a time axis of a billion of them; zeros that deflate to a thousandth, twice."""
+    for name, words in (("time", "time claims 8000000000 bytes"), ("top_force", "top_force has shape (1000000000, 3)")):
+        shutil.copy(saved, copy)
+        with h5py.File(copy, "r+") as file:
+            bomb(name, file)
+        assert words in refusal(copy)
+    shutil.copy(saved, copy)
+    with h5py.File(copy, "r+") as file:
+        values = file["time"][()]
+        del file["time"]
+        file.create_dataset("time", data=values, compression=9)
+    assert "time is compressed, or in an unknown way" in refusal(copy)
+    shutil.copy(saved, copy)
+    with h5py.File(copy, "r+") as file:
+        shape = file["gap"].shape
+        del file["gap"]
+        file.create_dataset("gap", shape, float, chunks=(2**24, 1), maxshape=(None, None))  # a chunk of 128 MB
+    assert "gap claims" in refusal(copy)
+
+
+def test_a_value_that_was_changed_is_found(copy: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        file["top_force"][1, 0] += 1.0
+    assert "a value was changed after this file was written" in refusal(copy)
+    with h5py.File(copy, "r+") as file:  # a file of an earlier version has no digest
+        del file.attrs["digest"]
+    assert Result.from_netcdf(copy).history.top_force[1, 0]
+
+
+def test_what_others_add_does_not_matter(copy: Path, saved: Path) -> None:
+    with h5py.File(copy, "r+") as file:
+        file.attrs["history"] = "made larger"
+        file["mine"] = np.zeros((3, 3))
+    assert Result.from_netcdf(copy).dataset.identical(Result.from_netcdf(saved).dataset)
+
+
+def test_a_command_says_it_in_one_line(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(copy, "r+") as file:
+        file.attrs["counter_steps"] = "many"
+        del file.attrs["digest"]
+    assert main(["characterise", str(copy)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: path = ") and error.count("\n") == 1 and "counter_steps is no count" in error
