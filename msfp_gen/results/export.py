@@ -45,12 +45,16 @@ def check_result_path(path: str | Path, name: str = "output") -> Path:
 
     name: that of the option, for the message.
     """
-    target = check_output(path, WRITERS, name)
-    if target.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+    return require_pyarrow(check_output(path, WRITERS, name), name, ".nc, .csv or .mat")
+
+
+def require_pyarrow(path: Path, name: str, others: str) -> Path:
+    """`path`; raises InputError for .parquet without pyarrow, whose message names the `others` to give instead."""
+    if path.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
         raise InputError(
-            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give .nc, .csv or .mat"
+            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give {others}"
         )
-    return target
+    return path
 
 
 def columns(dataset: xr.Dataset) -> list[Column]:

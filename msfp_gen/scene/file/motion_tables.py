@@ -9,13 +9,17 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from msfp_gen.common.fields import Notes, Quantity, Text
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.file.prescribed_tables import ROTATIONS, history_from
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.records import Record
 
 RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
 _LENGTH = Quantity("m", above=0.0)
@@ -138,17 +142,15 @@ class RecordMotion(MotionTable):
     taper: Annotated[float, _TIME] = 1.0
 
     def _motion(self) -> Motion:
-        from msfp_gen.motions import records
+        from msfp_gen.motions.records import ScaleTo
 
         if (self.file is None) == (self.bundled is None):
             found = "neither is" if self.file is None else "both are"
             raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
-        if self.bundled is not None:
-            record = records.bundled(self.bundled)
-        else:
-            files = [self.file] if isinstance(self.file, str) else self.file or ()
-            record = records.read_record(*map(_existing, files))
-        target = None if self.scale_to is None else records.ScaleTo(**self.scale_to)
+        files = [self.file] if isinstance(self.file, str) else self.file or ()
+        paths = [_existing(file) for file in files]
+        record = _record(self.bundled, tuple(paths), tuple(_stamp(path) for path in paths))
+        target = None if self.scale_to is None else ScaleTo(**self.scale_to)
         values = self._values("file", "bundled", "scale_to")
         return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
@@ -185,6 +187,20 @@ class Pieces(MotionTable):
         table = {"kind": cls.kind, **{name: getattr(motion, name).tolist() for name in names}}
         rest = {"max_step": motion.max_step, "name": motion.name, "metadata": dict(motion.metadata)}
         return table | {name: value for name, value in rest.items() if value is not None}
+
+
+@lru_cache(maxsize=8)
+def _record(bundled: str | None, paths: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> Record:
+    """A record, read once for all scenes of a sweep; `stamps` tell a file that has changed since."""
+    from msfp_gen.motions import records
+
+    return records.read_record(*paths) if bundled is None else records.bundled(bundled)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Time of the last change [ns] and size [bytes] of a file."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
 
 
 def resolved(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import changed_scene
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
+
+
+class Variation(NamedTuple):
+    """A scene of a sweep: the file or preset that it comes from, and the varied fields by their paths."""
+
+    source: str
+    varied: Mapping[str, Any]
+    scene: Scene
 
 
 def varied_field(text: str) -> tuple[str, list[Any]]:
@@ -35,7 +43,7 @@ def varied_field(text: str) -> tuple[str, list[Any]]:
     return path, found
 
 
-def varied_scenes(source: str | Path, fields: Sequence[tuple[str, list[Any]]]) -> list[Scene]:
+def variations(source: str | Path, fields: Sequence[tuple[str, list[Any]]]) -> list[Variation]:
     """The scenes of all combinations of values, the last field varying fastest; their names state the values.
 
     source: scene file or preset. fields: path and values of each. Raises InputError: a field is given twice, does not
@@ -47,13 +55,11 @@ def varied_scenes(source: str | Path, fields: Sequence[tuple[str, list[Any]]]) -
     combinations = list(product(*(values for _, values in fields)))
     if len(combinations) > MAX_SCENES:
         raise InputError(f"--vary: {len(combinations)} combinations; give at most {MAX_SCENES}")
-    return [
-        _named(changed_scene(source, dict(zip(paths, values, strict=True))), source, paths, values)
-        for values in combinations
-    ]
+    return [_variation(source, dict(zip(paths, values, strict=True))) for values in combinations]
 
 
-def _named(scene: Scene, source: str | Path, paths: Sequence[str], values: Sequence[Any]) -> Scene:
-    values_text = ", ".join(f"{path} = {value}" for path, value in zip(paths, values, strict=True))
+def _variation(source: str | Path, varied: Mapping[str, Any]) -> Variation:
+    scene = changed_scene(source, varied)
+    values_text = ", ".join(f"{path} = {value}" for path, value in varied.items())
     name = scene.name or Path(source).stem
-    return replace(scene, name=f"{name}, {values_text}" if values_text else name)
+    return Variation(str(source), varied, replace(scene, name=f"{name}, {values_text}" if values_text else name))
