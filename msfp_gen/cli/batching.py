@@ -26,6 +26,7 @@ LONGEST = 80  # characters of the name of a file, without its number
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen batch fenz-test1 fenz-test2 scene.toml -o runs\n"
     "  msfp-gen batch ridgecrest-clc --vary motion.scale=0.5,0.75,1,1.25,1.5 --table scales.csv\n"
+    "  msfp-gen batch scene.toml --suite suite.toml --vary bearing.friction=0.05,0.08 --table suite.csv\n"
     "  msfp-gen batch scene.toml --vary top.axial_load=1e6,2e6 --vary solver.rtol=1e-3,1e-4 --workers 4 -o study"
 )
 def batch(
@@ -36,6 +37,10 @@ def batch(
     vary: Annotated[
         list[str] | None,
         typer.Option(metavar="FIELD=VALUES", help="Run the scene once for each value of a field; may be repeated."),
+    ] = None,
+    suite: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Run every scene under each ground motion of a suite (TOML); see `suite`."),
     ] = None,
     output: Annotated[
         Path | None,
@@ -56,12 +61,15 @@ def batch(
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
     from msfp_gen.results.export import require_pyarrow
     from msfp_gen.scene.file.parameter_sweep import variations, varied_field
+    from msfp_gen.scene.file.suite import load_suite
     from msfp_gen.studies.sweep import TABLE_SUFFIXES
 
     if table is not None:
         require_pyarrow(check_output(table, TABLE_SUFFIXES, "--table"), "--table", ".csv")
     fields = [varied_field(text) for text in vary or ()]
-    chosen = [variation for source in sources for variation in variations(source, fields)]
+    with Progress("suite") as progress:
+        records = () if suite is None else load_suite(suite, progress).records
+    chosen = [variation for source in sources for variation in variations(source, fields, records)]
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json):
         _run(chosen, workers, output, rows)

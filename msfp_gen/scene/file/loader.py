@@ -49,11 +49,7 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        return scene_from_table(_changed(_toml(path.read_text(encoding="utf-8-sig")), changes), path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
+        return scene_from_table(_changed(toml_table(path), changes), path.parent)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -74,10 +70,14 @@ def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
     return table
 
 
-def _toml(text: str) -> Table:
-    """The table of a TOML text; raises InputError where the text is not valid."""
+def toml_table(path: Path) -> Table:
+    """The table of a TOML file; raises InputError, without the path, where it cannot be read or is not valid."""
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror}); check the file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
     except RecursionError:
         raise InputError("no valid TOML: tables or lists are nested too deeply; a scene needs few levels") from None
     except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits

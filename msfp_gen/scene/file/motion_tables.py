@@ -40,6 +40,17 @@ class Paths(Text):
         return value if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
 
 
+@dataclass(frozen=True)
+class Components(Text):
+    """A list of components of a record."""
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` as a tuple; raises ValueError whose text is the remedy."""
+        if not (isinstance(value, list | tuple) and value and set(map(str, value)) <= {"E1", "E2", "E3"}):
+            raise ValueError("give a list of E1, E2 and E3, or some of them")
+        return tuple(value)
+
+
 @dataclass(frozen=True, kw_only=True)
 class MotionTable(ABC):
     """Fields of every kind: name, time at rest after the end of the motion [s], and the table of a base rotation."""
@@ -127,12 +138,15 @@ class Ramp(MotionTable):
 class RecordMotion(MotionTable):
     """`Motion.from_record`: one file, one file for each component, or a record bundled with the package.
 
-    `scale_to` is a table of the fields of `records.ScaleTo`.
+    components: those that are kept; the others are zero. rotated_by: rotation of the horizontal components that are
+    kept, about E3 from E1 towards E2. scale_to: a table of the fields of `records.ScaleTo`.
     """
 
     kind: ClassVar[str] = "record"
     file: Annotated[str | tuple[str, ...] | None, Paths()] = None
     bundled: str | None = None
+    components: Annotated[tuple[str, ...] | None, Components()] = None
+    rotated_by: Annotated[float | None, Quantity("rad")] = None
     scale: Annotated[float, Quantity("")] = 1.0
     scale_to: Mapping[str, Any] | None = None
     start: Annotated[float | None, Quantity("s", least=0.0)] = None
@@ -150,8 +164,10 @@ class RecordMotion(MotionTable):
         files = [self.file] if isinstance(self.file, str) else self.file or ()
         paths = [_existing(file) for file in files]
         record = _record(self.bundled, tuple(paths), tuple(_stamp(path) for path in paths))
+        record = record if self.components is None else record.with_components(self.components)
+        record = record if self.rotated_by is None else record.rotated(self.rotated_by)
         target = None if self.scale_to is None else ScaleTo(**self.scale_to)
-        values = self._values("file", "bundled", "scale_to")
+        values = self._values("file", "bundled", "components", "rotated_by", "scale_to")
         return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
 

@@ -139,7 +139,7 @@ def _one_type(values: list[Any]) -> list[Any]:
 def sweep_table(rows: Sequence[Row]) -> Table:
     """The rows for a terminal, 80 columns wide at most: what does not fit is only in the table that is written."""
     rows = sorted(rows)
-    paths = list(dict.fromkeys(path for row in rows for path in row.varied))
+    paths = [path for path in dict.fromkeys(path for row in rows for path in row.varied) if _differs(rows, path)]
     scenes = {row.source for row in rows}
     leading = {"no.": [str(row.number) for row in rows]}
     if len(scenes) > 1 or not paths:
@@ -165,6 +165,11 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     return Table(title, tuple(table), list(zip(*table.values(), strict=True)))
 
 
+def _differs(rows: Sequence[Row], path: str) -> bool:
+    """Whether a varied field has several values, or there is one run only."""
+    return len(rows) == 1 or len({str(row.varied.get(path)) for row in rows}) > 1
+
+
 def _headings(paths: Sequence[str]) -> dict[str, str]:
     """Short names of fields: the last part of the path where no other has it."""
     last = [path.rpartition(".")[2] for path in paths]
@@ -177,4 +182,6 @@ def _width(table: Mapping[str, list[str]]) -> int:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+    """`text`, shortened in its middle: names of records and lists differ at their ends."""
+    half = (LONGEST - 2) // 2
+    return text if len(text) <= LONGEST else f"{text[:half]}..{text[-half:]}"
