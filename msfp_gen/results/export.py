@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """One column of the table of a run: name, unit, meaning, and one value per row."""
+    """One column of the table of a run: variable of the dataset, name, unit, meaning, and one value per row."""
 
+    variable: str
     name: str
     unit: str
     meaning: str
@@ -38,6 +39,16 @@ def save(result: RunData, path: str | Path) -> Path:
     """
     target = check_result_path(path)
     return WRITERS[target.suffix.lower()](result, target)
+
+
+def export_columns(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+    """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
+
+    names: of columns (`displacement_E1`) or of variables of the dataset, for all of their columns (`sliding`), in the
+    order in which they are written; None: all. Raises InputError for another name or an invalid path.
+    """
+    target = check_output(path, TABLE_WRITERS, "output")
+    return TABLE_WRITERS[target.suffix.lower()](result, target, names)
 
 
 def check_result_path(path: str | Path, name: str = "output") -> Path:
@@ -69,20 +80,41 @@ def columns(dataset: xr.Dataset) -> list[Column]:
     return found
 
 
+def selected_columns(table: list[Column], names: Sequence[str] | None) -> list[Column]:
+    """The columns with these names, or of these variables, after time; all for None. Raises InputError."""
+    if names is None:
+        return table
+    chosen = [table[0]]
+    for name in names:
+        found = [column for column in table if name in (column.name, column.variable)]
+        if not found:
+            known = ", ".join(dict.fromkeys(column.variable for column in table))
+            raise InputError(
+                f"columns: {name!r} is none; give names of columns, such as displacement_E1, or of {known}"
+            )
+        chosen += [column for column in found if column not in chosen]
+    return chosen
+
+
 def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
-    return Column(name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
+    return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
 
 
-def write_csv(result: RunData, path: str | Path) -> Path:
-    """Write a CSV file: `name [unit]` as header, one line per row; scene, events and provenance as # comments."""
+def write_csv(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+    """Write a CSV file: one comment, `name [unit]` as header, one line per row; the origin as # comments at the end.
+
+    The origin is attributes of the dataset, events, and the scene as TOML text. names: as of `export_columns`.
+    """
     target = check_output(path, (".csv",))
     dataset = to_dataset(result)
-    table = columns(dataset)
+    table = selected_columns(columns(dataset), names)
     rows = np.column_stack([column.values for column in table]).tolist()
+    title = " ".join(f"{result.scene.name or 'unnamed scene'}, status {result.status}".split())
     with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
+        file.write(f"# {title}; {len(rows)} rows; versions, events and scene stand after them\n")
         file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
     return target
 
 
@@ -107,14 +139,17 @@ def _events(result: RunData) -> list[dict[str, Any]]:
     ]
 
 
-def write_parquet(result: RunData, path: str | Path) -> Path:
-    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow."""
+def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow.
+
+    names: as of `export_columns`.
+    """
     target = check_result_path(check_output(path, (".parquet",)))
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     dataset = to_dataset(result)
-    table = columns(dataset)
+    table = selected_columns(columns(dataset), names)
     fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
     about = {str(key): str(value) for key, value in dataset.attrs.items()}
     schema = pa.schema(fields, metadata=about | {"events": json.dumps(_events(result))})
@@ -145,6 +180,10 @@ def _matlab(values: Any) -> Any:
     return values.astype(object) if values.dtype.kind == "U" else values
 
 
+TABLE_WRITERS: dict[str, Callable[[RunData, str | Path, Sequence[str] | None], Path]] = {
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+}
 WRITERS: dict[str, Callable[[RunData, str | Path], Path]] = {
     ".nc": write_netcdf,
     ".parquet": write_parquet,
