@@ -20,7 +20,20 @@ from msfp_gen.errors import InputError
 from msfp_gen.figures.loops import draw_orbit, moving_axes
 from msfp_gen.figures.section import draw_section, limits
 from msfp_gen.figures.sliding import draw_bars
-from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, THIN, engineering, headline, label_of, page, subscript
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    THIN,
+    displacement,
+    displacement_label,
+    engineering,
+    force,
+    headline,
+    label_of,
+    page,
+    subscript,
+)
 from msfp_gen.motions.checks import positive
 from msfp_gen.results.geometry.section import Section, sections
 from msfp_gen.results.resample import at_times
@@ -197,17 +210,17 @@ def _loop(axes: Axes, result: RunData, frames: RunData) -> tuple[Any, Any, Any]:
     moving = moving_axes(result)
     if len(moving) > 1:
         draw_orbit(axes, result)
-        x, y = (frames.history.displacement[:, :2] * MILLI).T
+        x, y = displacement(frames.history.displacement[:, :2]).T
     else:
         (axis,) = moving
         scale = engineering(result.history.top_force[:, :2], "N")
-        u, force = result.history.displacement[:, axis] * MILLI, result.history.top_force[:, axis] * scale.factor
-        axes.plot(u, force, color=FAINT, linewidth=THIN)
+        u, loads = displacement(result.history.displacement[:, axis]), force(result.history.top_force[:, axis], scale)
+        axes.plot(u, loads, color=FAINT, linewidth=THIN)
         axes.set(
             title="Hysteresis loop",
-            xlabel=f"u{subscript(axis + 1)} [mm]",
+            xlabel=displacement_label(axis),
             ylabel=f"F{subscript(axis + 1)} [{scale.unit}]",
         )
-        x, y = frames.history.displacement[:, axis] * MILLI, frames.history.top_force[:, axis] * scale.factor
+        x, y = displacement(frames.history.displacement[:, axis]), force(frames.history.top_force[:, axis], scale)
     (dot,) = axes.plot([x[0]], [y[0]], marker="o", markersize=7, color=COLOURS[1], linestyle="none", zorder=6)
     return dot, x, y

@@ -18,6 +18,7 @@ from msfp_gen.figures.style import (
     SMALL,
     THIN,
     colour,
+    displacement,
     headline,
     label_of,
     page,
@@ -26,6 +27,7 @@ from msfp_gen.figures.style import (
 from msfp_gen.results.geometry.section import Section, sections
 from msfp_gen.results.geometry.shape import friction_circles as circle_radii
 from msfp_gen.results.resample import at_times
+from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import rims_in_contact, separated, sliding_surfaces
 
 if TYPE_CHECKING:
@@ -147,8 +149,9 @@ class SectionDrawing:
         for index, (artist, (x, z)) in enumerate(zip(self.contacts, section.contacts * MILLI, strict=True)):
             artist.set_data([x], [z])
             artist.set_visible(not apart[index])
-        u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
-        self.title.set_text(f"t = {history.time[row]:.3f} s, u = {u * MILLI:.1f} mm")
+        along = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
+        u = f"u = {shown_sign().difference} = {displacement(along):.1f} mm"
+        self.title.set_text(f"t = {history.time[row]:.3f} s, {u}")
 
     def _face(self, axes: Axes, index: int) -> Any:
         (face,) = axes.plot([], [], color=colour(index + 1), solid_capstyle="butt", zorder=3)

@@ -15,6 +15,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing, write_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import to_dataset, write_netcdf
+from msfp_gen.results.sign import DEFAULT, sign_of, signed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,14 +42,15 @@ def save(result: RunData, path: str | Path) -> Path:
     return WRITERS[target.suffix.lower()](result, target)
 
 
-def export_columns(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+def export_columns(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
     """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
 
     names: of columns (`displacement_E1`) or of variables of the dataset, for all of their columns (`sliding`), in the
-    order in which they are written; None: all. Raises InputError for another name or an invalid path.
+    order in which they are written; None: all. sign: of displacement and force across the bearing, a word of
+    `sign.SIGNS`. Raises InputError for another name, another sign or an invalid path.
     """
     target = check_output(path, TABLE_WRITERS, "output")
-    return TABLE_WRITERS[target.suffix.lower()](result, target, names)
+    return TABLE_WRITERS[target.suffix.lower()](result, target, names, sign)
 
 
 def check_result_path(path: str | Path, name: str = "output") -> Path:
@@ -100,18 +102,20 @@ def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
     return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
 
 
-def write_csv(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+def write_csv(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
     """Write a CSV file: one comment, `name [unit]` as header, one line per row; the origin as # comments at the end.
 
-    The origin is attributes of the dataset, events, and the scene as TOML text. names: as of `export_columns`.
+    The origin is attributes of the dataset, events, and the scene as TOML text. names, sign: as of `export_columns`.
     """
     target = check_output(path, (".csv",))
+    shown, result = sign_of(sign), signed(result, sign)
     dataset = to_dataset(result)
     table = selected_columns(columns(dataset), names)
     rows = np.column_stack([column.values for column in table]).tolist()
     title = " ".join(f"{result.scene.name or 'unnamed scene'}, status {result.status}".split())
     with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# {title}; {len(rows)} rows; versions, events and scene stand after them\n")
+        u = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
+        file.write(f"# {title}; {u}; {len(rows)} rows; versions, events and scene stand after them\n")
         file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
         file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
@@ -139,12 +143,13 @@ def _events(result: RunData) -> list[dict[str, Any]]:
     ]
 
 
-def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None = None) -> Path:
+def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
     """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow.
 
-    names: as of `export_columns`.
+    names, sign: as of `export_columns`.
     """
     target = check_result_path(check_output(path, (".parquet",)))
+    shown, result = sign_of(sign), signed(result, sign)
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -152,6 +157,7 @@ def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None
     table = selected_columns(columns(dataset), names)
     fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
     about = {str(key): str(value) for key, value in dataset.attrs.items()}
+    about["sign"] = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
     schema = pa.schema(fields, metadata=about | {"events": json.dumps(_events(result))})
     content = BytesIO()
     pq.write_table(pa.table([np.ascontiguousarray(c.values) for c in table], schema=schema), content)
@@ -180,7 +186,7 @@ def _matlab(values: Any) -> Any:
     return values.astype(object) if values.dtype.kind == "U" else values
 
 
-TABLE_WRITERS: dict[str, Callable[[RunData, str | Path, Sequence[str] | None], Path]] = {
+TABLE_WRITERS: dict[str, Callable[[RunData, str | Path, Sequence[str] | None, str], Path]] = {
     ".csv": write_csv,
     ".parquet": write_parquet,
 }
