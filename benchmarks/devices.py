@@ -179,7 +179,7 @@ def figure(path: Path) -> None:
                 label="with the arms of friction",
             )
             axes.set_title(f"{device.title} ({bearing.layout.name.replace('_', ', ')})")
-            axes.set(xlabel="displacement u [mm]", ylabel="F / W", xlim=(0, None), ylim=(0, None))
+            axes.set(xlabel="u = base − top [mm]", ylabel="F / W", xlim=(0, None), ylim=(0, None))
             axes.grid(color=FAINT, linewidth=0.4)
             axes.annotate(device.source, (0.97, 0.04), xycoords="axes fraction", ha="right", fontsize=8, color=INK)
         whole.axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 0.1))

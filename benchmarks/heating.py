@@ -30,7 +30,7 @@ def draw(heats: Result, constant: Result) -> None:
         loop, warm, drop = panels(figure, "force over load", "temperature of the dish", "its friction, sliding fast")
         for run, colour, name in ((constant, COLOURS[1], "constant"), (heats, COLOURS[0], "pvt")):
             loop.plot(run.history.displacement[:, 0] * MILLI, ratio(run)[:, 0], color=colour, lw=0.9, label=name)
-        loop.set(xlabel="displacement [mm]", ylabel="F/N")
+        loop.set(xlabel="u = base − top [mm]", ylabel="F/N")
         loop.legend()
         warm.plot(rows.time, rows.temperature[:, 0], color=COLOURS[0], lw=0.9)
         warm.set(xlabel="time [s]", ylabel="[°C]")

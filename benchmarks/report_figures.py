@@ -28,7 +28,7 @@ TESTS = tuple(f"fenz-test{number}" for number in range(1, 6))
 AMPLITUDES = (125, 88, 50, 25, 12, 5)  # [mm], section 4.3
 PLAIN = ("fenz-test2", "fenz-test5", "ridgecrest-clc")  # drawn as `msfp-gen run SCENE --plot` draws them
 ROWS = 4000  # rows per cycle
-U, F = "displacement across the bearing u [mm]", "force over axial load F / N"
+U, F = "displacement across the bearing u = base − top [mm]", "force over axial load F / N"
 
 
 def stages(runs: Runs, path: Path) -> None:
@@ -140,8 +140,8 @@ def orbits(runs: Runs, path: Path, *, kind: str) -> None:
             first.plot(u[:, 0], force[:, 0], color=colour)
             second.plot(u[:, 1], force[:, 1], color=colour)
             orbit.plot(force[:, 0], force[:, 1], color=colour, label=f"A = {amplitude} mm")
-        first.set(xlabel="u₁ [mm]", ylabel="F₁ / N")
-        second.set(xlabel="u₂ [mm]", ylabel="F₂ / N")
+        first.set(xlabel="u₁ = base − top [mm]", ylabel="F₁ / N")
+        second.set(xlabel="u₂ = base − top [mm]", ylabel="F₂ / N")
         orbit.set(xlabel="F₁ / N", ylabel="F₂ / N")
         orbit.set_aspect("equal", adjustable="datalim")
         figure.legend(*orbit.get_legend_handles_labels(), loc="outside lower center", ncols=len(AMPLITUDES))

@@ -13,12 +13,23 @@ import numpy as np
 import run_tutorial
 
 from msfp_gen import figures, load_scene, simulate
+from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.result import Result
+from msfp_gen.results.geometry.section import sections
+from msfp_gen.results.resample import at_times
 
 FOLDER = Path(__file__).resolve().parent / "figures"
 RECORD = "ridgecrest-2019-ci-clc"
 ROWS = 3000
+DEVICES = {  # preset scene -> name in docs/layouts.md
+    "single-push": "single",
+    "single-articulated-push": "single, articulated",
+    "double-push": "double",
+    "double-articulated-push": "double, articulated",
+    "triple-push": "triple",
+    "quintuple-push": "quintuple",
+}
 TOLERANCES = 10.0 ** -np.arange(2, 7)
 
 
@@ -41,6 +52,33 @@ def draw_runs(folder: Path) -> None:
     figures.plot_section(test, folder / "gallery-circles.png", time=65.0, friction_circles=True)
     figures.plot_force_path(test, folder / "gallery-force-path.png", time=65.0)
     figures.animate(test, folder / "gallery-movie.gif", seconds=3.0, frames_per_second=6, start=173.6, end=243.0)
+
+
+def draw_layouts(folder: Path) -> None:
+    """A section of every kind of device at rest: numbers of bodies in black, of surfaces in their colours."""
+    with figures.page(11.0, 4.2, folder / "layouts.png") as figure:
+        for axes, (scene, title) in zip(figure.subplots(2, 3).flat, DEVICES.items(), strict=True):
+            given = load_scene(scene)
+            result = simulate(replace(given, duration=0.05, output_step=None, stop=None))
+            (section,) = sections(at_times(result, 0.0))
+            for polygon in section.bodies:
+                axes.fill(*(polygon * figures.MILLI).T, facecolor="#DCE1E7", edgecolor=figures.INK, linewidth=0.7)
+            for number, face in enumerate(section.faces, start=1):
+                colour, (x, z) = style.colour(number), face[-1] * figures.MILLI
+                axes.plot(*(face * figures.MILLI).T, color=colour, linewidth=2)
+                side = max(polygon[:, 0].max() for polygon in section.bodies) * figures.MILLI
+                axes.annotate(
+                    str(number), (x, z), (1.12 * side, z), va="center", color=colour, fontweight="bold",
+                    arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.7},
+                )  # fmt: skip
+            for number, polygon in enumerate(section.bodies, start=1):
+                middle = polygon[np.abs(polygon[:, 0]) < 1e-3][:, 1]
+                axes.text(0, figures.MILLI * middle.mean(), str(number), ha="center", va="center", fontsize=8)
+            layout = given.bearing.layout
+            axes.set_title(f"{title}: ({layout.n}, {layout.m}, {layout.p})", fontsize=10)
+            axes.set_aspect("equal")
+            axes.margins(0.12)
+            axes.set_axis_off()
 
 
 def draw_tutorial(folder: Path) -> None:
@@ -87,6 +125,7 @@ def draw_cost(folder: Path) -> None:
 def main(folder: Path = FOLDER) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     draw_runs(folder)
+    draw_layouts(folder)
     draw_tutorial(folder)
     draw_record(folder)
     draw_cost(folder)

@@ -72,7 +72,7 @@ class Result(RunData):
         return write_netcdf(self, path)
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write a CSV file: `name [unit]` as header, one line per row; scene, events and provenance as comments.
+        """Write a CSV file: `name [unit]` as header, one line per row; then scene, events and provenance as comments.
 
         Raises InputError where the suffix is not .csv or the folder does not exist.
         """

@@ -1,8 +1,8 @@
-"""Tables of a run for the console (peaks, surfaces, transitions), and of many runs with one row each."""
+"""Tables of a run for the console: peaks, surfaces, transitions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.summary import summarise
@@ -28,24 +28,6 @@ def summary_tables(result: RunData) -> list[Table]:
     if "transitions" in summary:
         tables.append(transition_table(summary["transitions"]))
     return tables
-
-
-def batch_table(results: Sequence[RunData]) -> Table:
-    """Many runs, one per row: status, peaks, number of rims met and wall time."""
-    rows = [
-        (
-            run["name"] or "unnamed scene",
-            run["status"],
-            f"{run['peak_displacement']['radial'] * 1e3:.2f}",
-            f"{run['peak_top_force']['radial'] * 1e-3:.3f}",
-            str(len(run["rims_met"])),
-            f"{run['wall_time'] * 1e3:.1f}",
-        )
-        for result in results
-        for run in (summarise(result),)
-    ]
-    columns = ("scene", "status", "peak displacement [mm]", "peak force [kN]", "rims met", "time [ms]")
-    return Table(f"{len(results)} runs", columns, rows)
 
 
 def _run_table(summary: Mapping[str, Any]) -> Table:

@@ -14,6 +14,7 @@ from msfp_gen.cli import (
     building,
     cache_command,
     drawing,
+    exporting,
     records,
     reporting,
     running,
@@ -35,7 +36,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 # This order is the order of the commands in the help text.
-for group in (running, batching, drawing, assessment_commands, benching, reporting, records, building, cache_command):
+for group in (
+    running, batching, exporting, drawing, assessment_commands, benching, reporting, records, building, cache_command,
+):  # fmt: skip
     app.add_typer(group.app)
 
 

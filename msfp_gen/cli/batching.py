@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from msfp_gen.cli.console import Progress, note, say, scenes, show, whole_number
+from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
+    from msfp_gen.scene.file.parameter_sweep import Variation
+    from msfp_gen.studies.sweep import Row
 
 app = typer.Typer()
+LONGEST = 80  # characters of the name of a file, without its number
 
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen batch fenz-test1 fenz-test2 scene.toml -o runs\n"
-    "  msfp-gen batch ridgecrest-clc --vary motion.scale=0.5,0.75,1,1.25,1.5\n"
+    "  msfp-gen batch ridgecrest-clc --vary motion.scale=0.5,0.75,1,1.25,1.5 --table scales.csv\n"
+    "  msfp-gen batch scene.toml --suite suite.toml --vary bearing.friction=0.05,0.08 --table suite.csv\n"
     "  msfp-gen batch scene.toml --vary top.axial_load=1e6,2e6 --vary solver.rtol=1e-3,1e-4 --workers 4 -o study"
 )
 def batch(
@@ -32,47 +38,84 @@ def batch(
         list[str] | None,
         typer.Option(metavar="FIELD=VALUES", help="Run the scene once for each value of a field; may be repeated."),
     ] = None,
+    suite: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Run every scene under each ground motion of a suite (TOML); see `suite`."),
+    ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write every run to this folder, as netCDF-4.")
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Write every run to this folder as it ends, as netCDF-4."),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summaries as JSON, and nothing else.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print summaries and varied fields as JSON, and nothing else.")
+    ] = False,
 ) -> None:
-    """Simulate many scenes, or one with fields varied, on all cores."""
-    from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.parameter_sweep import varied_field, varied_scenes
-    from msfp_gen.simulation.batch import simulate_batch
+    """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
+    from msfp_gen.results.export import require_pyarrow
+    from msfp_gen.scene.file.parameter_sweep import variations, varied_field
+    from msfp_gen.scene.file.suite import load_suite
+    from msfp_gen.studies.sweep import TABLE_SUFFIXES
 
+    if table is not None:
+        require_pyarrow(check_output(table, TABLE_SUFFIXES, "--table"), "--table", ".csv")
     fields = [varied_field(text) for text in vary or ()]
-    chosen = [scene for source in sources for scene in varied_scenes(source, fields)]
-    if output is not None:
-        make_folder(output, "--output")
-    with Progress(f"{len(chosen)} scenes") as progress:
-        results = simulate_batch(chosen, workers=workers, progress=progress)
-    if as_json:
-        say(json.dumps([result.summary for result in results], indent=2, allow_nan=False))
-    else:
-        from msfp_gen.analysis.tables import batch_table
-
-        show([batch_table(results)])
-    for path in _save(results, output):
-        note(f"wrote {path}")
-    if failed := [result for result in results if not result.succeeded]:
-        first = f"{failed[0].scene.name}: {failed[0].message}"
-        raise RunError(f"{len(failed)} of {len(results)} runs did not reach their end; the first: {first}")
+    with Progress("suite") as progress:
+        records = () if suite is None else load_suite(suite, progress).records
+    chosen = [variation for source in sources for variation in variations(source, fields, records)]
+    rows: list[Row] = []
+    with _reported(rows, len(chosen), table, as_json):
+        _run(chosen, workers, output, rows)
+    if failed := [row.summary for row in sorted(rows) if row.summary["status"] not in ("ok", "stopped")]:
+        first = f"{failed[0]['name']}: {failed[0]['message']}"
+        raise RunError(f"{len(failed)} of {len(rows)} runs did not reach their end; the first: {first}")
 
 
-def _save(results: list[Result], folder: Path | None) -> list[Path]:
-    """Write one file per run, named by the number and the name of its scene; returns the paths."""
-    if folder is None:
-        return []
-    digits = len(str(len(results)))
-    names = ((result.scene.name or "scene").replace(" = ", "=") for result in results)
-    stems = (re.sub(r"[^A-Za-z0-9.=_-]+", "-", name).strip("-.")[:80] for name in names)
-    return [
-        result.save(folder / f"{index:0{digits}d}-{stem}.nc")
-        for index, (result, stem) in enumerate(zip(results, stems, strict=True), start=1)
-    ]
+def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, rows: list[Row]) -> None:
+    """Run all scenes; each run is written, and its row appended to `rows`, as it ends."""
+    from msfp_gen.studies.sweep import completed_runs, row_of
+
+    started = completed_runs([variation.scene for variation in chosen], workers)
+    if folder is not None:
+        make_folder(folder, "--output")
+    with Progress(f"{len(chosen)} scenes") as progress, closing(started) as runs:
+        for index, result in runs:
+            file = None if folder is None else folder / _file_name(index + 1, len(chosen), result.scene.name)
+            if file is not None:
+                result.save(file)
+            rows.append(row_of(index + 1, chosen[index], result, file))
+            if progress is not None:
+                progress(len(rows), len(chosen))
+    if folder is not None:
+        note(f"wrote {len(rows)} runs to {folder}")
+
+
+@contextmanager
+def _reported(rows: list[Row], count: int, table: Path | None, as_json: bool) -> Iterator[None]:
+    """Print and write the rows at the end of the block, also where it is interrupted or fails."""
+    from msfp_gen.studies.sweep import sweep_table, write_table
+
+    try:
+        yield
+    finally:
+        if rows and as_json:
+            say(json.dumps([row.as_dict() for row in sorted(rows)], indent=2, allow_nan=False))
+        elif rows:
+            show([sweep_table(rows)])
+        if rows and table is not None:
+            note(f"wrote {write_table(rows, table, '--table')}")
+        if 0 < len(rows) < count:
+            note(f"{len(rows)} of {count} runs had ended and are kept")
+
+
+def _file_name(number: int, count: int, name: str) -> str:
+    """The name of a run's file: numbered so that names sort, of characters that no shell needs in quotes."""
+    plain = re.sub(r"[^A-Za-z0-9._]+", "-", name)[:LONGEST].strip("-.")
+    return f"{number:0{len(str(count))}d}-{plain or 'scene'}.nc"

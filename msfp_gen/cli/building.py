@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, building, show, whole_number, with_effects
+from msfp_gen.cli.console import SceneName, building, note, show, whole_number, with_effects
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 app = typer.Typer()
@@ -26,19 +26,26 @@ def generate(
         int, typer.Argument(parser=whole_number, metavar="P", help="Number of concave-down surfaces; n = m + p + 1.")
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Write sources and module to this folder.")
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Write sources, module, README and a C example there."),
     ] = None,
     *,
     effects: Effects,
 ) -> None:
     """Derive and compile the equations of a stack layout."""
     spec = ModelSpec(Layout(n, m, p), effects)
+    from msfp_gen.embedding import check_guide, write_guide
     from msfp_gen.jit.build import generate_to, prepare
     from msfp_gen.jit.tables import build_table
 
+    if output is not None:
+        check_guide(output)
     with building() as progress:
         info = prepare(spec, progress) if output is None else generate_to(spec, output, progress)
     show([build_table(info)])
+    if output is not None:
+        write_guide(spec, info.folder, info.module)
+        note(f"start with {info.folder / 'README.md'}; `make run` there builds and runs a C example")
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")

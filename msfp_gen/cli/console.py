@@ -16,6 +16,7 @@ import typer
 
 from msfp_gen.common.fields import Choice, Rule, ruled_fields
 from msfp_gen.errors import printable
+from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -76,6 +77,14 @@ whole_number, number = parser_of(int, "whole number"), parser_of(float, "number"
 Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write every row: .nc (netCDF-4), .csv, .parquet or .mat."),
+]
+
+
+SignOption = Annotated[
+    str,
+    typer.Option(
+        metavar="|".join(SIGNS), help="Sign of the displacement across the bearing, and of its force, as shown."
+    ),
 ]
 
 

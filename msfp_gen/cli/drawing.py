@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, number, whole_number
+from msfp_gen.cli.console import Progress, SignOption, note, number, whole_number
 from msfp_gen.cli.inputs import load_source, result_of
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
 from msfp_gen.errors import InputError
+from msfp_gen.results.sign import DEFAULT, sign_of
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -53,27 +54,30 @@ def plot(
     friction_circles: Annotated[
         bool, typer.Option("--friction-circles", help="Add sphere centres and friction circles to the section.")
     ] = False,
+    sign: SignOption = DEFAULT,
 ) -> None:
     """Draw a run: one figure, or all of them."""
     targets = _targets(figure, output)
+    sign_of(sign, "--sign")
     angle = None if azimuth is None else math.radians(azimuth)
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
     loaded = _load_for_figures(source)
     make_folder(next(iter(targets.values())).parent, "--output")
     result, failure = result_of(loaded)
-    from msfp_gen.figures import FIGURES, plot_force_path, plot_section
+    from msfp_gen.figures import FIGURES, plot_force_path, plot_section, using_sign
     from msfp_gen.results.resample import at_times
 
     if time is not None:
         at_times(result, time)  # refuses a time outside the run before anything is written
     for name, path in targets.items():
-        if name == "section":
-            plot_section(result, path, time=time, azimuth=angle, friction_circles=friction_circles)
-        elif name == "force-path":
-            plot_force_path(result, path, time=time)
-        else:
-            FIGURES[name](result, path)
+        with using_sign(sign):
+            if name == "section":
+                plot_section(result, path, time=time, azimuth=angle, friction_circles=friction_circles)
+            elif name == "force-path":
+                plot_force_path(result, path, time=time)
+            else:
+                FIGURES[name](result, path)
         note(f"wrote {path}")
     if failure is not None:
         raise failure
@@ -95,15 +99,17 @@ def animate(
         float | None, typer.Option(parser=number, metavar="SECONDS", help="Last instant of the run that is shown.")
     ] = None,
     azimuth: Azimuth = None,
+    sign: SignOption = DEFAULT,
 ) -> None:
     """Write a movie of the stack in motion, with its loop and the bars of sliding surfaces."""
     from msfp_gen.figures import animate as write_movie
-    from msfp_gen.figures import check_movie
+    from msfp_gen.figures import check_movie, using_sign
 
     check_movie(output, "--output")
+    sign_of(sign, "--sign")
     result, failure = result_of(_load_for_figures(source))
     angle = None if azimuth is None else math.radians(azimuth)
-    with Progress("frames") as progress:
+    with Progress("frames") as progress, using_sign(sign):
         write_movie(
             result,
             output,

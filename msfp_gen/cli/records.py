@@ -1,7 +1,8 @@
-"""Command for ground motions: record."""
+"""Commands for ground motions: record, suite."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,7 @@ app = typer.Typer()
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen record RSN6_180.AT2 RSN6_270.AT2 RSN6_UP.AT2\n"
     "  msfp-gen record station.v2 --as-is --duration 40\n"
+    "  msfp-gen record station.v2 --components E1,E3 --rotated-by 30 -o turned.csv\n"
     "  msfp-gen record ridgecrest-2019-ci-clc --duration 60 --plot correction.png --spectrum spectrum.csv\n"
     '  msfp-gen record quake.v1 --scale-to "sa=0.6 g, period=2.5 s" -o scaled.csv\n'
     '  msfp-gen record quake.v1 --scale-to "sds=1 g, sd1=0.6 g, between=0.5:4, component=rotd50" --spectrum fit.png'
@@ -29,6 +31,13 @@ def record(
         list[str],
         typer.Argument(metavar="FILE...", help="A record, one file per component, or the name of a bundled one."),
     ],
+    components: Annotated[
+        str | None, typer.Option(metavar="E1,E2,E3", help="Components to keep; the others are zero.")
+    ] = None,
+    rotated_by: Annotated[
+        float | None,
+        typer.Option(parser=number, metavar="DEGREES", help="Rotate the horizontal components from E1 towards E2."),
+    ] = None,
     correct: Annotated[
         bool, typer.Option("--correct", help="Correct the baseline; implied by any option below.")
     ] = False,
@@ -75,7 +84,7 @@ def record(
     from msfp_gen.motions.records.tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
-    raw = _read(files)
+    raw = _turned(_read(files), components, rotated_by)
     process = correct or as_is or plot is not None or any(v is not None for v in (start, duration, corner, target))
     corrected, factor = _prepared(raw, target, start, duration, not as_is, corner) if process else (None, 1.0)
     motion = raw if corrected is None else corrected if target is None else corrected.scaled(factor)
@@ -92,10 +101,49 @@ def record(
         note(f"wrote {path}")
 
 
+@app.command(epilog="Example:\n\n\b\n  msfp-gen suite suite.toml --spectrum suite.png")
+def suite(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A list of records (TOML): docs/data.md, Suites.")],
+    spectrum: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the spectra, their mean and the target: .png, .svg, .pdf.")
+    ] = None,
+) -> None:
+    """Read a suite of ground motions; scale its mean spectrum to a target; print the factors."""
+    if spectrum is not None:
+        check_output(spectrum, FIGURE_SUFFIXES, "--spectrum")
+    from msfp_gen.motions.records.tables import suite_tables
+    from msfp_gen.scene.file.suite import load_suite
+
+    with Progress("spectra") as progress:
+        found = load_suite(file, progress)
+    if spectrum is not None and (found.scaled is None or len(found.scaled.period) == 1):
+        raise InputError(f"--spectrum: {file} has no [scale_to] with sds, sd1 and between; give one")
+    names, motions = [record.name for record in found.records], [record.motion for record in found.records]
+    show(suite_tables(names, motions, found.scaled))
+    if spectrum is not None and found.scaled is not None:
+        from msfp_gen.figures import plot_response_spectrum
+
+        scaled = found.scaled
+        curves, target = dict(zip(names, scaled.spectra, strict=True)), (scaled.period, scaled.target)
+        title = f"Mean spectrum of {file.name}"
+        plot_response_spectrum(scaled.period, curves, spectrum, target=target, mean=scaled.mean, title=title)
+        note(f"wrote {spectrum}")
+
+
 def _read(files: list[str]) -> Record:
     from msfp_gen.motions.records import BUNDLED, bundled, read_record
 
     return bundled(files[0]) if len(files) == 1 and files[0] in BUNDLED else read_record(*files)
+
+
+def _turned(raw: Record, components: str | None, degrees: float | None) -> Record:
+    """The record with the chosen components, rotated."""
+    if components is not None:
+        try:
+            raw = raw.with_components([name.strip() for name in components.split(",")])
+        except InputError as error:
+            raise InputError(f"--{error}") from None
+    return raw if degrees is None else raw.rotated(math.radians(degrees))
 
 
 def _prepared(

@@ -17,6 +17,7 @@ MOST = 5000  # instants in the interactive view; more would give a file of tens 
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen run fenz-test5 -o out.nc\n  msfp-gen report out.nc -o report.html\n"
+    '  msfp-gen report out.nc --project "Hospital, block B" --date 2026-03-01 --revision 2 --code "ASCE 7-22"\n'
     "  msfp-gen report ridgecrest-clc   # runs it first, and writes ridgecrest-clc.html"
 )
 def report(
@@ -33,10 +34,19 @@ def report(
         int | None,
         typer.Option(parser=whole_number, metavar="N", help="Number of instants in the view, about; default 1500."),
     ] = None,
+    project: Annotated[str, typer.Option(metavar="TEXT", help="Title block: the project.")] = "",
+    device: Annotated[
+        str, typer.Option(metavar="TEXT", help="Title block: the bearing; default: its kind.", show_default=False)
+    ] = "",
+    date: Annotated[str, typer.Option(metavar="TEXT", help="Title block: the date.")] = "",
+    revision: Annotated[str, typer.Option(metavar="TEXT", help="Title block: the revision.")] = "",
+    code: Annotated[
+        str, typer.Option(metavar="TEXT", help="Title block: the edition of the design code, such as ASCE 7-22.")
+    ] = "",
 ) -> None:
     """Write a run as one HTML file that needs no network: numbers, settings, figures, the bearing in motion."""
     from msfp_gen.common.output import check_output
-    from msfp_gen.report import FRAMES, REPORT_SUFFIXES, write_report
+    from msfp_gen.report import FRAMES, REPORT_SUFFIXES, TitleBlock, write_report
 
     count = FRAMES if frames is None else frames
     if not 2 <= count <= MOST:
@@ -44,7 +54,7 @@ def report(
     path = check_output(Path(f"{Path(source).stem}.html") if output is None else output, REPORT_SUFFIXES, "--output")
     result, failure = result_of(load_source(source))
     with Progress("report") as progress:
-        write_report(result, path, count, progress)
+        write_report(result, path, count, progress, TitleBlock(project, device, date, revision, code))
     note(f"wrote {path}")
     if failure is not None:
         raise RunError(f"{failure}; the report of what was computed until then is in {path}", status=failure.status)

@@ -17,8 +17,21 @@ from msfp_gen.figures.overview import plot_result
 from msfp_gen.figures.records import plot_correction, plot_response_spectrum
 from msfp_gen.figures.section import plot_section
 from msfp_gen.figures.sliding import plot_sliding, plot_stages
-from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, STYLE, engineering, page, panels
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    MILLI,
+    STYLE,
+    displacement,
+    displacement_label,
+    engineering,
+    force,
+    page,
+    panels,
+)
 from msfp_gen.figures.work_precision import plot_work_precision
+from msfp_gen.results.sign import using_sign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +48,10 @@ __all__ = [
     "STYLE",
     "animate",
     "check_movie",
+    "displacement",
+    "displacement_label",
     "engineering",
+    "force",
     "moving_axes",
     "page",
     "panels",
@@ -50,6 +66,7 @@ __all__ = [
     "plot_sliding",
     "plot_stages",
     "plot_work_precision",
+    "using_sign",
 ]
 
 # Figures of one run, by their names on the command line.

@@ -18,14 +18,18 @@ from msfp_gen.figures.style import (
     MILLI,
     SMALL,
     THIN,
+    displacement,
+    displacement_label,
     engineering,
     first_contacts,
+    force,
     headline,
     label_of,
     mark,
     page,
     subscript,
 )
+from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,11 +63,13 @@ def plot_orbit(result: RunData, path: str | Path | None = None) -> Figure:
         headline(figure, label_of(result))
         left, right = figure.subplots(1, 2)
         draw_orbit(left, result, "Orbit of the displacement")
-        force = result.history.top_force[:, :2]
-        scale = engineering(force, "N")
-        right.plot(*(force * scale.factor).T, color=COLOURS[1])
-        right.plot(*(force[0] * scale.factor), marker="o", markersize=5, color=INK, linestyle="none")
-        right.set(title="Orbit of the force", xlabel=f"F₁ [{scale.unit}]", ylabel=f"F₂ [{scale.unit}]")
+        scale = engineering(result.history.top_force[:, :2], "N")
+        path_of_force = force(result.history.top_force[:, :2], scale)
+        right.plot(*path_of_force.T, color=COLOURS[1])
+        right.plot(*path_of_force[0], marker="o", markersize=5, color=INK, linestyle="none")
+        right.set(
+            title=f"Orbit of the force {shown_sign().force}", xlabel=f"F₁ [{scale.unit}]", ylabel=f"F₂ [{scale.unit}]"
+        )
         right.set_aspect("equal", adjustable="datalim")
         right.margins(0.06)
         figure.legend(loc="outside lower left", ncols=7, handletextpad=0.1)
@@ -80,14 +86,15 @@ def draw_loop(axes: Axes, result: RunData, axis: int) -> None:
     """Top force over displacement along `axis`, with the first rim contacts and force over axial load on the right."""
     history, name = result.history, subscript(axis + 1)
     scale = engineering(history.top_force[:, :2], "N")
-    axes.plot(history.displacement[:, axis] * MILLI, history.top_force[:, axis] * scale.factor, color=COLOURS[0])
+    axes.plot(displacement(history.displacement[:, axis]), force(history.top_force[:, axis], scale), color=COLOURS[0])
     for event in first_contacts(result):
         label = f"first contact of rim {event.surface}"
-        axes.plot(event.displacement[axis] * MILLI, event.top_force[axis] * scale.factor, **mark(event), label=label)
+        point = displacement(event.displacement[axis]), force(event.top_force[axis], scale)
+        axes.plot(*point, **mark(event), label=label)
     axes.set(
         title=f"Force and displacement along E{name}",
-        xlabel=f"displacement across the bearing u{name} [mm]",
-        ylabel=f"force on the top support F{name} [{scale.unit}]",
+        xlabel=f"displacement across the bearing {displacement_label(axis)}",
+        ylabel=f"force {shown_sign().force} F{name} [{scale.unit}]",
     )
     axes.margins(0.06)
     if len(moving_axes(result)) == 1 and is_monotonic(result):
@@ -104,17 +111,16 @@ def draw_loop(axes: Axes, result: RunData, axis: int) -> None:
 
 def draw_orbit(axes: Axes, result: RunData, title: str = "Orbit") -> None:
     """Displacement across the bearing in the horizontal plane, with its start and the first contact of every rim."""
-    u = result.history.displacement * MILLI
+    u = displacement(result.history.displacement)
     axes.plot(u[:, 0], u[:, 1], color=COLOURS[0])
     for event in first_contacts(result):
         axes.plot(
-            event.displacement[0] * MILLI,
-            event.displacement[1] * MILLI,
+            *displacement(event.displacement[:2]),
             **mark(event),
             label=f"first contact of rim {event.surface}",
         )
     axes.plot(*u[0, :2], marker="o", markersize=5, color=INK, linestyle="none", label="start")
-    axes.set(title=title, xlabel="u₁ [mm]", ylabel="u₂ [mm]")
+    axes.set(title=title, xlabel=displacement_label(0), ylabel=displacement_label(1))
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
 
@@ -122,7 +128,7 @@ def draw_orbit(axes: Axes, result: RunData, title: str = "Orbit") -> None:
 def _draw_transitions(axes: Axes, result: RunData, axis: int) -> None:
     """Dotted lines at the transitions of a monotonic run, each with its symbol and value."""
     history = result.history
-    sign = np.sign(history.displacement[history.peak_row, axis])
+    sign = float(np.sign(displacement(history.displacement[history.peak_row, axis])))
     for key, value in transitions(result, axial_load(result)).items():
         if not key.startswith("u_") or value is None:
             continue

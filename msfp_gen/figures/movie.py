@@ -1,21 +1,41 @@
-"""Movie of the stack in motion, with its loop and the bars of sliding surfaces: .gif by Pillow, .mp4 by ffmpeg."""
+"""Movie of the stack in motion, with its loop and the bars of sliding surfaces: .gif by Pillow, .mp4 by ffmpeg.
+
+What stands still is drawn once; each frame moves the other artists over a copy of it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
 from msfp_gen.figures.loops import draw_orbit, moving_axes
 from msfp_gen.figures.section import draw_section, limits
 from msfp_gen.figures.sliding import draw_bars
-from msfp_gen.figures.style import COLOURS, FAINT, INK, MILLI, THIN, engineering, headline, label_of, page, subscript
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    INK,
+    THIN,
+    displacement,
+    displacement_label,
+    engineering,
+    force,
+    headline,
+    label_of,
+    page,
+    subscript,
+)
 from msfp_gen.motions.checks import positive
-from msfp_gen.results.geometry.section import sections
+from msfp_gen.results.geometry.section import Section, sections
 from msfp_gen.results.resample import at_times
 
 if TYPE_CHECKING:
@@ -25,7 +45,10 @@ if TYPE_CHECKING:
     from msfp_gen.results.run_data import RunData
 
 MOVIE_SUFFIXES = (".gif", ".mp4")
-DOTS = 80  # per inch: 800 x 400 pixels; video needs even numbers
+DOTS = 80  # per inch: 800 pixels wide
+WIDE, BELOW = 10.0, 2.7  # width of the movie, height of loop and bars [inch]
+AROUND, TALLEST = 1.55, 4.5  # height of title, legend and labels of the section, and of the section itself [inch]
+PALETTE = 256  # colours of a GIF
 
 
 def animate(
@@ -58,7 +81,8 @@ def animate(
         InputError: a time outside the run, a path that cannot be written, or .mp4 without ffmpeg. No file is written.
     """
     target = check_movie(path)
-    writer = _writer(target, frames_per_second)
+    if frames_per_second < 1:
+        raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
     positive("seconds", seconds)
     rows = result.history.time
     first, last = (float(rows[0]) if start is None else start), (float(rows[-1]) if end is None else end)
@@ -66,13 +90,10 @@ def animate(
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
     at_times(result, (first, last))  # raises InputError for a time outside the run
     frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
-    with page(10.0, 5.0) as figure, replacing(target) as temporary, writer.saving(figure, temporary, DOTS):
-        update = _layout(figure, result, frames, azimuth)
-        for row in range(len(frames.history.time)):
-            update(row)
-            writer.grab_frame()
-            if progress is not None:
-                progress(row + 1, len(frames.history.time))
+    found = sections(frames, azimuth)
+    with page(WIDE, _height(found)) as figure, replacing(target) as temporary:
+        pictures = _pictures(figure, result, frames, found, progress)
+        _WRITERS[target.suffix.lower()](pictures, temporary, frames_per_second)
     return target
 
 
@@ -88,43 +109,100 @@ def check_movie(path: str | Path, name: str = "movie") -> Path:
     return target
 
 
-def _writer(target: Path, frames_per_second: int) -> Any:
-    """The writer of matplotlib for this kind of file."""
-    from matplotlib.animation import FFMpegWriter, PillowWriter
-
-    if frames_per_second < 1:
-        raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
-    if target.suffix.lower() == ".gif":
-        return PillowWriter(fps=frames_per_second)
-    return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+def _height(found: list[Section]) -> float:
+    """Height of the movie [inch]: the section over its full width to scale, the loop and the bars below it."""
+    (left, right), (low, high) = limits(found)
+    panel = min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left))
+    return 2 * round((panel + AROUND + BELOW) * DOTS / 2) / DOTS  # video needs even numbers of pixels
 
 
-def _layout(figure: Figure, result: RunData, frames: RunData, azimuth: float | None) -> Callable[[int], None]:
-    """Draw the parts that do not move; returns a function that draws one row of `frames`."""
-    found = sections(frames, azimuth)
+def _pictures(
+    figure: Figure,
+    result: RunData,
+    frames: RunData,
+    found: list[Section],
+    progress: Callable[[float, float], None] | None,
+) -> Iterator[Array]:
+    """The frames as pixels, shape (height, width, 4): what stands still is drawn once, the rest over a copy of it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(DOTS)
+    canvas: Any = FigureCanvasAgg(figure)
+    update, moving = _layout(figure, result, frames, found)
+    for artist in moving:
+        artist.set_animated(True)
+    canvas.draw()
+    still, count = canvas.copy_from_bbox(figure.bbox), len(frames.history.time)
+    for row in range(count):
+        canvas.restore_region(still)
+        update(row)
+        for artist in moving:
+            artist.draw(canvas.get_renderer())
+        yield np.array(canvas.buffer_rgba())
+        if progress is not None:
+            progress(row + 1, count)
+
+
+def _write_gif(pictures: Iterator[Array], path: Path, frames_per_second: int) -> None:
+    """Write a GIF; all frames have the colours of the first one, which holds every colour of the movie."""
+    from PIL import Image
+
+    images = (Image.fromarray(picture[..., :3]) for picture in pictures)
+    first = next(images).quantize(PALETTE)
+    rest = (image.quantize(palette=first, dither=Image.Dither.NONE) for image in images)
+    first.save(path, save_all=True, append_images=rest, duration=1000 / frames_per_second, loop=0)
+
+
+def _write_mp4(pictures: Iterator[Array], path: Path, frames_per_second: int) -> None:
+    """Write an MP4 by ffmpeg, which reads the pixels from a pipe. Raises OSError with its message."""
+    from matplotlib.animation import FFMpegWriter
+
+    first = next(pictures)
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", size, "-framerate", str(frames_per_second), "-i", "pipe:"]
+    command = [FFMpegWriter.bin_path(), "-loglevel", "error", *raw, "-vcodec", "h264", "-pix_fmt", "yuv420p", "-y"]
+    with subprocess.Popen([*command, str(path)], stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdin is not None and process.stderr is not None
+        with suppress(BrokenPipeError):
+            for picture in chain((first,), pictures):
+                process.stdin.write(picture.tobytes())
+            process.stdin.close()
+        message = process.stderr.read().decode(errors="replace")
+    if process.returncode:
+        raise OSError(f"ffmpeg failed: {' '.join(message.split())[-200:]}")
+
+
+_WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
+
+
+def _layout(
+    figure: Figure, result: RunData, frames: RunData, found: list[Section]
+) -> tuple[Callable[[int], None], list[Any]]:
+    """Draw all parts; returns a function that moves them to one row of `frames`, and the artists that it changes."""
     headline(figure, label_of(result))
-    ((left, right),) = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))
-    ((above,), (below,)) = right.subfigures(2, 1, squeeze=False, height_ratios=(1.5, 1))
-    stack, bars = left.subplots(), below.subplots()
-    pointers = [_loop(above.subplots(), result, frames)]
-    draw_bars(bars, result)
-    bars.set_xlabel("time t [s]")
-    cursor = bars.axvline(frames.history.time[0], color=INK, linewidth=THIN)
+    height = figure.get_size_inches()[1]
+    ((above,), (below,)) = figure.subfigures(2, 1, squeeze=False, height_ratios=(height - BELOW, BELOW))
+    stack = above.subplots()
+    left, right = below.subplots(1, 2)
+    drawing = draw_section(stack, frames, found[0])
     wide, high = limits(found)
+    stack.set(xlim=wide, ylim=high)
+    legend = above.legend(handles=drawing.entries, loc="outside upper center", ncols=3)
+    dot, x, y = _loop(left, result, frames)
+    draw_bars(right, result)
+    right.set_xlabel("time t [s]")
+    cursor = right.axvline(frames.history.time[0], color=INK, linewidth=THIN)
 
     def update(row: int) -> None:
-        stack.clear()
-        draw_section(stack, frames, found[row], row)
-        stack.set(xlim=wide, ylim=high)
-        stack.legend(loc="lower center", bbox_to_anchor=(0.5, 1.13), ncols=2)
-        for dot, x, y in pointers:
-            dot.set_data([x[row]], [y[row]])
+        drawing.update(found[row], row)
+        shown = zip(legend.get_texts(), legend.get_lines(), drawing.entries, strict=True)
+        for text, line, entry in shown:
+            text.set_text(entry.get_label())
+            line.set_linewidth(entry.get_linewidth())
+        dot.set_data([x[row]], [y[row]])
         cursor.set_xdata([frames.history.time[row]] * 2)
 
-    update(0)
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # the axes keep their places in all frames
-    return update
+    return update, [*drawing.artists, legend, dot, cursor]
 
 
 def _loop(axes: Axes, result: RunData, frames: RunData) -> tuple[Any, Any, Any]:
@@ -132,17 +210,17 @@ def _loop(axes: Axes, result: RunData, frames: RunData) -> tuple[Any, Any, Any]:
     moving = moving_axes(result)
     if len(moving) > 1:
         draw_orbit(axes, result)
-        x, y = (frames.history.displacement[:, :2] * MILLI).T
+        x, y = displacement(frames.history.displacement[:, :2]).T
     else:
         (axis,) = moving
         scale = engineering(result.history.top_force[:, :2], "N")
-        u, force = result.history.displacement[:, axis] * MILLI, result.history.top_force[:, axis] * scale.factor
-        axes.plot(u, force, color=FAINT, linewidth=THIN)
+        u, loads = displacement(result.history.displacement[:, axis]), force(result.history.top_force[:, axis], scale)
+        axes.plot(u, loads, color=FAINT, linewidth=THIN)
         axes.set(
             title="Hysteresis loop",
-            xlabel=f"u{subscript(axis + 1)} [mm]",
+            xlabel=displacement_label(axis),
             ylabel=f"F{subscript(axis + 1)} [{scale.unit}]",
         )
-        x, y = frames.history.displacement[:, axis] * MILLI, frames.history.top_force[:, axis] * scale.factor
+        x, y = displacement(frames.history.displacement[:, axis]), force(frames.history.top_force[:, axis], scale)
     (dot,) = axes.plot([x[0]], [y[0]], marker="o", markersize=7, color=COLOURS[1], linestyle="none", zorder=6)
     return dot, x, y

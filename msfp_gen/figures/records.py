@@ -77,6 +77,7 @@ def plot_response_spectrum(
     path: str | Path | None = None,
     *,
     target: tuple[ArrayLike, ArrayLike] | None = None,
+    mean: ArrayLike | None = None,
     damping: float = 0.05,
     title: str = "Response spectrum",
 ) -> Figure:
@@ -87,6 +88,7 @@ def plot_response_spectrum(
         spectra: label -> ndarray, shape (k,), [m/s^2].
         path: file to write: .png, .svg or .pdf; None: none.
         target: periods [s] and accelerations [m/s^2] of a target spectrum, drawn for comparison.
+        mean: ndarray, shape (k,), [m/s^2]: the mean of the spectra, drawn over them.
         damping: ratio to critical damping, for the title.
         title: of the figure.
 
@@ -105,6 +107,8 @@ def plot_response_spectrum(
         axes = figure.subplots()
         for index, (label, values) in enumerate(curves.items()):
             axes.plot(x, values, color=COLOURS[index % len(COLOURS)], label=label)
+        if mean is not None:
+            axes.plot(x, np.asarray(mean, dtype=float), color=INK, linewidth=2.5, label="mean")
         if target is not None:
             axes.plot(*(np.asarray(v, dtype=float) for v in target), color=INK, linestyle=(0, (5, 3)), label="target")
         axes.set(
@@ -114,6 +118,7 @@ def plot_response_spectrum(
             title=f"{100 * damping:.3g} % of critical damping",
         )
         axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("{x:g}" if x.max() < 10 * x.min() else "")
         axes.set_ylim(bottom=0)
         right = axes.secondary_yaxis("right", functions=(partial(mul, 1 / G), partial(mul, G)))
         right.set_ylabel("Sₐ [g]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from msfp_gen.figures.style import (
     SMALL,
     THIN,
     colour,
+    displacement,
     headline,
     label_of,
     page,
@@ -26,6 +27,7 @@ from msfp_gen.figures.style import (
 from msfp_gen.results.geometry.section import Section, sections
 from msfp_gen.results.geometry.shape import friction_circles as circle_radii
 from msfp_gen.results.resample import at_times
+from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import rims_in_contact, separated, sliding_surfaces
 
 if TYPE_CHECKING:
@@ -87,30 +89,78 @@ def peak_time(result: RunData) -> float:
     return float(result.history.time[result.history.peak_row])
 
 
-def draw_section(axes: Axes, then: RunData, section: Section, row: int = 0) -> None:
+def draw_section(axes: Axes, then: RunData, section: Section, row: int = 0) -> SectionDrawing:
     """Draw bodies, sliding faces, contact points and line of force of one row of `then` [mm]."""
-    history, last = then.history, len(section.bodies) - 1
-    for body, polygon in enumerate(section.bodies):
-        axes.fill(*(polygon * MILLI).T, facecolor=STEEL[0 < body < last], edgecolor=INK, linewidth=HAIR)
-    slides, on_rim = sliding_surfaces(history)[row], rims_in_contact(history)[row]
-    apart = separated(history)[row]
-    for index in reversed(range(history.surfaces)):
-        state = bool(slides[index]), bool(on_rim[index])
-        text = f"separated by {history.lift[row, index] * MILLI:.2f} mm" if apart[index] else STATES[state]
-        axes.plot(
-            *(section.faces[index] * MILLI).T,
-            color=colour(index + 1),
-            linewidth=BOLD if state[0] else LINE,
-            label=f"surface {index + 1} {text}",
-            solid_capstyle="butt",
-            zorder=3,
+    drawing = SectionDrawing(axes, then, section)
+    drawing.update(section, row)
+    return drawing
+
+
+class SectionDrawing:
+    """The parts of a section in motion; `update` moves them to another row of `then`.
+
+    Attributes:
+        bodies, faces, line, contacts: artists of bodies, sliding faces, line of force and contact points.
+        title: title of the axes, with time and displacement.
+    """
+
+    def __init__(self, axes: Axes, then: RunData, section: Section) -> None:
+        history, last = then.history, len(section.bodies) - 1
+        self.history = history
+        self.slides, self.on_rim = sliding_surfaces(history), rims_in_contact(history)
+        self.apart = separated(history)
+        self.bodies: list[Any] = []
+        for body, polygon in enumerate(section.bodies):
+            steel = STEEL[0 < body < last]
+            self.bodies += axes.fill(*(polygon * MILLI).T, facecolor=steel, edgecolor=INK, linewidth=HAIR)
+        self.faces = [self._face(axes, index) for index in reversed(range(history.surfaces))][::-1]
+        (self.line,) = axes.plot([], [], color=INK, linewidth=LINE, linestyle=(0, (6, 2)), zorder=4)
+        self.line.set_label("line of force")
+        self.contacts = [self._contact(axes, index) for index in range(history.surfaces)]
+        axes.set(
+            xlabel=f"{_direction(section.azimuth)}, from the centre of the base [mm]",
+            ylabel="height above the base [mm]",
         )
-    draw_force_line(axes, section)
-    for index, point in enumerate(section.contacts * MILLI):
-        if apart[index]:
-            continue
-        axes.plot(
-            *point,
+        self.title = axes.set_title(" ")
+        axes.set_aspect("equal", adjustable="box")
+        axes.grid(visible=False)
+
+    @property
+    def artists(self) -> list[Any]:
+        """Everything that moves, in the order of drawing."""
+        return [*self.bodies, *self.faces, self.line, *self.contacts, self.title]
+
+    @property
+    def entries(self) -> list[Any]:
+        """The entries of a legend: surfaces from the top, then the line of force."""
+        return [*self.faces[::-1], self.line]
+
+    def update(self, section: Section, row: int) -> None:
+        """Move everything to one row; `section` is that of the row."""
+        history, apart = self.history, self.apart[row]
+        for artist, polygon in zip(self.bodies, section.bodies, strict=True):
+            artist.set_xy(polygon * MILLI)
+        for index, face in enumerate(self.faces):
+            state = bool(self.slides[row, index]), bool(self.on_rim[row, index])
+            text = f"separated by {history.lift[row, index] * MILLI:.2f} mm" if apart[index] else STATES[state]
+            face.set(data=(section.faces[index] * MILLI).T, linewidth=BOLD if state[0] else LINE)
+            face.set_label(f"surface {index + 1} {text}")
+        self.line.set_data(*_force_line(section))
+        for index, (artist, (x, z)) in enumerate(zip(self.contacts, section.contacts * MILLI, strict=True)):
+            artist.set_data([x], [z])
+            artist.set_visible(not apart[index])
+        along = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
+        u = f"u = {shown_sign().difference} = {displacement(along):.1f} mm"
+        self.title.set_text(f"t = {history.time[row]:.3f} s, {u}")
+
+    def _face(self, axes: Axes, index: int) -> Any:
+        (face,) = axes.plot([], [], color=colour(index + 1), solid_capstyle="butt", zorder=3)
+        return face
+
+    def _contact(self, axes: Axes, index: int) -> Any:
+        (contact,) = axes.plot(
+            [],
+            [],
             marker="o",
             markersize=5,
             color="white",
@@ -119,18 +169,11 @@ def draw_section(axes: Axes, then: RunData, section: Section, row: int = 0) -> N
             linestyle="none",
             zorder=5,
         )
-    u = history.displacement[row] @ [np.cos(section.azimuth), np.sin(section.azimuth), 0.0]
-    axes.set(
-        title=f"t = {history.time[row]:.3f} s, u = {u * MILLI:.1f} mm",
-        xlabel=f"{_direction(section.azimuth)}, from the centre of the base [mm]",
-        ylabel="height above the base [mm]",
-    )
-    axes.set_aspect("equal", adjustable="box")
-    axes.grid(visible=False)
+        return contact
 
 
-def draw_force_line(axes: Axes, section: Section) -> None:
-    """Draw the line of force of every surface up to halfway to its neighbours, and beyond base and top."""
+def _force_line(section: Section) -> tuple[Array, Array]:
+    """Line of force of every surface up to halfway to its neighbours, and beyond base and top [mm]."""
     heights = np.concatenate([polygon[:, 1] for polygon in section.bodies])
     low, high = float(heights.min()), float(heights.max())
     beyond = OVERHANG * (high - low)
@@ -140,15 +183,8 @@ def draw_force_line(axes: Axes, section: Section) -> None:
     for (x, z), (along, up), below, above in zip(section.points, section.forces, edges, edges[1:], strict=False):
         if up > 0:
             ends += [(x + (level - z) * along / up, level) for level in (below, above)]
-    if ends:
-        axes.plot(
-            *(np.array(ends) * MILLI).T,
-            color=INK,
-            linewidth=LINE,
-            linestyle=(0, (6, 2)),
-            zorder=4,
-            label="line of force",
-        )
+    points = np.array(ends).reshape(-1, 2) * MILLI
+    return points[:, 0], points[:, 1]
 
 
 def draw_circles(axes: Axes, section: Section, radii: Array) -> None:

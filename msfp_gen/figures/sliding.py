@@ -12,6 +12,8 @@ from msfp_gen.figures.style import (
     THIN,
     colour,
     contacts,
+    displacement,
+    displacement_label,
     headline,
     label_of,
     mark,
@@ -124,12 +126,12 @@ def _draw_displacement(axes: Axes, result: RunData) -> None:
     for axis, style in zip(moving_axes(result), ("-", "--"), strict=False):
         axes.plot(
             history.time,
-            history.displacement[:, axis] * MILLI,
+            displacement(history.displacement[:, axis]),
             color=INK,
             linestyle=style,
             linewidth=THIN,
             label=f"u{subscript(axis + 1)}",
         )
-    axes.set(title="Displacement across the bearing", ylabel="u [mm]")
+    axes.set(title="Displacement across the bearing", ylabel=displacement_label())
     if len(moving_axes(result)) > 1:
         axes.legend(loc="upper right", ncols=2)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, replacing
 from msfp_gen.results.history import Event
+from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +120,21 @@ def strips(figure: Any, count: int, **options: Any) -> list[Axes]:
 def subscript(number: int) -> str:
     """`number` in subscript digits."""
     return str(number).translate(SUBSCRIPTS)
+
+
+def displacement(values: ArrayLike) -> Array:
+    """Displacement across the bearing [m], as a result holds it, in mm and in the sign of the figures."""
+    return shown_sign().factor * MILLI * np.asarray(values)
+
+
+def force(values: ArrayLike, scale: Scale) -> Array:
+    """Force on the top [N], as a result holds it, in the unit of `scale` and in the sign of the figures."""
+    return shown_sign().factor * scale.factor * np.asarray(values)
+
+
+def displacement_label(axis: int | None = None) -> str:
+    """Label of an axis with the displacement along E1 (0) or E2 (1), or with both (None): its sign and unit."""
+    return f"u{'' if axis is None else subscript(axis + 1)} = {shown_sign().difference} [mm]"
 
 
 def colour(surface: int) -> str:

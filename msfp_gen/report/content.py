@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.tables import transition_table
@@ -17,6 +17,60 @@ if TYPE_CHECKING:
 MILLI, KILO = 1e3, 1e-3
 MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine
 EVENTS = 40  # most events listed; in an earthquake there may be a rim contact in every cycle
+
+
+DEVICES = {1: "single", 2: "double", 4: "triple", 6: "quintuple"}  # number of sliding surfaces -> pendulum
+# Words of the page for a reader who has seen nothing else of msfp-gen.
+TERMS = (
+    ("friction pendulum bearing", "steel sliders in spherical dishes, between a structure and its foundation. It "
+     "slides when the ground moves, friction dissipates energy, and the weight on the curved dishes brings it back."),
+    ("surface", "a pair of spherical faces that slide on each other, numbered from the bottom."),
+    ("sliding", "distance of a slider from the centre of its dish, along the dish."),
+    ("capacity, rim, gap", "the sliding at which the slider meets the raised edge (rim) of its dish; the gap is what "
+     "is left until then. A negative gap is the compression of the rim."),
+    ("u", "horizontal displacement across the bearing: base less top, less its value at the start."),
+    ("F", "force of the bearing on what stands on it; it has the sign of u in a loop."),
+    ("normal force N", "compression through a surface. Where it falls to zero, the surface would open."),
+    ("effective stiffness, damping", "of one cycle: force over displacement between its two ends, and the energy of "
+     "the loop over 2π times stiffness times displacement squared."),
+    ("sliding regime", "a part of the motion in which the same surfaces slide."),
+    ("friction mobilised", "share of the full friction force; 100 % while a surface slides, less while it sticks."),
+    ("energy balance", "work of the ground and the loads, less all energy stored and dissipated; what remains is the "
+     "error of the computation."),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TitleBlock:
+    """What identifies a report in a project: texts; "" leaves an entry out. device: "" for the kind of the bearing.
+
+    code: the edition of the design code, such as "ASCE 7-22".
+    """
+
+    project: str = ""
+    device: str = ""
+    date: str = ""
+    revision: str = ""
+    code: str = ""
+
+    def rows(self, result: Result) -> list[tuple[str, str]]:
+        """Names and texts of the entries that are given, the device in any case."""
+        entries = {
+            "project": self.project,
+            "device": self.device or device_name(result),
+            "date": self.date,
+            "revision": self.revision,
+            "code edition": self.code,
+        }
+        return [(name, text) for name, text in entries.items() if text]
+
+
+def device_name(result: Result) -> str:
+    """The kind of the bearing by its sliding surfaces, with its layout."""
+    layout = result.scene.bearing.layout
+    kind = DEVICES.get(layout.surfaces)
+    surfaces = f"{layout.surfaces} sliding surface{'s' if layout.surfaces > 1 else ''}"
+    return f"{kind} friction pendulum, {surfaces}" if kind else f"friction pendulum of {surfaces}"
 
 
 class SummaryNumber(str):
@@ -98,11 +152,11 @@ def _surface_table(result: Result) -> Table:
     columns = {
         "peak sliding [mm]": ("peak_sliding", MILLI),
         "least gap [mm]": ("minimum_gap", MILLI),
-        "least N [kN]": ("minimum_normal_force", KILO),
-        "peak N [kN]": ("maximum_normal_force", KILO),
-        "least mu": ("least_friction", 1.0),
-        "peak mu": ("most_friction", 1.0),
-        "peak T [degC]": ("peak_temperature", 1.0),
+        "least normal force [kN]": ("minimum_normal_force", KILO),
+        "peak normal force [kN]": ("maximum_normal_force", KILO),
+        "least friction coefficient [-]": ("least_friction", 1.0),
+        "peak friction coefficient [-]": ("most_friction", 1.0),
+        "peak temperature [degC]": ("peak_temperature", 1.0),
     }
     columns = {name: column for name, column in columns.items() if column[0] in result.summary}
     rows = [

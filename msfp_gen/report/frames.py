@@ -54,6 +54,7 @@ def view(result: Result, count: int = FRAMES) -> dict[str, Any]:
         "circle": friction_circles(shown),
     }
     return {
+        "peak": history.peak_row,
         "azimuth": main_direction(history.displacement[:, :2]),
         "states": STATES,
         "surfaces": _surfaces(bearing, frames["circle"]),

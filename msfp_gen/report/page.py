@@ -12,13 +12,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.common.output import check_output, write_bytes
-from msfp_gen.report.content import characterisation_page, outcome, provenance_table, settings_page, summary_page
+from msfp_gen.report.content import (
+    TERMS,
+    TitleBlock,
+    characterisation_page,
+    outcome,
+    provenance_table,
+    settings_page,
+    summary_page,
+)
 from msfp_gen.report.frames import FRAMES, view
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
 
+NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
 SCRIPTS = ("three.min.js", "data.js", "chart.js", "section.js", "scene.js", "page.js")
@@ -41,23 +50,32 @@ EXPLANATION = (
 )
 
 
-def write_report(result: Result, path: str | Path, frames: int = FRAMES, progress: Progress | None = None) -> Path:
+def write_report(
+    result: Result,
+    path: str | Path,
+    frames: int = FRAMES,
+    progress: Progress | None = None,
+    title: TitleBlock = NO_TITLE,
+) -> Path:
     """Write the HTML report of a run to `path`; the file appears only when complete. Arguments as `report_html`.
 
     Raises InputError for a path that does not end in .html or cannot be written.
     """
     path = check_output(path, REPORT_SUFFIXES)
-    write_bytes(path, [report_html(result, frames, progress).encode()])
+    write_bytes(path, [report_html(result, frames, progress, title).encode()])
     return path
 
 
-def report_html(result: Result, frames: int = FRAMES, progress: Progress | None = None) -> str:
+def report_html(
+    result: Result, frames: int = FRAMES, progress: Progress | None = None, title: TitleBlock = NO_TITLE
+) -> str:
     """The HTML report of a run as text; the file loads no other file.
 
     Args:
         result: the run.
         frames: number of instants in the interactive view, about. Tables and figures use all rows.
         progress: called with the number of finished figures and of all figures.
+        title: project, device, date, revision and code edition.
     """
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -71,6 +89,8 @@ def report_html(result: Result, frames: int = FRAMES, progress: Progress | None 
         name=result.scene.name or "unnamed scene",
         version=__version__,
         lead=_introduction(result),
+        title_block=title.rows(result),
+        terms=TERMS,
         outcome=outcome(result),
         succeeded=result.succeeded,
         summary=summary_page(result),
@@ -88,11 +108,11 @@ def report_html(result: Result, frames: int = FRAMES, progress: Progress | None 
 
 
 def _introduction(result: Result) -> str:
-    """One sentence about the stack and the program."""
+    """One sentence about the bearing and the program."""
     layout = result.scene.bearing.layout
     return (
-        f"A stack of {layout.n} bodies, {layout.m} surfaces concave up and {layout.p} concave down, computed by "
-        f"msfp-gen {result.provenance.get('msfp_gen', __version__)}."
+        f"Simulation of a friction pendulum bearing of {layout.n} bodies, with {layout.m} sliding surfaces concave up "
+        f"and {layout.p} concave down, by msfp-gen {result.provenance.get('msfp_gen', __version__)}."
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -15,6 +15,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing, write_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import to_dataset, write_netcdf
+from msfp_gen.results.sign import DEFAULT, sign_of, signed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """One column of the table of a run: name, unit, meaning, and one value per row."""
+    """One column of the table of a run: variable of the dataset, name, unit, meaning, and one value per row."""
 
+    variable: str
     name: str
     unit: str
     meaning: str
@@ -40,17 +42,32 @@ def save(result: RunData, path: str | Path) -> Path:
     return WRITERS[target.suffix.lower()](result, target)
 
 
+def export_columns(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+    """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
+
+    names: of columns (`displacement_E1`) or of variables of the dataset, for all of their columns (`sliding`), in the
+    order in which they are written; None: all. sign: of displacement and force across the bearing, a word of
+    `sign.SIGNS`. Raises InputError for another name, another sign or an invalid path.
+    """
+    target = check_output(path, TABLE_WRITERS, "output")
+    return TABLE_WRITERS[target.suffix.lower()](result, target, names, sign)
+
+
 def check_result_path(path: str | Path, name: str = "output") -> Path:
     """`path` if a result can be written there; raises InputError otherwise, also for .parquet without pyarrow.
 
     name: that of the option, for the message.
     """
-    target = check_output(path, WRITERS, name)
-    if target.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+    return require_pyarrow(check_output(path, WRITERS, name), name, ".nc, .csv or .mat")
+
+
+def require_pyarrow(path: Path, name: str, others: str) -> Path:
+    """`path`; raises InputError for .parquet without pyarrow, whose message names the `others` to give instead."""
+    if path.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
         raise InputError(
-            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give .nc, .csv or .mat"
+            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give {others}"
         )
-    return target
+    return path
 
 
 def columns(dataset: xr.Dataset) -> list[Column]:
@@ -65,20 +82,43 @@ def columns(dataset: xr.Dataset) -> list[Column]:
     return found
 
 
+def selected_columns(table: list[Column], names: Sequence[str] | None) -> list[Column]:
+    """The columns with these names, or of these variables, after time; all for None. Raises InputError."""
+    if names is None:
+        return table
+    chosen = [table[0]]
+    for name in names:
+        found = [column for column in table if name in (column.name, column.variable)]
+        if not found:
+            known = ", ".join(dict.fromkeys(column.variable for column in table))
+            raise InputError(
+                f"columns: {name!r} is none; give names of columns, such as displacement_E1, or of {known}"
+            )
+        chosen += [column for column in found if column not in chosen]
+    return chosen
+
+
 def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
-    return Column(name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
+    return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
 
 
-def write_csv(result: RunData, path: str | Path) -> Path:
-    """Write a CSV file: `name [unit]` as header, one line per row; scene, events and provenance as # comments."""
+def write_csv(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+    """Write a CSV file: one comment, `name [unit]` as header, one line per row; the origin as # comments at the end.
+
+    The origin is attributes of the dataset, events, and the scene as TOML text. names, sign: as of `export_columns`.
+    """
     target = check_output(path, (".csv",))
+    shown, result = sign_of(sign), signed(result, sign)
     dataset = to_dataset(result)
-    table = columns(dataset)
+    table = selected_columns(columns(dataset), names)
     rows = np.column_stack([column.values for column in table]).tolist()
+    title = " ".join(f"{result.scene.name or 'unnamed scene'}, status {result.status}".split())
     with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
+        u = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
+        file.write(f"# {title}; {u}; {len(rows)} rows; versions, events and scene stand after them\n")
         file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
     return target
 
 
@@ -103,16 +143,21 @@ def _events(result: RunData) -> list[dict[str, Any]]:
     ]
 
 
-def write_parquet(result: RunData, path: str | Path) -> Path:
-    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow."""
+def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow.
+
+    names, sign: as of `export_columns`.
+    """
     target = check_result_path(check_output(path, (".parquet",)))
+    shown, result = sign_of(sign), signed(result, sign)
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     dataset = to_dataset(result)
-    table = columns(dataset)
+    table = selected_columns(columns(dataset), names)
     fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
     about = {str(key): str(value) for key, value in dataset.attrs.items()}
+    about["sign"] = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
     schema = pa.schema(fields, metadata=about | {"events": json.dumps(_events(result))})
     content = BytesIO()
     pq.write_table(pa.table([np.ascontiguousarray(c.values) for c in table], schema=schema), content)
@@ -141,6 +186,10 @@ def _matlab(values: Any) -> Any:
     return values.astype(object) if values.dtype.kind == "U" else values
 
 
+TABLE_WRITERS: dict[str, Callable[[RunData, str | Path, Sequence[str] | None, str], Path]] = {
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+}
 WRITERS: dict[str, Callable[[RunData, str | Path], Path]] = {
     ".nc": write_netcdf,
     ".parquet": write_parquet,

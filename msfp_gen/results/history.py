@@ -94,7 +94,7 @@ class History:
     interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
     slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
     base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
-    top_displacement: Annotated[Array, Rows(("axis",), "m", "displacement of the top plate at r_nn")]
+    top_displacement: Annotated[Array, Rows(("axis",), "m", "position r_nn of the top plate in space")]
     displacement: Annotated[
         Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
     ]

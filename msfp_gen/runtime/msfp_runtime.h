@@ -370,7 +370,9 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
 #endif
                    const double *jumps, int jump_count, const msfp_options *options,
                    const double *q, const double *v, const double *f);
-/* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). */
+/* Take up to `steps` steps. Returns 1 while there is more to do, 0 at the end (see run->status). Between two calls the
+ * coefficients of a history may be changed from run->now.t on; its values, and the rates of the motion, stay
+ * continuous there. */
 int msfp_run_advance(msfp_run *run, long steps);
 /* A snapshot of a run between two steps: bytes without pointers, with version and checksum. rows: how many of the last
  * rows it holds, without events; negative: all rows and events. `snapshot` has the size that msfp_snapshot_size gives. */

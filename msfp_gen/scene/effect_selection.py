@@ -88,14 +88,20 @@ def _rims(scene: SceneParts, requested: Auto) -> Reason:
     if scene.stop is not None and scene.stop.all_rims:
         return Reason("rims", True, "the stop condition is contact at all rims")
     capacity = min(surface.capacity for surface in scene.bearing.surfaces)
-    travel = float(np.ptp(_sampled_motion(scene)[:, :2], axis=0).max()) * np.sqrt(2)
+    farthest = _farthest(scene)
     limit = f"the smallest capacity is {1e3 * capacity:.4g} mm"
     if not (isinstance(scene.top, RigTop) and scene.top.stiffness > 0):
         return Reason("rims", True, f"a {scene.top.kind} top does not limit the sliding displacement; {limit}")
-    because = f"the base moves {1e3 * travel:.4g} mm, {limit}"
-    if scene.load is None and travel + _initial_sliding(scene) < capacity:
+    because = f"the base moves up to {1e3 * farthest:.4g} mm from its start, {limit}"
+    if scene.load is None and farthest + _initial_sliding(scene) < capacity:
         return Reason("rims", False, because, "the forces of the rims and their events")
     return Reason("rims", True, because)
+
+
+def _farthest(scene: SceneParts) -> float:
+    """Largest horizontal distance of the base from its position at the start [m]."""
+    path = scene.motion.evaluate(_sampled_times(scene))[:, :2]
+    return float(np.linalg.norm(path - path[0], axis=1).max())
 
 
 def _initial_sliding(scene: SceneParts) -> float:
@@ -244,7 +250,3 @@ def _sampled_times(scene: SceneParts) -> Array:
     load_knots = () if scene.load is None else scene.load.knots
     times = np.concatenate([scene.motion.knots, load_knots, np.linspace(0, scene.end, 1001)])
     return np.unique(times[times <= scene.end])
-
-
-def _sampled_motion(scene: SceneParts) -> Array:
-    return scene.motion.evaluate(_sampled_times(scene))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SURFACE_COLUMNS = {
     "R [mm]": ("radius", 1e3),
     "capacity [mm]": ("capacity", 1e3),
-    "friction": ("friction", 1.0),
+    "friction [-]": ("friction", 1.0),
     "yield [mm]": ("yield_displacement", 1e3),
     "damping [ms]": ("contact_damping", 1e3),
     "rim [N/m]": ("rim_stiffness", 1.0),
@@ -40,6 +40,11 @@ BODY_COLUMNS = {
     "rim radius [mm]": ("rim_radius", 1e3),
     "rim offset [mm]": ("rim_offset", 1e3),
 }
+# Units of the numbers that describe the origin of a motion (`Motion.metadata`); the others have none.
+MOTION_UNITS = {
+    "amplitude": "m", "period": "s", "lead_in": "s", "acceleration": "m/s^2", "initial_speed": "m/s",
+    "start_time": "s", "window_start": "s", "end_offset": "m",
+}  # fmt: skip
 METHODS = {
     "implicit": "L-stable, states and unknowns solved together",
     "esdirk4": "L-stable of order 4, for tight tolerances",
@@ -99,7 +104,11 @@ def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]
 def _motion(motion: Motion) -> Table:
     t = np.union1d(motion.knots, np.linspace(0, motion.duration, 4001))
     peaks = [np.abs(of(t)).max(axis=0) for of in (motion.displacement, motion.velocity, motion.acceleration)]
-    sources = [(str(key).replace("_", " "), _value(value)) for key, value in motion.metadata.items()]
+    sources = [
+        (str(key).replace("_", " "), f"{_value(value)} {MOTION_UNITS.get(key, '')}".rstrip())
+        for key, value in motion.metadata.items()
+        if value != ""
+    ]
     return Table(
         f"motion of the base: {motion.name or 'unnamed'}",
         (),
@@ -183,7 +192,7 @@ def _solver(scene: Scene) -> Table:
         (),
         [
             ("method", f"{solver.method}: {METHODS[solver.method]}"),
-            ("rtol", f"{solver.rtol:g}"),
+            ("rtol", f"{solver.rtol:g}, relative error of a step"),
             ("steps", _steps(scene)),
             ("tolerance of angles", f"{solver.angle_tolerance:g} rad"),
             ("longest step", "resolution of the motion" if solver.max_step is None else f"{solver.max_step:g} s"),

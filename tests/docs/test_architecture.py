@@ -17,8 +17,9 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
-    "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "motions", "scene",
-    "model", "results", "analysis", "figures", "result", "simulation", "studies", "report", "", "cli", "__main__",
+    "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
+    "scene", "model", "results", "analysis", "figures", "result", "simulation", "studies", "report", "", "cli",
+    "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.

@@ -16,6 +16,7 @@ from msfp_gen.motions.records.peer import read_peer
 from msfp_gen.motions.records.record import Record
 from msfp_gen.motions.records.scaling import ScaleTo, asce7_spectrum, prepared
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
+from msfp_gen.motions.records.suite import ScaledSuite, scaled_suite
 from msfp_gen.motions.records.table import Table, read_table, write_csv
 from msfp_gen.motions.records.text import Lines, read_lines
 
@@ -24,6 +25,7 @@ __all__ = [
     "Corrected",
     "Record",
     "ScaleTo",
+    "ScaledSuite",
     "Spectrum",
     "Table",
     "asce7_spectrum",
@@ -34,6 +36,7 @@ __all__ = [
     "read_record",
     "read_table",
     "response_spectrum",
+    "scaled_suite",
     "strong_window",
     "uncorrected",
     "write_csv",

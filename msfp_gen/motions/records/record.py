@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +86,38 @@ class Record:
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
         return (len(self.acceleration) - 1) * self.time_step
+
+    def with_components(self, components: Collection[str]) -> Record:
+        """The record with these components (E1, E2, E3) as they are, and zero along the others.
+
+        Raises InputError for other names, and where nothing is left.
+        """
+        if not components or set(components) - set(COMPONENTS):
+            raise InputError(f"components = {list(components)!r}: give one or more of {', '.join(COMPONENTS)}")
+        kept = np.array([name in components for name in COMPONENTS])
+        if not np.any(self.acceleration[:, kept]):
+            raise InputError(f"components = {list(components)!r}: {self.name or 'the record'} has nothing along them")
+        labels = [
+            "" if name not in components else label for name, label in zip(COMPONENTS, self.channels, strict=True)
+        ]
+        left_out = ", ".join(name for name in COMPONENTS if name not in components)
+        note = f"components left out: {left_out}" if left_out else ""
+        return self._changed(lambda values: values * kept, (labels[0], labels[1], labels[2]), note)
+
+    def rotated(self, angle: float) -> Record:
+        """The record with its horizontal components rotated by `angle` [rad] about E3, from E1 towards E2."""
+        c, s = np.cos(angle), np.sin(angle)
+        matrix = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        first, second, up = self.channels
+        turned = f"{' and '.join(filter(None, (first, second)))} rotated"
+        note = f"horizontal components rotated by {np.degrees(angle):.6g} degrees from E1 towards E2"
+        return self._changed(lambda values: values @ matrix, (turned, turned, up), note)
+
+    def _changed(self, change: Callable[[Array], Array], channels: tuple[str, str, str], note: str) -> Record:
+        """The record with a linear `change` of the rows of all its quantities."""
+        given: dict[str, Any] = {name: getattr(self, name) for name in ("acceleration", "velocity", "displacement")}
+        values: dict[str, Any] = {name: None if rows is None else change(rows) for name, rows in given.items()}
+        return replace(self, **values, channels=channels, notes=(*self.notes, *filter(None, [note])))
 
 
 def sample_times(points: int, time_step: float) -> Array:

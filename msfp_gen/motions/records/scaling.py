@@ -71,15 +71,17 @@ class ScaleTo:
         column = measure_index(self.component)
         if self.pga is not None:
             spectrum = response_spectrum(motion, [1.0])
-            return self._ratio(np.array([self.pga]), spectrum.pga[[column]])
-        if self.between is None:
-            periods = np.array([self.period], dtype=float)
-            target = np.array([self.sa], dtype=float)
-        else:
-            periods = np.geomspace(*self.between, _FIT_POINTS)
-            target = asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+            return self.ratio(np.array([self.pga]), spectrum.pga[[column]])
+        periods, target = self.ordinates()
         spectrum = response_spectrum(motion, periods, damping=self.damping, progress=progress)
-        return self._ratio(target, spectrum.psa[:, column])
+        return self.ratio(target, spectrum.psa[:, column])
+
+    def ordinates(self) -> tuple[Array, Array]:
+        """Periods [s] at which a spectrum is compared with the target, and the target there [m/s^2]; not of a peak."""
+        if self.between is None:
+            return np.array([self.period], dtype=float), np.array([self.sa], dtype=float)
+        periods = np.geomspace(*self.between, _FIT_POINTS)
+        return periods, asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
 
     def curve(self, period: Array) -> tuple[Array, Array] | None:
         """The target as a curve for a plot of spectra; None for a peak acceleration.
@@ -117,7 +119,7 @@ class ScaleTo:
                 raise InputError(f"scale_to.{name} = {value!r}: {error}") from None
         return cls(**values)
 
-    def _ratio(self, target: Array, found: Array) -> float:
+    def ratio(self, target: Array, found: Array) -> float:
         """Geometric mean of target/found, the factor of least squares of the logarithms."""
         if not np.all(found > 0):
             raise InputError(f"scale_to.component = {self.component!r}: the motion has none; choose another component")

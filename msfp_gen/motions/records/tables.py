@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from msfp_gen.motions.records.correction import Corrected
 from msfp_gen.motions.records.record import COMPONENTS, G, Record
 from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
 
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.motions.records.suite import ScaledSuite
+
 _PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0)  # [s]
 
 
@@ -19,6 +24,30 @@ def record_tables(record: Record, motion: Record | Corrected) -> list[Table]:
     """Tables of the origin of `record`, and of intensities and spectrum of `motion`: the record or its correction."""
     corrected = motion if isinstance(motion, Corrected) else None
     return [_origin(record, corrected), _intensities(record, motion), _ordinates(motion)]
+
+
+def suite_tables(names: Sequence[str], motions: Sequence[Motion], scaled: ScaledSuite | None) -> list[Table]:
+    """Tables of the motions of a suite: factor and peaks of each; of a scaled suite also the mean and its target."""
+    rows = []
+    for name, motion in zip(names, motions, strict=True):
+        peaks = np.abs(motion.acceleration(motion.knots)).max(axis=0) / G
+        row = (f"{float(motion.metadata['scale']):.4g}", f"{motion.duration:.4g}", *(f"{peak:.4f}" for peak in peaks))
+        rows.append((name, *row))
+    columns = ("record", "factor", "duration [s]", *(f"PGA {axis} [g]" for axis in COMPONENTS))
+    tables = [Table(f"suite of {len(rows)}", columns, rows)]
+    if scaled is None:
+        return tables
+    ratio, at = scaled.mean / scaled.target, np.linspace(0, len(scaled.period) - 1, min(9, len(scaled.period)))
+    shown = [
+        (
+            f"{scaled.period[i]:.3g}",
+            *(f"{values[i] / G:.4f}" for values in (scaled.mean, scaled.target)),
+            f"{ratio[i]:.3f}",
+        )
+        for i in np.unique(at.round().astype(int))
+    ]
+    title = f"mean spectrum; its least share of the target is {scaled.least_share:.3f}"
+    return [*tables, Table(title, ("period [s]", "mean [g]", "target [g]", "mean/target"), shown)]
 
 
 def arias_intensity(time: Array, acceleration: Array) -> Array:

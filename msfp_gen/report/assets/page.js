@@ -25,18 +25,18 @@ function addCharts(parent) {
   const add = (chart) => views.push(addChart(parent, chart, show));
   for (const axis of moving.length ? moving : [0]) {
     add({
-      title: `Force and displacement along E${"₁₂"[axis]}`, xlabel: `displacement ${names[axis]} [mm]`,
+      title: `Force and displacement along E${"₁₂"[axis]}`, xlabel: `${names[axis]} = base − top [mm]`,
       ylabel: `force on the top F${"₁₂"[axis]} [kN]`, lines: [{ x: u[axis], y: force[axis], colour: colours[axis] }],
     });
   }
   if (moving.length === 2) {
-    add({ title: "Orbit", xlabel: "u₁ [mm]", ylabel: "u₂ [mm]", equal: true, lines: [{ x: u[0], y: u[1], colour: "#009E73" }] });
+    add({ title: "Orbit", xlabel: "u₁ = base − top [mm]", ylabel: "u₂ = base − top [mm]", equal: true, lines: [{ x: u[0], y: u[1], colour: "#009E73" }] });
   }
   const surfaces = (name, read) => surfaceNumbers.map((j) => ({
     name: `${name} ${j + 1}`, colour: colourOf(j), x: time, y: column((frame) => read(frame, j)),
   }));
   add({
-    title: "Displacement", xlabel: "time t [s]", ylabel: "displacement [mm]", timed: true,
+    title: "Displacement", xlabel: "time t [s]", ylabel: "u = base − top [mm]", timed: true,
     lines: (moving.length ? moving : [0]).map((axis) => ({ name: names[axis], x: time, y: u[axis], colour: colours[axis] })),
   });
   add({
@@ -80,6 +80,7 @@ function addPlayer() {
   let playing = false;
   let begun = 0;
   let from = 0;
+  let fresh = true; // the page opens at the peak, but plays from the start
   const button = find("play");
   const stop = () => {
     playing = false;
@@ -96,7 +97,8 @@ function addPlayer() {
   };
   const clock = () => { [begun, from] = [performance.now(), at("time", current)]; };
   const start = () => {
-    if (current === frameCount - 1) show(0);
+    if (fresh || current === frameCount - 1) show(0);
+    fresh = false;
     playing = true;
     clock();
     button.textContent = "Pause";
@@ -105,6 +107,7 @@ function addPlayer() {
   button.addEventListener("click", () => (playing ? stop() : start()));
   find("speed").addEventListener("change", clock);
   find("frame").addEventListener("input", (event) => {
+    fresh = false;
     stop();
     show(Number(event.target.value));
   });
@@ -117,6 +120,7 @@ function addSettings(scene) {
   for (const name of ["open", "forces", "still"]) {
     find(name).addEventListener("change", (event) => {
       scene.settings[name] = event.target.checked;
+      if (name === "still") scene.setView();
       scene.show(current);
     });
   }
@@ -147,5 +151,5 @@ addCharts(find("charts"));
 addReadout();
 addPlayer();
 addEvents();
-show(0);
+show(report.peak);
 document.documentElement.dataset.ready = "true";

@@ -88,6 +88,40 @@ function lights(scene) {
   scene.add(sun);
 }
 
+// Radius and height of a cylinder about E3 that contains the bodies in all frames; with the motion of the base unless it
+// is held still.
+function cylinder(still) {
+  let [radius, top] = [0, 0];
+  for (let frame = 0; frame < frameCount; frame += 1) {
+    const [x, y] = still ? [0, 0] : at("base", frame);
+    report.bodies.forEach((pieces, body) => {
+      const points = pieces.flatMap((piece) => piece.points);
+      const bottom = at("bottom", frame, body);
+      radius = Math.max(radius, Math.hypot(bottom[0] + x, bottom[1] + y) + Math.max(...points.map(([r]) => r)));
+      top = Math.max(top, bottom[2] + Math.max(...points.map(([, h]) => h)));
+    });
+  }
+  return [radius, top];
+}
+
+// Points on the edges of that cylinder, relative to the target of the camera.
+function corners([radius, top], target) {
+  const angles = Array.from({ length: 16 }, (_, k) => (Math.PI * k) / 8);
+  return [0, top].flatMap((z) => angles.map((angle) => (
+    new THREE.Vector3(radius * Math.cos(angle), radius * Math.sin(angle), z).sub(target)
+  )));
+}
+
+// The least distance of the camera along `away` from which all corners are in the frame.
+function fittingDistance(points, away, camera) {
+  const right = new THREE.Vector3().crossVectors(camera.up, away).normalize();
+  const up = new THREE.Vector3().crossVectors(away, right);
+  const high = Math.tan((camera.fov * Math.PI) / 360);
+  return 1.05 * Math.max(...points.map((point) => point.dot(away) + Math.max(
+    Math.abs(point.dot(right)) / (high * camera.aspect), Math.abs(point.dot(up)) / high,
+  )));
+}
+
 // Adds the view to `parent`. Returns { show, setView, settings }, or null if the browser has no WebGL.
 function addScene(parent) {
   const canvas = element(parent, "canvas", { role: "img", "aria-label": "The bearing in three dimensions; drag to turn, wheel to zoom" });
@@ -104,7 +138,7 @@ function addScene(parent) {
   const reach = Math.max(...report.bodies.flat(2).flatMap((piece) => piece.points.map(([r]) => r)));
   const height = at("bottom", 0, report.bodies.length - 1)[2] + 0.1 * reach;
   const stack = new THREE.Group();
-  scene.add(stack, floor(3.4 * reach));
+  scene.add(stack, floor(2.4 * cylinder(true)[0]));
   const solids = report.bodies.map((pieces, body) => {
     const both = [bodyGroup(pieces, body, true), bodyGroup(pieces, body, false)];
     const group = new THREE.Group();
@@ -132,7 +166,8 @@ function addScene(parent) {
     const [c, s] = horizontal;
     const away = new THREE.Vector3(c * x - s * y, s * x + c * y, z).normalize();
     controls.target.set(0, 0, height / 2);
-    camera.position.copy(controls.target).addScaledVector(away, 5.6 * reach);
+    const distance = fittingDistance(corners(cylinder(settings.still), controls.target), away, camera);
+    camera.position.copy(controls.target).addScaledVector(away, distance);
     controls.update();
     draw();
   };
@@ -158,7 +193,7 @@ function addScene(parent) {
     renderer.setSize(clientWidth, clientHeight, false);
     camera.aspect = clientWidth / clientHeight;
     camera.updateProjectionMatrix();
-    draw();
+    setView();
   }).observe(parent);
   setView();
   return { show, setView, settings };

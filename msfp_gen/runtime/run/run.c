@@ -266,6 +266,11 @@ static int finished(const msfp_run *run)
 
 int msfp_run_advance(msfp_run *run, long steps)
 {
+    /* The caller may have changed coefficients of a history since the last call. */
+    run->motion.held = run->load.held = 0;
+#if MSFP_TOP_ROTATION
+    run->support.held = 0;
+#endif
     for (long i = 0; i < steps && run->status == MSFP_OK; ++i) {
         if (finished(run))
             return 0;

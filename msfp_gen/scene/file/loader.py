@@ -52,11 +52,7 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        return scene_from_table(_changed(toml_table(path.read_text(encoding="utf-8-sig")), changes), path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
+        return scene_from_table(_changed(toml_file(path), changes), path.parent)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -75,6 +71,16 @@ def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
                 raise InputError(f"{path} = {value!r}: {name} is {inner!r} here, which has no fields to change")
         inner[last] = value
     return table
+
+
+def toml_file(path: Path) -> Table:
+    """The table of a TOML file; raises InputError, without the path, where it cannot be read or is not valid."""
+    try:
+        return toml_table(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror}); check the file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
 
 
 def toml_table(text: str) -> Table:

@@ -9,13 +9,17 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from msfp_gen.common.fields import Notes, Quantity, Text
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.file.prescribed_tables import ROTATIONS, history_from
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.records import Record
 
 RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
 _LENGTH = Quantity("m", above=0.0)
@@ -34,6 +38,17 @@ class Paths(Text):
         if not (isinstance(value, str) or several):
             raise ValueError("give a text in quotes, or a list of them: one file for each component")
         return value if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Components(Text):
+    """A list of components of a record."""
+
+    def parse(self, value: object, *, text: bool = False) -> Any:
+        """`value` as a tuple; raises ValueError whose text is the remedy."""
+        if not (isinstance(value, list | tuple) and value and set(map(str, value)) <= {"E1", "E2", "E3"}):
+            raise ValueError("give a list of E1, E2 and E3, or some of them")
+        return tuple(value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,12 +138,15 @@ class Ramp(MotionTable):
 class RecordMotion(MotionTable):
     """`Motion.from_record`: one file, one file for each component, or a record bundled with the package.
 
-    `scale_to` is a table of the fields of `records.ScaleTo`.
+    components: those that are kept; the others are zero. rotated_by: rotation of the horizontal components that are
+    kept, about E3 from E1 towards E2. scale_to: a table of the fields of `records.ScaleTo`.
     """
 
     kind: ClassVar[str] = "record"
     file: Annotated[str | tuple[str, ...] | None, Paths()] = None
     bundled: str | None = None
+    components: Annotated[tuple[str, ...] | None, Components()] = None
+    rotated_by: Annotated[float | None, Quantity("rad")] = None
     scale: Annotated[float, Quantity("")] = 1.0
     scale_to: Mapping[str, Any] | None = None
     start: Annotated[float | None, Quantity("s", least=0.0)] = None
@@ -138,18 +156,18 @@ class RecordMotion(MotionTable):
     taper: Annotated[float, _TIME] = 1.0
 
     def _motion(self) -> Motion:
-        from msfp_gen.motions import records
+        from msfp_gen.motions.records import ScaleTo
 
         if (self.file is None) == (self.bundled is None):
             found = "neither is" if self.file is None else "both are"
             raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
-        if self.bundled is not None:
-            record = records.bundled(self.bundled)
-        else:
-            files = [self.file] if isinstance(self.file, str) else self.file or ()
-            record = records.read_record(*map(_existing, files))
-        target = None if self.scale_to is None else records.ScaleTo(**self.scale_to)
-        values = self._values("file", "bundled", "scale_to")
+        files = [self.file] if isinstance(self.file, str) else self.file or ()
+        paths = [_existing(file) for file in files]
+        record = _record(self.bundled, tuple(paths), tuple(_stamp(path) for path in paths))
+        record = record if self.components is None else record.with_components(self.components)
+        record = record if self.rotated_by is None else record.rotated(self.rotated_by)
+        target = None if self.scale_to is None else ScaleTo(**self.scale_to)
+        values = self._values("file", "bundled", "components", "rotated_by", "scale_to")
         return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
 
 
@@ -185,6 +203,20 @@ class Pieces(MotionTable):
         table = {"kind": cls.kind, **{name: getattr(motion, name).tolist() for name in names}}
         rest = {"max_step": motion.max_step, "name": motion.name, "metadata": dict(motion.metadata)}
         return table | {name: value for name, value in rest.items() if value is not None}
+
+
+@lru_cache(maxsize=8)
+def _record(bundled: str | None, paths: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> Record:
+    """A record, read once for all scenes of a sweep; `stamps` tell a file that has changed since."""
+    from msfp_gen.motions import records
+
+    return records.read_record(*paths) if bundled is None else records.bundled(bundled)
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Time of the last change [ns] and size [bytes] of a file."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
 
 
 def resolved(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import changed_scene
 
 if TYPE_CHECKING:
+    from msfp_gen.scene.file.suite import SuiteRecord
     from msfp_gen.scene.scene import Scene
 
 MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
+
+
+class Variation(NamedTuple):
+    """A scene of a sweep: the file or preset that it comes from, and the varied fields by their paths."""
+
+    source: str
+    varied: Mapping[str, Any]
+    scene: Scene
 
 
 def varied_field(text: str) -> tuple[str, list[Any]]:
@@ -35,25 +44,35 @@ def varied_field(text: str) -> tuple[str, list[Any]]:
     return path, found
 
 
-def varied_scenes(source: str | Path, fields: Sequence[tuple[str, list[Any]]]) -> list[Scene]:
+def variations(
+    source: str | Path, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord] = ()
+) -> list[Variation]:
     """The scenes of all combinations of values, the last field varying fastest; their names state the values.
 
-    source: scene file or preset. fields: path and values of each. Raises InputError: a field is given twice, does not
-    exist, or does not accept a value.
+    source: scene file or preset. fields: path and values of each. records: of a suite, in place of the motion of the
+    scene; they vary slowest, as the field "record". Raises InputError: a field is given twice, does not exist, or does
+    not accept a value.
     """
     paths = [path for path, _ in fields]
+    if records and (motion := [path for path in paths if path.partition(".")[0] == "motion"]):
+        raise InputError(f"--vary {motion[0]}: --suite gives the motion; change its records there")
     if repeated := [path for path in paths if paths.count(path) > 1]:
         raise InputError(f"--vary {repeated[0]}: given twice; give all its values at once")
     combinations = list(product(*(values for _, values in fields)))
-    if len(combinations) > MAX_SCENES:
-        raise InputError(f"--vary: {len(combinations)} combinations; give at most {MAX_SCENES}")
+    if len(combinations) * max(len(records), 1) > MAX_SCENES:
+        each = " for each record" if records else ""
+        raise InputError(f"--vary: {len(combinations)} combinations{each}; give at most {MAX_SCENES} in all")
     return [
-        _named(changed_scene(source, dict(zip(paths, values, strict=True))), source, paths, values)
+        _variation(source, dict(zip(paths, values, strict=True)), record)
+        for record in records or (None,)
         for values in combinations
     ]
 
 
-def _named(scene: Scene, source: str | Path, paths: Sequence[str], values: Sequence[Any]) -> Scene:
-    values_text = ", ".join(f"{path} = {value}" for path, value in zip(paths, values, strict=True))
+def _variation(source: str | Path, varied: dict[str, Any], record: SuiteRecord | None) -> Variation:
+    scene = changed_scene(source, varied)
+    if record is not None:
+        scene, varied = record.of(scene), {"record": record.name, **varied}
+    values_text = ", ".join(f"{path} = {value}" for path, value in varied.items())
     name = scene.name or Path(source).stem
-    return replace(scene, name=f"{name}, {values_text}" if values_text else name)
+    return Variation(str(source), varied, replace(scene, name=f"{name}, {values_text}" if values_text else name))

@@ -169,6 +169,22 @@ def validate_bearing(table: Mapping[str, Any]) -> Table:
     return _validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
 
 
+def validate_suite(table: Mapping[str, Any]) -> Table:
+    """The same for the table of a suite of records: `records`, and `scale_to` with `least_share`."""
+    return _validate(_SUITE, table)
+
+
+_SHARE = Annotated[Any, PlainValidator(partial(Quantity("", above=0.0).parse, text=True))]
+_SUITE_MOTION = _model(motion_tables.RecordMotion, **_inner(motion_tables.RecordMotion))
+_SUITE_TARGET = _model(ScaleTo, least_share=(_SHARE, None))
+_SUITE: Model = create_model(
+    "Suite",
+    __base__=_Strict,
+    records=(_rows(_SUITE_MOTION), ...),
+    scale_to=(_SUITE_TARGET, None),
+)
+_TABLES |= {"records": _SUITE_MOTION, "records.scale_to": _SCALE_TO, "scale_to": _SUITE_TARGET}
+
 _ONLY_BEARING = create_model("OnlyBearing", __base__=_Strict, bearing=(_EITHER, ...))
 
 

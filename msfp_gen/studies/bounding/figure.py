@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.figures import COLOURS, INK, MILLI, engineering, moving_axes, page
+from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, moving_axes, page
 from msfp_gen.figures.style import THIN, headline, subscript
+from msfp_gen.results.sign import shown_sign
 from msfp_gen.studies.bounding.runs import CASES
 
 if TYPE_CHECKING:
@@ -43,15 +44,15 @@ def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
 def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
     forces = [case.result.history.top_force[:, axis] for case in cases if case.result]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
-    for case, force in zip(cases, forces, strict=True):
+    for case, values in zip(cases, forces, strict=True):
         assert case.result is not None
-        u = case.result.history.displacement[:, axis] * MILLI
-        axes.plot(u, force * scale.factor, label=_label(found, case), linewidth=THIN, **LINE_STYLES[case.name])
+        u = displacement(case.result.history.displacement[:, axis])
+        axes.plot(u, force(values, scale), label=_label(found, case), linewidth=THIN, **LINE_STYLES[case.name])
     sign = subscript(axis + 1)
     axes.set(
         title=f"Force and displacement along E{sign}",
-        xlabel=f"displacement across the bearing u{sign} [mm]",
-        ylabel=f"force on the top support F{sign} [{scale.unit}]",
+        xlabel=f"displacement across the bearing {displacement_label(axis)}",
+        ylabel=f"force {shown_sign().force} F{sign} [{scale.unit}]",
     )
     axes.margins(0.06)
     handles, labels = axes.get_legend_handles_labels()

@@ -10,7 +10,9 @@ import pytest
 from support import preset_run
 
 from msfp_gen.errors import InputError
-from msfp_gen.figures import animate
+from msfp_gen.figures import animate, movie, page
+from msfp_gen.results.geometry.section import sections
+from msfp_gen.results.resample import at_times
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}
 
@@ -26,10 +28,53 @@ def test_gif_has_its_frames_and_they_move(tmp_path):
         for index in range(3):
             movie.seek(index)
             frames.append(np.asarray(movie.convert("RGB"), dtype=int))
-    assert frames[0].shape == (400, 800, 3)
+    assert frames[0].shape[1] == 800 and frames[0].shape[0] % 2 == 0
     assert all(np.abs(one - other).max() > 100 for one, other in pairwise(frames))
     assert told == [(1, 3), (2, 3), (3, 3)]
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_frame_is_what_a_complete_drawing_shows():
+    """Moving artists over a copy of what stands still gives every pixel that drawing all of them gives."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    result = preset_run("fenz-test5")
+    frames = at_times(result, [40.0, 100.0, 150.0])
+    found = sections(frames)
+    with page(10.0, 5.5) as figure:
+        moved = list(movie._pictures(figure, result, frames, found, None))
+    with page(10.0, 5.5) as figure:
+        figure.set_dpi(movie.DOTS)
+        canvas = FigureCanvasAgg(figure)
+        update, moving = movie._layout(figure, result, frames, found)
+        canvas.draw()
+        figure.set_layout_engine("none")
+        for row, picture in enumerate(moved):
+            update(row)
+            canvas.draw()
+            whole = np.array(canvas.buffer_rgba(), dtype=int)
+            assert (np.abs(whole - picture).max(axis=-1) > 60).mean() < 2e-3  # curves overlap the frame of their axes
+    assert {artist.axes for artist in moving if artist.axes is not None} == set(figure.axes)
+
+
+def test_the_section_spans_the_movie():
+    """No half of the picture is white: bodies cover most columns of the upper part."""
+    result = preset_run("fenz-test5")
+    frames = at_times(result, np.linspace(0, 300, 7))
+    with page(10.0, movie._height(sections(frames))) as figure:
+        pictures = np.array(list(movie._pictures(figure, result, frames, sections(frames), None)))[..., :3]
+    height = pictures.shape[1]
+    drawn = (pictures.min(axis=(0, 3)) < 235)[round(0.25 * height) : round(0.5 * height)]
+    assert drawn.any(axis=0).mean() > 0.8
+
+
+def test_what_stands_still_is_drawn_once(tmp_path, monkeypatch):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    drawn, draw = [], FigureCanvasAgg.draw
+    monkeypatch.setattr(FigureCanvasAgg, "draw", lambda canvas: drawn.append(canvas) or draw(canvas))
+    animate(preset_run("fenz-test5"), tmp_path / "m.gif", **SHORT)
+    assert len(drawn) == 1
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")

@@ -17,8 +17,8 @@ from support.synthetic import loops, opened
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
-from msfp_gen.report import report_html, write_report
-from msfp_gen.report.content import provenance_table, summary_numbers, summary_page
+from msfp_gen.report import TitleBlock, report_html, write_report
+from msfp_gen.report.content import TERMS, provenance_table, settings_page, summary_numbers, summary_page
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
 from msfp_gen.report.page import FIGURES
 from msfp_gen.result import Result
@@ -106,9 +106,38 @@ def test_every_number_of_the_tables_is_in_the_summary():
 
 def test_page_asks_for_no_other_file(page):
     links = Cells(page).links
-    assert len(links) == 2 and all(link.startswith("data:") for link in links)
+    assert len(links) == 3 and all(link.startswith(("data:", "#")) for link in links)
     assert not re.search(r"@import|url\((?!#)", page.partition("</style>")[0])
     assert "default-src 'none'" in page and "<script src" not in page
+
+
+def test_title_block_and_terms(saved, tmp_path):
+    result = Result.from_netcdf(saved)
+    path = tmp_path / "a.html"
+    words = ["--project", "Block <B>", "--date", "2026-03-01", "--revision", "2", "--code", "ASCE 7-22"]
+    assert main(["report", str(saved), "-o", str(path), *words]) == 0
+    text = path.read_text(encoding="utf-8")
+    shown = re.findall(r"<dt>([^<]+)</dt><dd>([^<]+)</dd>", text.partition("</header>")[0])
+    assert shown == [
+        ("project", "Block &lt;B&gt;"),
+        ("device", "triple friction pendulum, 4 sliding surfaces"),
+        ("date", "2026-03-01"),
+        ("revision", "2"),
+        ("code edition", "ASCE 7-22"),
+    ]
+    assert [name for name, _ in TitleBlock(device="TFP 7").rows(result)] == ["device"]
+    assert all(f"<dt>{term}</dt>" in text for term, _ in TERMS)
+
+
+def test_every_number_of_the_settings_has_its_unit():
+    """But for counts, shares of a sum, and numbers inside a sentence."""
+    result = preset_run("fenz-test5")
+    plain = {"cycles", "fraction", "scale", "rtol"}
+    for table in settings_page(result):
+        for row in table.rows:
+            if not table.columns and len(row) == 2 and row[0] not in plain:
+                assert not re.fullmatch(r"[-+\d.e, ]*\d", row[1]), row
+    assert ("amplitude", "0.14 m") in {row[:2] for table in settings_page(result) for row in table.rows}
 
 
 def test_page_is_the_same_on_every_machine(page, saved):

@@ -110,6 +110,47 @@ def test_it_loads_offline_without_a_word_in_the_console(browser, page):
     assert asked == {page.as_uri()}
 
 
+def test_it_opens_at_the_peak_and_plays_from_the_start(start, page, saved):
+    browser = start()
+    browser.get(page.as_uri())
+    u = read_netcdf(saved)["displacement"].values[:, :2]
+    shown = js(browser, "return [...at('displacement', current)].slice(0, 2)")
+    assert np.hypot(*shown) == pytest.approx(np.hypot(*u.T).max(), rel=2e-3)
+    assert js(browser, "return current") == js(browser, "return report.peak") > 0
+    browser.find_element("id", "play").click()
+    assert js(browser, "return at('time', current)") < 5
+
+
+@pytest.mark.parametrize("still", [True, False])
+def test_the_bearing_stays_inside_the_frame(browser, still):
+    """At both ends of the motion and from every side, no drawn pixel of a body touches the edge of the view."""
+    last = int(browser.find_element("id", "frame").get_attribute("max"))
+    js(browser, "const e = document.getElementById('still'); if (e.checked !== arguments[0]) e.click();", still)
+    if js(browser, "return document.getElementById('forces').checked"):
+        browser.find_element("id", "forces").click()
+    for view in ("oblique", "side", "above"):
+        browser.find_element("css selector", f"[data-view={view}]").click()
+        for frame in (js(browser, "return report.peak"), last // 2):
+            move(browser, frame)
+            assert js(browser, EDGE) == 0, (view, frame)
+    browser.find_element("id", "forces").click()
+    js(browser, "const e = document.getElementById('still'); if (!e.checked) e.click();")
+    browser.find_element("css selector", "[data-view=oblique]").click()
+
+
+# How many pixels on the border of the view are opaque: bodies are, the grid on the floor is not.
+EDGE = """
+const canvas = document.querySelector("#scene canvas");
+const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+const pen = copy.getContext("2d");
+pen.drawImage(canvas, 0, 0);
+const { width, height } = copy;
+const opaque = (...box) => pen.getImageData(...box).data.filter((value, k) => k % 4 === 3 && value === 255).length;
+const borders = [[0, 0, width, 1], [0, height - 1, width, 1], [0, 0, 1, height], [width - 1, 0, 1, height]];
+return borders.reduce((sum, box) => sum + opaque(...box), 0);
+"""
+
+
 def test_the_slider_moves_every_view(browser):
     last = int(browser.find_element("id", "frame").get_attribute("max"))
     seen = []

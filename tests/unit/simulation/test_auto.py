@@ -86,6 +86,19 @@ def test_loads_decide_uplift_and_capacity_decides_rims() -> None:
     assert "21.5 mm" in chosen(gentle, "rims")[1]
 
 
+def test_the_rims_are_judged_by_the_largest_distance_of_the_base_from_its_start() -> None:
+    """Not by the range of the motion, and not by its components: 400 mm each way along 30 degrees is 400 mm."""
+    far = Motion.harmonic(0.4, 0.5, direction=np.radians(30))
+    assert "up to 400 mm from its start" in chosen(replace(TEST2, effects=Auto(), motion=far, duration=None), "rims")[1]
+    eight = Motion.figure_eight(0.4, 1.0)
+    t = np.linspace(0, eight.duration, 100_001)
+    farthest = np.hypot(*eight.displacement(t)[:, :2].T).max()
+    because = chosen(replace(TEST2, effects=Auto(), motion=eight, duration=None), "rims")[1]
+    assert f"up to {1e3 * farthest:.4g} mm" in because and farthest == pytest.approx(0.5, rel=1e-3)
+    near = Motion.harmonic(0.021, 0.2)  # less than 21.5 mm each way, more from one side to the other
+    assert chosen(replace(TEST2, effects=Auto(), motion=near, duration=None), "rims")[0] is False
+
+
 def test_what_a_file_leaves_out_is_chosen_and_what_it_gives_stands() -> None:
     table = {
         "bearing": "fenz-tfp",

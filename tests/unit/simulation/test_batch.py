@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -43,7 +42,7 @@ from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.file.loader import changed_scene
-from msfp_gen.scene.file.parameter_sweep import varied_field, varied_scenes
+from msfp_gen.scene.file.parameter_sweep import variations, varied_field
 from msfp_gen.scene.scene import InitialState
 from msfp_gen.simulation import batch
 
@@ -296,11 +295,13 @@ def test_the_number_of_workers_is_that_of_the_cores_or_as_asked(monkeypatch: pyt
 
 def test_fields_take_several_values() -> None:
     fields = [varied_field("solver.rtol=1e-3, 1e-4"), varied_field("bearing.gravity = 9.81, 9.8")]
-    scenes = varied_scenes("fenz-test2", fields)
+    found = variations("fenz-test2", fields)
+    assert found[1].source == "fenz-test2" and found[1].varied == {"solver.rtol": 1e-3, "bearing.gravity": 9.8}
+    scenes = [variation.scene for variation in found]
     values = [(scene.solver.rtol, scene.bearing.gravity) for scene in scenes]
     assert values == [(1e-3, 9.81), (1e-3, 9.8), (1e-4, 9.81), (1e-4, 9.8)]
     assert scenes[1].name == "fenz-test2, solver.rtol = 0.001, bearing.gravity = 9.8"
-    assert varied_scenes("fenz-test2", []) == [load_scene("fenz-test2")]
+    assert [variation.scene for variation in variations("fenz-test2", [])] == [load_scene("fenz-test2")]
 
 
 @pytest.mark.parametrize(
@@ -319,21 +320,3 @@ def test_fields_that_are_none(text: str, words: str, capsys: pytest.CaptureFixtu
     assert main(["batch", "fenz-test1", "--vary", text]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("error: ") and err.count("\n") == 1 and words in err
-
-
-def test_the_command(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "runs"
-    assert main(["batch", "fenz-test1", "fenz-test2", "--vary", "solver.rtol=1e-2,1e-3", "-o", str(folder)]) == 0
-    out, err = capsys.readouterr()
-    assert "4 runs" in out and "fenz-test2, solver.rtol = 0.001" in out
-    names = sorted(path.name for path in folder.iterdir())
-    assert names[0] == "1-fenz-test1-solver.rtol=0.01.nc" and len(names) == 4 and err.count("wrote ") == 4
-    assert Result.from_netcdf(folder / names[3]).scene.solver.rtol == 1e-3
-    assert main(["batch", "fenz-test1", "--json", "--workers", "1"]) == 0
-    assert [run["status"] for run in json.loads(capsys.readouterr().out)] == ["ok"]
-
-
-def test_the_command_says_what_failed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["batch", "fenz-test1", "--vary", "solver.max_steps=5,100000"]) == 1
-    out, err = capsys.readouterr()
-    assert "steps" in out and "error: 1 of 2 runs did not reach their end; the first: fenz-test1" in err

@@ -1,0 +1,268 @@
+"""Write docs/scene.md, every key of a scene file, from its schema: `python docs/make_scene_reference.py`.
+
+What a key takes and its default come from the rules that the reader of scene files checks; only the meanings are here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import MISSING
+from pathlib import Path
+from typing import Any
+
+from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
+from msfp_gen.motions.records import ScaleTo
+from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.file import motion_tables, schema
+from msfp_gen.scene.file.motion_tables import Components, Paths
+from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.specification.layout import Auto, Layout
+
+TARGET = Path(__file__).with_name("scene.md")
+
+INTRODUCTION = """# Scene files: every key
+
+Written by `docs/make_scene_reference.py` from the schema that reads scene files; do not edit.
+
+A scene is a TOML file. Numbers are SI; a text may carry a unit (`"75 mm"`). Unknown keys are errors. The
+[tutorial](tutorial.md) builds a scene step by step, `msfp-gen explain SCENE` prints one as the program reads it.
+Surfaces and bodies are listed from the bottom; body 1 is the base, `[[bearing.bodies]]` begins with body 2.
+"""
+
+KIND = "Which of the tables of this section it is."
+NAME = "A label for figures and files."
+CYCLES = "Number of full cycles after the smooth start."
+LEAD = "Duration of the smooth start."
+FORCE, MOMENT = "Force on the top plate along E1, E2, E3.", "Moment on the top plate along E1, E2, E3."
+KNOTS, COEFFICIENTS = "Ends of the pieces, from zero.", "Piece, channel, ascending power of the time since the knot."
+ROTATIONAL = "Against tilt and spin of the top plate."
+LAW = "Parameter of a friction law ([friction.md](friction.md))."
+DIRECTION = "Azimuth from E1 towards E2."
+
+# Key -> meaning, for all tables; where a table means something else by a key, under "table.key".
+MEANINGS = {
+    "name": NAME,
+    "kind": KIND,
+    "bearing": "The bearing: `[bearing]`, or the name of a preset.",
+    "motion": "Motion of the base: `[motion]`.",
+    "top": "What stands on the bearing: `[top]`.",
+    "load": "Load history on the top plate: `[load]` ([loads.md](loads.md)).",
+    "top_rotation": "Rotation of the support of the top plate: `[top_rotation]` ([loads.md](loads.md)).",
+    "effects": 'What is modelled: `[effects]`, or `"auto"` ([effects.md](effects.md)).',
+    "solver": "Settings of the integration: `[solver]`.",
+    "initial_state": "State at the start: `[initial_state]`; without it centred and at rest.",
+    "stop": "Conditions that end the run early: `[stop]`.",
+    "scene.duration": "Length of the run; without it that of the motion.",
+    "output_step": "Distance of the rows of results; without it every step of the solver.",
+    "layout": "Numbers of bodies and surfaces: `n`, `m`, `p`.",
+    "surfaces": "One table for each sliding surface.",
+    "bodies": "One table for each moving body, from body 2 to the top plate.",
+    "preset": "Name of a preset bearing; other keys change it. A list has one value for each surface or body.",
+    "base_height": "Height of the base at its axis.",
+    "gravity": "Acceleration of gravity.",
+    "base_rim_radius": "Radius of the edge of the base that meets a rim, where the base is a slider.",
+    "base_rim_offset": "Height of that edge above its face.",
+    "base_centroid": "Centre of mass of the base above its bottom.",
+    "n": "Number of bodies, with base and top plate; n = m + p + 1.",
+    "m": "Number of surfaces that are concave up, the lower ones.",
+    "p": "Number of surfaces that are concave down, above them.",
+    "radius": "Radius R of the sphere.",
+    "capacity": "Sliding displacement at which the slider meets the rim.",
+    "friction": "Friction coefficient.",
+    "effects.friction": "What the friction coefficient depends on ([friction.md](friction.md)).",
+    "yield_displacement": "Slip over which friction builds up; 0.25 to 1 mm in practice.",
+    "rim_stiffness": "Stiffness of the rim ([faq.md](faq.md#how-stiff-is-a-rim)).",
+    "rim_damping": "Damping of the rim.",
+    "seat_stiffness": "Stiffness of the unilateral contact, with uplift ([uplift.md](uplift.md)).",
+    "seat_damping": "Damping of that contact, over its stiffness and compression.",
+    **dict.fromkeys(
+        (
+            "friction_slow",
+            "velocity_rate",
+            "velocity_drop",
+            "reference_pressure",
+            "pressure_ratio",
+            "temperature_ratio",
+            "patch_radius",
+            "conductivity",
+            "diffusivity",
+            "start_temperature",
+            "c1",
+            "c2",
+            "c3",
+            "c4",
+        ),
+        LAW,
+    ),
+    "height": "Height of the body at its axis.",
+    "centroid": "Centre of mass above the lowest point of the axis.",
+    "mass": "Mass.",
+    "inertia": "Moments of inertia (transverse, axial) about the centre of mass, or one value for both.",
+    "rim_radius": "Radius of the edge that meets a rim; needed of sliders.",
+    "rim_offset": "Height of that edge above the face.",
+    "hold": "Time without motion after the end.",
+    "rotation": "Rotation of the base: a table as `[top_rotation]`.",
+    "amplitude": "Amplitude of the displacement.",
+    "frequency": "Frequency.",
+    "angular_frequency": "Angular frequency.",
+    "direction": DIRECTION,
+    "cycles": CYCLES,
+    "lead_in": LEAD,
+    "acceleration": "Constant acceleration from rest.",
+    "duration": "Duration.",
+    "motion.record.duration": "Length of the window; without it to the end of the record.",
+    "records.duration": "Length of the window; without it to the end of the record.",
+    "file": "File of the record, or one for each component; relative to the scene file ([data.md](data.md)).",
+    "motion.arrays.file": "CSV file with columns of time and displacement, velocity or acceleration.",
+    "bundled": "Name of a record that comes with the package, in place of `file`.",
+    "components": "Components that are kept; the others are zero.",
+    "rotated_by": "Rotation of the horizontal components about E3, from E1 towards E2.",
+    "scale": "Factor on the motion.",
+    "scale_to": "Target of scaling: `[motion.scale_to]` ([data.md](data.md#scaling)).",
+    "start": "Start of the window; without it the strongest window of the given duration.",
+    "correct": "Whether the baseline is corrected.",
+    "corner": "Corner frequency of the high-pass filter.",
+    "taper": "Duration of the smooth start and end.",
+    "knots": KNOTS,
+    "coefficients": COEFFICIENTS,
+    "jumps": "Knots at which the acceleration may jump.",
+    "max_step": "Longest step of the integration.",
+    "metadata": "Origin of the motion, for information.",
+    "pga": "Peak ground acceleration.",
+    "sa": "Pseudo-acceleration at `period`.",
+    "period": "Period of `sa`.",
+    "sds": "Ordinate of the design spectrum at short periods.",
+    "sd1": "Ordinate of the design spectrum at 1 s.",
+    "long_period": "Transition period T_L of the design spectrum.",
+    "between": "Shortest and longest period of the fit.",
+    "component": "Component or measure that meets the target.",
+    "damping": "Damping of the horizontal springs.",
+    "motion.record.scale_to.damping": "Damping ratio of the spectra.",
+    "scale_to.damping": "Damping ratio of the spectra.",
+    "least_share": "Least share of the target that the mean spectrum reaches; without it least squares.",
+    "axial_load": "Constant load, downwards.",
+    "stiffness": "Stiffness of the horizontal springs that hold the top plate.",
+    "rotational_stiffness": ROTATIONAL,
+    "rotational_damping": ROTATIONAL,
+    "force": FORCE,
+    "moment": MOMENT,
+    "top.mass.mass": "Supported mass.",
+    "top.mass.height": "Height of its centre of mass above the top plate.",
+    "phase": "Phase of the sine.",
+    "time": "Times of the samples.",
+    "psi": "Rotation about E1.",
+    "theta": "Rotation about E2.",
+    "angles": "psi, theta at these times.",
+    "dimension": "Motion in one vertical plane, or in space.",
+    "sliders": "Whether sliders have inertia.",
+    "rims": "Whether sliders are stopped by rims.",
+    "uplift": "Whether surfaces can open.",
+    "spin": "Rotation of the bodies about their own axes.",
+    "bouc_wen": "Hysteresis law: one switch for each axis, or one along the slip.",
+    "friction_law": 'Formula of the friction coefficient, with `friction = "custom"`.',
+    "error": "Permitted effect of what is left out, as a share of the friction force.",
+    "method": "Method of integration ([accuracy.md](accuracy.md)).",
+    "rtol": "Relative tolerance of a step.",
+    "atol_angle": "Absolute tolerance of angles; without it a hundredth of `rtol`.",
+    "solver.max_step": "Longest step; without it the resolution of the motion.",
+    "first_step": "First step; without it chosen by the method.",
+    "max_steps": "Number of steps after which a run ends with the status `steps`.",
+    "q": "psi, theta, phi of bodies 2 to n.",
+    "v": "Their rates.",
+    "h": "Friction state Y, Z of each surface, within the unit disc.",
+    "displacement": "Horizontal displacement across the bearing.",
+    "all_rims": "Whether contact at every rim ends the run.",
+}
+
+# Heading, path of the table in the schema, class whose fields have the rules.
+SECTIONS: list[tuple[str, str, type]] = [
+    ("The scene", "", Scene),
+    ("`[bearing]`", "bearing.full", Bearing),
+    ("`layout` of a bearing", "bearing.full.layout", Layout),
+    ("`[[bearing.surfaces]]`", "bearing.full.surfaces", Surface),
+    ("`[[bearing.bodies]]`", "bearing.full.bodies", Body),
+    *((f'`[motion]`, `kind = "{kind}"`', f"motion.{kind}", table) for kind, table in motion_tables.KINDS.items()),
+    ("`[motion.scale_to]`", "motion.record.scale_to", ScaleTo),
+    *((f'`[top]`, `kind = "{kind.kind}"`', f"top.{kind.kind}", kind) for kind in (RigTop, PrescribedTop, MassTop)),
+    *((f'`[load]`, `kind = "{kind}"`', f"load.{kind}", table) for kind, table in LOADS.items()),
+    *((f'`[top_rotation]`, `kind = "{kind}"`', f"top_rotation.{kind}", table) for kind, table in ROTATIONS.items()),
+    ("`[effects]`", "effects", Auto),
+    ("`[solver]`", "solver", Solver),
+    ("`[initial_state]`", "initial_state", InitialState),
+    ("`[stop]`", "stop", Stop),
+    ("Suites: `[[records]]`", "records", motion_tables.RecordMotion),
+    ("Suites: `[scale_to]`", "scale_to", ScaleTo),
+]
+
+
+def meaning(path: str, key: str) -> str:
+    """The meaning of a key of the table at `path`: the longest entry that fits. Raises KeyError where there is none."""
+    head = path.split(".")[0] if path else "scene"
+    for name in (f"{path}.{key}", f"{head}.{key}"):
+        if name in MEANINGS:
+            return MEANINGS[name]
+    return MEANINGS[key]
+
+
+def takes(rule: Rule | None) -> str:
+    """What a key takes: a number with its unit and bounds, one of some words, a text, a list, or a table."""
+    if isinstance(rule, Quantity):
+        bounds = {">": rule.above, "≥": rule.least}
+        limits = "".join(f" {sign} {bound:g}" for sign, bound in bounds.items() if bound is not None)
+        noun = "whole number" if rule.whole else "number"
+        if rule.shape:
+            noun = "list of " + " x ".join("any" if count is None else str(count) for count in rule.shape) + " numbers"
+        return f"{noun}{limits}" + (f" [{rule.unit}]" if rule.unit else "")
+    if isinstance(rule, Choice):
+        return ", ".join(str(word).lower() if isinstance(word, bool) else f'`"{word}"`' for word in rule.words)
+    if isinstance(rule, Paths):
+        return "text, or a list of texts"
+    if isinstance(rule, Components):
+        return '`"E1"`, `"E2"`, `"E3"` in a list'
+    return "table" if rule is None else "text"
+
+
+def default_of(given: Any) -> str:
+    """The default of a key, as it is written in a scene file."""
+    if given is MISSING:
+        return "required"
+    if given is None or given == "" or given == ():
+        return "-"
+    if isinstance(given, bool):
+        return str(given).lower()
+    return f'`"{given}"`' if isinstance(given, str) else f"{given:g}" if isinstance(given, float | int) else str(given)
+
+
+def section(title: str, path: str, kind: type) -> str:
+    """One table of the page: the keys in the order of the schema, those that are required first."""
+    rules = {name: (rule, default) for name, rule, default in ruled_fields(kind)}
+    lines = [f"## {title}", "", "| key | takes | default | meaning |", "|---|---|---|---|"]
+    fields = schema._TABLES[path].model_fields
+    for key in sorted(fields, key=lambda name: not fields[name].is_required()):
+        rule, given = rules.get(key, (None, MISSING if fields[key].is_required() else None))
+        shown = f'`"{kind.kind}"`' if key == "kind" else takes(rule)  # type: ignore[attr-defined]
+        if key == "least_share":
+            shown = takes(Quantity("", above=0.0))
+        lines.append(f"| `{key}` | {shown} | {default_of(given)} | {meaning(path, key)} |")
+    return "\n".join(lines)
+
+
+def page() -> str:
+    """The text of docs/scene.md."""
+    parts = [INTRODUCTION, *(section(*each) for each in SECTIONS)]
+    preset = (
+        "## `[bearing]` from a preset\n\n"
+        "`preset` and any key of `[bearing]`, `[[bearing.surfaces]]` and `[[bearing.bodies]]`: one value for all\n"
+        "surfaces or bodies, or a list with one for each, bottom first. `msfp-gen presets` lists the bearings.\n\n"
+        '```toml\nbearing = { preset = "fenz-tfp", friction = [0.04, 0.02, 0.02, 0.08] }\n```'
+    )
+    parts.insert(6, preset)
+    return "\n\n".join(parts) + "\n"
+
+
+if __name__ == "__main__":
+    TARGET.write_text(page(), encoding="utf-8")
+    print(f"wrote {TARGET}")

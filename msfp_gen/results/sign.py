@@ -1,0 +1,71 @@
+"""Sign of the displacement across the bearing, and of its force, in figures and exported tables.
+
+Results have one sign: u is base less top, F the force of the bearing on the top support, so that F has the sign of u in
+a loop. Reports of tests often give top less base; then F is the force of the support on the bearing. Both change, so
+that loops look the same and turn the same way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
+
+from msfp_gen.errors import InputError
+from msfp_gen.results.run_data import RunData
+
+R = TypeVar("R", bound=RunData)
+VARIABLES = ("displacement", "top_force", "top_moment")  # that change their sign
+
+
+class Sign(NamedTuple):
+    """factor: on the values of a result. difference: what u is. force: whose force F is."""
+
+    factor: float
+    difference: str
+    force: str
+
+
+SIGNS = {
+    "base-top": Sign(1.0, "base − top", "on the top support"),
+    "top-base": Sign(-1.0, "top − base", "on the bearing"),
+}
+DEFAULT = "base-top"
+_current: ContextVar[Sign] = ContextVar("sign", default=SIGNS[DEFAULT])
+
+
+def sign_of(word: str, name: str = "sign") -> Sign:
+    """The sign of this name; raises InputError for another word."""
+    if word not in SIGNS:
+        raise InputError(f"{name} = {word!r}: give one of {', '.join(SIGNS)}")
+    return SIGNS[word]
+
+
+def shown_sign() -> Sign:
+    """The sign in which figures are drawn now."""
+    return _current.get()
+
+
+@contextmanager
+def using_sign(word: str) -> Iterator[None]:
+    """Draw the figures of the block with this sign of u: "base-top" (the default) or "top-base". Raises InputError."""
+    token = _current.set(sign_of(word))
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
+def signed(result: R, word: str) -> R:
+    """`result` with `VARIABLES` of rows and events in another sign, for an exported table. Raises InputError."""
+    factor, history = sign_of(word).factor, result.history
+    if factor == 1.0:
+        return result
+    rows = replace(history, **{name: factor * getattr(history, name) + 0.0 for name in VARIABLES})  # no -0.0
+    events = [
+        replace(event, displacement=factor * event.displacement, top_force=factor * event.top_force)
+        for event in result.events
+    ]
+    return replace(result, history=rows, events=tuple(events))

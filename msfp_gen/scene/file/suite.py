@@ -1,0 +1,99 @@
+"""Suites of ground motions: a file that lists records, and their scaling to a mean spectrum (docs/data.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.common.fields import errors_at
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file import schema
+from msfp_gen.scene.file.loader import toml_file
+from msfp_gen.scene.file.motion_tables import RecordMotion, is_file, resolved
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.motions.records import ScaledSuite
+    from msfp_gen.scene.scene import Scene
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class SuiteRecord:
+    """A motion of a suite: its name, its `[motion]` table, from which a result file describes it, and the motion."""
+
+    name: str
+    table: Table
+    motion: Motion
+
+    def of(self, scene: Scene) -> Scene:
+        """`scene` with this motion. Raises InputError where it is shorter than the duration of the scene."""
+        return replace(scene, motion=self.motion, motion_table={"kind": RecordMotion.kind, **self.table})
+
+
+@dataclass(frozen=True)
+class Suite:
+    """The motions of a suite; scaled: their spectra, where the suite is scaled to a mean spectrum."""
+
+    records: tuple[SuiteRecord, ...]
+    scaled: ScaledSuite | None
+
+
+def load_suite(path: str | Path, progress: Callable[[float, float], None] | None = None) -> Suite:
+    """The suite in a TOML file; paths inside it are relative to it, and permitted as in a scene file.
+
+    progress: called with the number of spectra computed and of all. Raises InputError of one line that names the file,
+    the path of the field, the value and the remedy.
+    """
+    path = Path(path)
+    if not is_file(path):
+        raise InputError(f"suite = {str(path)!r}: no such file; give the path of a TOML file with [[records]]")
+    try:
+        given = schema.validate_suite(toml_file(path))
+        if not given["records"]:
+            raise InputError("records = []: give at least one [[records]]")
+        tables = [_located(table, path.parent, index) for index, table in enumerate(given["records"])]
+        return _suite(tables, given.get("scale_to"), progress)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _located(table: Table, folder: Path, index: int) -> Table:
+    """The table of a record with absolute paths."""
+    if "file" not in table:
+        return table
+    with errors_at("motion", f"records[{index}]"):
+        return {**table, "file": resolved(table["file"], folder)}
+
+
+def _suite(tables: list[Table], target: Table | None, progress: Callable[[float, float], None] | None) -> Suite:
+    if target is None:
+        return Suite(_records(tables), None)
+    from msfp_gen.motions.records import ScaleTo, scaled_suite
+
+    for index, table in enumerate(tables):
+        if own := [name for name in ("scale", "scale_to") if name in table]:
+            raise InputError(f"records[{index}].{own[0]}: [scale_to] scales all records of the suite; leave one out")
+    values = dict(target)
+    share = values.pop("least_share", None)
+    scaled = scaled_suite([record.motion for record in _records(tables)], ScaleTo(**values), share, progress)
+    factors = scaled.factors.tolist()
+    return Suite(_records([{**table, "scale": f} for table, f in zip(tables, factors, strict=True)]), scaled)
+
+
+def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:
+    found = []
+    for index, table in enumerate(tables):
+        try:
+            motion = RecordMotion(**table).build()
+        except InputError as error:
+            raise InputError(f"records[{index}].{str(error).removeprefix('motion').lstrip('.: ')}") from None
+        found.append(SuiteRecord(motion.name, table, motion))
+    names = [record.name for record in found]
+    return tuple(
+        replace(record, name=f"{record.name}-{index}") if names.count(record.name) > 1 else record
+        for index, record in enumerate(found, start=1)
+    )
