@@ -88,9 +88,10 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
     with Progress(f"{len(chosen)} scenes") as progress, closing(started) as runs:
         for index, result in runs:
             file = None if folder is None else folder / _file_name(index + 1, len(chosen), result.scene.name)
+            row = row_of(index + 1, chosen[index], result, file)
             if file is not None:
                 result.save(file)
-            rows.append(row_of(index + 1, chosen[index], result, file))
+            rows.append(row)
             if progress is not None:
                 progress(len(rows), len(chosen))
     if folder is not None:

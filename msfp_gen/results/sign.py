@@ -11,12 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from msfp_gen.errors import InputError
-from msfp_gen.results.run_data import RunData
 
-R = TypeVar("R", bound=RunData)
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+R = TypeVar("R", bound="RunData")
 VARIABLES = ("displacement", "top_force", "top_moment")  # that change their sign
 
 

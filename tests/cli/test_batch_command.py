@@ -162,8 +162,9 @@ def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hearing,
     )  # fmt: skip
     limit = time.monotonic() + 60
-    while not list(tmp_path.glob("runs/*.nc")) and time.monotonic() < limit:
+    while not list(tmp_path.glob("runs/[0-9]*.nc")) and time.monotonic() < limit:  # not the temporary file
         time.sleep(0.05)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "1 of 2 runs had ended and are kept" in err, err
