@@ -14,7 +14,7 @@ from msfp_gen.common.output import write_bytes
 from msfp_gen.embedding import values
 from msfp_gen.errors import InputError
 from msfp_gen.jit.compiler import FLAGS
-from msfp_gen.specification import contract
+from msfp_gen.specification import contract, rows
 from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.version import __version__
 
@@ -76,7 +76,7 @@ def _content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]:
         "body": contract.BODY,
         "surface": _surface_values(spec),
         "top": contract.TOP,
-        "row": contract.row(spec.effects),
+        "row": rows.row(spec.effects),
         "works": contract.WORKS,
         "kinds": contract.EVENT_KINDS,
         "counters": contract.COUNTERS,

@@ -113,7 +113,7 @@ def test_it_loads_offline_without_a_word_in_the_console(browser, page):
 def test_it_opens_at_the_peak_and_plays_from_the_start(start, page, saved):
     browser = start()
     browser.get(page.as_uri())
-    u = read_netcdf(saved)["displacement"].values[:, :2]
+    u = Result.from_netcdf(saved).history.displacement[:, :2]
     shown = js(browser, "return [...at('displacement', current)].slice(0, 2)")
     assert np.hypot(*shown) == pytest.approx(np.hypot(*u.T).max(), rel=2e-3)
     assert js(browser, "return current") == js(browser, "return report.peak") > 0
