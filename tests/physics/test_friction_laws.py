@@ -305,7 +305,7 @@ def test_results_and_scenes_come_back(tmp_path: Any) -> None:
 
 
 def test_constant_friction_emits_nothing_of_a_law() -> None:
-    files = generate(ModelSpec(Layout.tfp()), "some_model").files
+    files = generate(ModelSpec(Layout.tfp())).files
     for word in ("MSFP_LAW", "MSFP_HEAT", "coefficient[", "flux", "temperature"):
         assert word not in files["msfp_kernels.h"], word
     header = files["msfp_model.h"]
@@ -313,7 +313,7 @@ def test_constant_friction_emits_nothing_of_a_law() -> None:
         "#define MSFP_LAW 0 " in header and "#define MSFP_LAW_VALUES 0 " in header and "#define MSFP_HEAT 0 " in header
     )
     assert "coefficient[" not in header and "MSFP_SURFACE_PARAMETERS_HEATING" not in header
-    with_heat = generate(ModelSpec(Layout.tfp(), Effects(friction="pvt")), "some_model").files
+    with_heat = generate(ModelSpec(Layout.tfp(), Effects(friction="pvt"))).files
     assert "#define MSFP_HEAT 14" in with_heat["msfp_model.h"] and "heat.c" in runtime_sources()
 
 

@@ -94,7 +94,7 @@ def inputs(scene: Scene) -> str:
 
 def compiled(scene: Scene, folder: Path, flags: tuple[str, ...]) -> Path:
     """The program of one scene's model."""
-    sources = runtime_sources() | generate(scene.spec, "some_model").files
+    sources = runtime_sources() | generate(scene.spec).files
     for name, content in sources.items():
         (folder / name).write_text(content, encoding="utf-8")
     shutil.copy(REPLAY, folder)
