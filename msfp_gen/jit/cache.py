@@ -137,13 +137,13 @@ class Entry:
             "manifest": 3,
             "spec": spec.key,
             "sources": _digest_sources(),
-            "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
+            "tools": {"msfp-gen": __version__, **{tool: tool_version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
             "compiler": [*compiler.command, compiler.path, compiler.version],
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
         }
         identity = _sha256(json.dumps(inputs, sort_keys=True))
-        inputs["processor"] = [] if portable else list(processor_flags())
+        inputs["processor"] = [] if portable else list(processor_flags(FLAGS["user"]))
         key = _sha256(json.dumps(inputs, sort_keys=True))
         module = module_name(spec)
         return cls(spec, module, inputs, key, identity, cache_root() / f"{module}-{key[:20]}")
@@ -222,6 +222,14 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def tool_version(tool: str) -> str:
+    """Version of an installed package; "not installed" where it is missing."""
+    try:
+        return metadata.version(tool)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
 def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -238,10 +246,3 @@ def _digest_sources() -> str:
             total.update(f"{folder}/{path.relative_to(PACKAGE / folder).as_posix()}\0{len(data)}\0".encode())
             total.update(data)
     return total.hexdigest()
-
-
-def _version(tool: str) -> str:
-    try:
-        return metadata.version(tool)
-    except metadata.PackageNotFoundError:
-        return "not installed"

@@ -7,6 +7,7 @@ machines that share a cache do not use each other's models unless they can. `msf
 from __future__ import annotations
 
 import platform
+from collections.abc import Sequence
 from pathlib import Path
 
 CPUINFO = Path("/proc/cpuinfo")
@@ -37,7 +38,12 @@ def x86_64_level() -> int | None:
     return reached
 
 
-def processor_flags() -> tuple[str, ...]:
-    """Flags with which C code is compiled for this processor alone; none where it is not known."""
+def processor_flags(user: Sequence[str] = ()) -> tuple[str, ...]:
+    """Flags with which C code is compiled for this processor alone.
+
+    None where the processor is not known, or where `user`, the user's own flags, select one, as -march=native does.
+    """
     level = x86_64_level()
-    return () if level is None else (f"-DMSFP_X86_64_LEVEL={level}",)
+    if level is None or any(flag.startswith("-m") for flag in user):
+        return ()
+    return (f"-DMSFP_X86_64_LEVEL={level}",)

@@ -10,18 +10,17 @@ import os
 import re
 import time
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 
 from msfp_gen.common.output import write_bytes
-from msfp_gen.jit.cache import cache_root, write_errors
+from msfp_gen.jit.cache import cache_root, tool_version, write_errors
 
 _NAME = re.compile(r"wrapper-[0-9a-f]{20}\.c")
 
 
 def translation_path(pyx: str) -> Path:
     """Where the cache keeps the translation of a wrapper by the installed Cython."""
-    key = hashlib.sha256(f"{metadata.version('cython')}\0{pyx}".encode()).hexdigest()
+    key = hashlib.sha256(f"{tool_version('cython')}\0{pyx}".encode()).hexdigest()
     return cache_root() / f"wrapper-{key[:20]}.c"
 
 

@@ -134,7 +134,7 @@ def test_key_follows_spec_flags_tools_and_compiler(monkeypatch: pytest.MonkeyPat
         patch.setitem(compiler.FLAGS, "c", (*compiler.FLAGS["c"], "-O3"))
         keys.add(cache.Entry.of(SPEC).key)
     with monkeypatch.context() as patch:
-        patch.setattr(cache, "_version", lambda tool: "99")
+        patch.setattr(cache, "tool_version", lambda tool: "99")
         keys.add(cache.Entry.of(SPEC).key)
     other = tmp_path / "mycc"
     other.write_text("#!/bin/sh\necho mycc 1.0\n")
@@ -162,7 +162,7 @@ def test_cache_of_a_checkout_and_of_an_installation(monkeypatch: pytest.MonkeyPa
 def test_models_of_processors_differ_in_the_key_and_not_in_the_identity(monkeypatch: pytest.MonkeyPatch) -> None:
     entries = [cache.Entry.of(SPEC, portable=True)]
     for level in (3, 4):
-        monkeypatch.setattr(cache, "processor_flags", lambda flag=f"-DMSFP_X86_64_LEVEL={level}": (flag,))
+        monkeypatch.setattr(cache, "processor_flags", lambda _, flag=f"-DMSFP_X86_64_LEVEL={level}": (flag,))
         entries.append(cache.Entry.of(SPEC))
     assert len({entry.key for entry in entries}) == len({entry.folder for entry in entries}) == 3
     assert len({entry.identity for entry in entries}) == 1
@@ -170,11 +170,11 @@ def test_models_of_processors_differ_in_the_key_and_not_in_the_identity(monkeypa
 
 
 def test_flags_of_the_processor_reach_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "processor_flags", lambda: ("-DMSFP_X86_64_LEVEL=2",))
+    monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=2",))
     info = build.prepare(SPEC)
     assert "-DMSFP_X86_64_LEVEL=2" in (info.folder / "build.log").read_text()
     assert pruning.cached_models()[0].state == "current"
-    monkeypatch.setattr(cache, "processor_flags", lambda: ("-DMSFP_X86_64_LEVEL=3",))
+    monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=3",))
     assert cache.Entry.of(SPEC).find() is None
     assert pruning.cached_models()[0].state == "current", "of this version, though not for this processor"
 

@@ -51,3 +51,9 @@ def test_other_architectures_have_no_level(machine: Path, monkeypatch: pytest.Mo
     machine.write_text(f"flags : {flags_of(2, 3)}\n")
     monkeypatch.setattr(processor.platform, "machine", lambda: "aarch64")
     assert processor_flags() == ()
+
+
+def test_flags_of_the_user_that_select_a_processor_count(machine: Path) -> None:
+    """GCC inlines no function of another -march, so the two are not mixed."""
+    machine.write_text(f"flags : {flags_of(2, 3)}\n")
+    assert processor_flags(("-march=native", "-g")) == () and processor_flags(("-g",)) == ("-DMSFP_X86_64_LEVEL=3",)

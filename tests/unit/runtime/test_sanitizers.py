@@ -144,6 +144,7 @@ def test_generated_c_is_clean_under_sanitizers(case: str, tmp_path: Path) -> Non
     same_as_python(scene, done.stdout)
 
 
+@pytest.mark.slow
 def test_a_run_is_clean_under_valgrind(tmp_path: Path) -> None:
     if shutil.which("valgrind") is None:
         pytest.skip("valgrind is not installed")
