@@ -141,7 +141,8 @@ def test_velocity_and_acceleration_are_rates_of_position(layout):
     thinned(product([(2, 1, 0), (3, 2, 0), (5, 2, 2), (5, 3, 1)], SPINS), often),
 )
 def test_report_jacobians_against_differences(layout, spin):
-    values, state, h, load = sensible(layout, 6)
+    # The steps of the differences must not cross a kink: in state 6 of (5,2,2) one is 0.3 to 1 mrad away.
+    values, state, h, load = sensible(layout, 7 if layout == SPUN else 6)
     bearing, model, count = bearing_of(values), model_of(layout, spin=spin), layout[0] - 1
     a, angles, normal = unknowns_of(np.random.default_rng(1), count)
     u = np.concatenate([a.ravel(), angles.ravel(), normal])
