@@ -76,7 +76,7 @@ def costs() -> None:
         unknowns, states = sizes(scene, effects)
         counters = result.counters
         each = counters.wall_time / counters.newton_iterations * first.newton_iterations / first.wall_time
-        operations = generate(ModelSpec(scene.bearing.layout, effects), "model").operations
+        operations = generate(ModelSpec(scene.bearing.layout, effects)).operations
         print(
             f"| {name} | {unknowns} | {states} | {operations} | {counters.steps} | "
             f"{counters.wall_time / first.wall_time:.2f} | {each:.2f} |"

@@ -31,14 +31,13 @@ class Generated:
     stages: dict[str, float]
 
 
-def generate(spec: ModelSpec, module: str) -> Generated:
+def generate(spec: ModelSpec) -> Generated:
     """Derive, lower and emit one model.
 
     Statements and operations are counted for one body and one surface, since the C code loops over them.
 
     Args:
         spec: layout and effects.
-        module: name of the extension module.
     """
     from .derive import derive
     from .emit import emit
@@ -49,7 +48,7 @@ def generate(spec: ModelSpec, module: str) -> Generated:
     times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
     times.append(time.perf_counter())
-    files = emit(equations, kernels, module)
+    files = emit(equations, kernels)
     times.append(time.perf_counter())
     stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), times, times[1:], strict=False)}
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from importlib import resources
@@ -223,7 +224,22 @@ def word_enums() -> list[tuple[str, str, str, str, list[tuple[str, str, str]]]]:
     ]
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict[str, str]:
+def description(spec: ModelSpec) -> str:
+    """What the wrapper states about a model, as JSON. The wrapper itself is the same text for every model."""
+    shape = shape_of(spec)
+    return json.dumps(
+        {
+            "spec": spec.key,
+            "layout": (spec.layout.n, spec.layout.m, spec.layout.p),
+            "effects": {f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)},
+            "surface_values": contract.surface_values(spec.effects),
+            "row": [(q.name, shape(q)) for q in rows.row(spec.effects)],
+            "extremes": [(q.name, shape(q)) for q in rows.extremes(spec.effects)],
+        }
+    )
+
+
+def emit(equations: Equations, kernels: tuple[Kernel, ...]) -> dict[str, str]:
     """Render all generated files: {file name: text}."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
@@ -243,15 +259,13 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
     context = {
         "version": __version__,
         "spec": spec,
-        "module": module,
         "layout": spec.layout,
         "effects": spec.effects,
         "blocks": blocks,
         "functions": [function(k) for k in kernels],
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
-        "nq": 6 if spec.effects.uplift else 3,
-        "effects_dict": repr({f.name: getattr(spec.effects, f.name) for f in fields(spec.effects)}),
+        "description": json.dumps(description(spec)),
         "unknowns": equations.unknowns,
         "separations": equations.separations,
         "vectors": vector_quantities,
@@ -265,18 +279,12 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], module: str) -> dict
         "words": word_enums(),
         "row": rows.row(spec.effects),
         "extremes": rows.extremes(spec.effects),
-        "shape": shape_of(spec),
         "columns": {
             "body": contract.names(contract.BODY),
-            "surface": contract.surface_values(spec.effects),
             "top": contract.names(contract.TOP),
         },
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
     }
-    names = {
-        "msfp_model.h": "msfp_model.h.jinja",
-        "msfp_kernels.h": "msfp_kernels.h.jinja",
-        f"{module}.pyx": "module.pyx.jinja",
-    }
-    return {name: environment.get_template(template).render(context, file=name) for name, template in names.items()}
+    names = ("msfp_model.h", "msfp_kernels.h", "msfp_python.h", "msfp_module.pyx")
+    return {name: environment.get_template(f"{name}.jinja").render(context, file=name) for name in names}

@@ -1,8 +1,12 @@
-"""What pytest itself needs for these tests: the option `--update`; helpers are imported from `tests/support`."""
+"""What pytest itself needs for these tests: the option `--update`, and how many models a run built."""
 
 from __future__ import annotations
 
 import pytest
+
+from msfp_gen.jit.cache import MANIFEST_NAME, cache_root
+
+_BEFORE = pytest.StashKey[set[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -13,3 +17,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def update(request: pytest.FixtureRequest) -> bool:
     """Whether golden files are rewritten instead of compared."""
     return bool(request.config.getoption("--update"))
+
+
+def models() -> set[str]:
+    """Folders of the models in the cache."""
+    return {path.parent.name for path in cache_root().glob(f"msfp_*/{MANIFEST_NAME}")}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[_BEFORE] = models()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Building models takes most of the time of a run with an empty cache."""
+    terminalreporter.write_line(f"models built: {len(models() - config.stash[_BEFORE])}")

@@ -3,6 +3,7 @@
 | stage | module | input -> output |
 |---|---|---|
 | derive, lower, emit | `msfp_gen.generator` | ModelSpec -> sources |
+| translate | `msfp_gen.jit.translation` | wrapper -> its C, kept for all models |
 | compile | `msfp_gen.jit.compiler` | sources and the runtime's C -> extension |
 | store | `msfp_gen.jit.cache` | folder -> entry with a manifest |
 | load | `msfp_gen.jit.build` | extension -> imported module |
@@ -22,6 +23,7 @@ from types import ModuleType
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import cache
 from msfp_gen.jit.compiler import LOG_NAME, compile_extension
+from msfp_gen.jit.translation import find_translation, keep_translation
 from msfp_gen.specification.layout import ModelSpec
 
 Progress = Callable[[str, float], None]
@@ -41,7 +43,7 @@ class BuildInfo:
         stages: stage -> its time when the model was built, now or earlier [s].
         seconds: duration of this call [s].
         statements, operations: numbers of statements and of arithmetic operations of the emitted kernels.
-        key: cache key, the hash of all inputs that determine the compiled model.
+        key: hash of all inputs that determine the numbers that the model gives: the cache key less the processor.
     """
 
     path: Path
@@ -56,19 +58,20 @@ class BuildInfo:
     key: str = ""
 
 
-def prepare(spec: ModelSpec, progress: Progress | None = None) -> BuildInfo:
+def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = False) -> BuildInfo:
     """Build the model unless the cache holds it; the extension is not imported.
 
     Args:
         spec: layout and effects.
         progress: called with a text and the completed share of the build, 0 to 1.
+        portable: compile for every processor, not only for that of this machine.
 
     Raises:
         CompileError: no C compiler was found, or it rejected a file.
         InputError: the cache folder cannot be written to.
     """
     begin = perf_counter()
-    entry = cache.Entry.of(spec)
+    entry = cache.Entry.of(spec, portable)
     manifest, built = entry.find(), False
     if manifest is None:
         notify = progress or _no_progress
@@ -88,7 +91,7 @@ def prepare(spec: ModelSpec, progress: Progress | None = None) -> BuildInfo:
         seconds=perf_counter() - begin,
         statements=manifest.statements,
         operations=manifest.operations,
-        key=entry.key,
+        key=entry.identity,
     )
 
 
@@ -103,8 +106,8 @@ def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType,
 def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None = None) -> BuildInfo:
     """Write the sources and the compiled module of a model into `folder`, for a plain `import msfp_5_2_2`.
 
-    Each file is replaced in one rename, the manifest first and the extension last. Files that msfp-gen did not write
-    are never changed.
+    The module runs on every processor of this architecture. Each file is replaced in one rename, the manifest first and
+    the extension last. Files that msfp-gen did not write are never changed.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def generate_to(spec: ModelSpec, folder: Path | str, progress: Progress | None =
     """
     target = Path(folder).absolute()
     replaceable = _replaceable_files(target, cache.module_name(spec))
-    info = prepare(spec, progress)
+    info = prepare(spec, progress, portable=True)
     manifest = cache.Manifest.read(info.folder)
     files = [cache.MANIFEST_NAME, *sorted(set(manifest.files) - {manifest.extension}), manifest.extension]
     if foreign := [name for name in files if name not in replaceable and (target / name).exists()]:
@@ -157,8 +160,11 @@ def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest
     from msfp_gen.generator import generate
 
     notify(f"deriving and emitting {entry.spec.key}", 0.0)
-    generated = generate(entry.spec, entry.module)
-    sources = {**runtime_sources(), **generated.files}
+    generated = generate(entry.spec)
+    wrapper = next(name for name in generated.files if name.endswith(".pyx"))
+    translated = f"{Path(wrapper).stem}.c"
+    known = find_translation(generated.files[wrapper])
+    sources = {**runtime_sources(), **generated.files, **({translated: known} if known is not None else {})}
     begin = perf_counter()
     extension = compile_extension(
         sources,
@@ -168,7 +174,10 @@ def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest
             f"compiling {entry.module} ({done} of {count} files)",
             GENERATION_SHARE + (1 - GENERATION_SHARE) * done / count,
         ),
+        entry.inputs["processor"],
     )
+    if known is None:
+        keep_translation(generated.files[wrapper], folder / translated)
     manifest = cache.Manifest(
         module=entry.module,
         spec=entry.spec.key,

@@ -21,6 +21,7 @@ from typing import Any
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.compiler import EXTENSION_SUFFIX, FLAGS, find_compiler
+from msfp_gen.jit.processor import processor_flags
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
@@ -112,6 +113,7 @@ class Entry:
         inputs: all inputs that determine the extension: model, sources, versions of tools, compiler, flags. No derived
             expression is among them, so that an entry is found without deriving the equations.
         key: sha256 of `inputs`.
+        identity: sha256 of `inputs` less the processor. Models of one identity give the same numbers.
         folder: folder of the entry.
     """
 
@@ -119,23 +121,31 @@ class Entry:
     module: str
     inputs: dict[str, Any]
     key: str
+    identity: str
     folder: Path
 
     @classmethod
-    def of(cls, spec: ModelSpec) -> Entry:
-        """The entry of a model; reading the sources and asking the compiler for its version takes milliseconds."""
+    def of(cls, spec: ModelSpec, portable: bool = False) -> Entry:
+        """The entry of a model; reading the sources and asking the compiler for its version takes milliseconds.
+
+        Args:
+            spec: layout and effects.
+            portable: compiled for every processor, not only for that of this machine.
+        """
         inputs: dict[str, Any] = {
-            "manifest": 2,
+            "manifest": 3,
             "spec": spec.key,
             "sources": _digest_sources(),
-            "tools": {"msfp-gen": __version__, **{tool: _version(tool) for tool in TOOLS}},
+            "tools": {"msfp-gen": __version__, **{tool: tool_version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
         }
         inputs["compiler"] = _compiler(module_name(spec), inputs)
-        key = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+        identity = _sha256(json.dumps(inputs, sort_keys=True))
+        inputs["processor"] = [] if portable else list(processor_flags(FLAGS["user"]))
+        key = _sha256(json.dumps(inputs, sort_keys=True))
         module = module_name(spec)
-        return cls(spec, module, inputs, key, cache_root() / f"{module}-{key[:20]}")
+        return cls(spec, module, inputs, key, identity, cache_root() / f"{module}-{key[:20]}")
 
     def find(self) -> Manifest | None:
         """Manifest of the compiled model; None if it is not built or is damaged. A damaged one raises a warning."""
@@ -213,6 +223,14 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def tool_version(tool: str) -> str:
+    """Version of an installed package; "not installed" where it is missing."""
+    try:
+        return metadata.version(tool)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
 def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -246,10 +264,3 @@ def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
                     return list(found["compiler"])
         raise
     return [*compiler.command, compiler.path, compiler.version]
-
-
-def _version(tool: str) -> str:
-    try:
-        return metadata.version(tool)
-    except metadata.PackageNotFoundError:
-        return "not installed"

@@ -1,7 +1,7 @@
 """C compiler: finds it and compiles sources to one extension module.
 
-`compile_extension` writes the sources, runs Cython and the compiler on them (two commands at a time) and links. Every
-tool runs as a subprocess with its own working folder, so the state of this process does not change. Commands and their
+`compile_extension` writes the sources, runs Cython and the compiler on them in parallel and links. Every tool runs as a
+subprocess with its own working folder, so the state of this process does not change. Commands and their
 output are written to `build.log` beside the sources.
 """
 
@@ -24,7 +24,6 @@ from typing import NamedTuple
 from msfp_gen.errors import CompileError
 from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
-JOBS = 2
 LOG_NAME = "build.log"
 EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
 PLATFORM_COMPILERS = ("cc", "gcc", "clang")
@@ -45,7 +44,7 @@ FLAGS: dict[str, tuple[str, ...]] = {
     ),
     "user": user_flags(),
     # Cython's output causes warnings and takes little of the run time: no warnings, little optimisation.
-    "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O1"),
+    "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-Og"),
     "libraries": ("-lm",),
 }
 
@@ -118,19 +117,23 @@ def compile_extension(
     module: str,
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
+    processor: Sequence[str] = (),
 ) -> Path:
     """Write `sources` into `folder` and build the extension `module` there.
 
     Parameters
     ----------
     sources
-        File name -> text: any number of `.c` and `.h` files and the wrapper `<module>.pyx`.
+        File name -> text: any number of `.c` and `.h` files and one `.pyx`, the wrapper. Where its translation, the
+        `.c` of the same name, is among them, Cython is not run.
     module
         Name under which the extension is imported.
     folder
         Working folder; sources, `build.log` and the extension remain there, also after a failure.
     progress
         Called with the number of compiled C files and the number of all.
+    processor
+        Flags of the C files that select a processor; see `msfp_gen.jit.processor`.
 
     Returns
     -------
@@ -148,12 +151,19 @@ def compile_extension(
     for name, text in sources.items():
         (folder / name).write_text(text, encoding="utf-8")
     log = Log(folder)
-    units = sorted(name for name in sources if name.endswith(".c"))
-    chains = [_wrapper_steps(module, compiler, include), *([_compile_step(name, compiler)] for name in units)]
+    wrapper = next(Path(name).stem for name in sources if name.endswith(".pyx"))
+    # The longest first, so that no processor waits for another in the end: the wrapper, then the files with kernels.
+    units = [name for name in sorted(sources) if name.endswith(".c") and name != f"{wrapper}.c"]
+    units.sort(key=lambda name: "msfp_kernels.h" not in sources[name])
+    c_flags = (*FLAGS["c"], *processor, *FLAGS["user"])
+    chains = [
+        _wrapper_steps(wrapper, module, compiler, include, translated=f"{wrapper}.c" in sources),
+        *([_compile_step(name, compiler, c_flags)] for name in units),
+    ]
     for done in _run_parallel(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
-    objects = [_object_file(name) for name in [*units, f"{module}.c"]]
+    objects = [_object_file(name) for name in [*units, f"{wrapper}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
     if not target.is_file():
@@ -204,13 +214,13 @@ def first_error(output: str, code: int) -> str:
 
 
 def _run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
-    """Run all chains, `JOBS` at a time, and yield the number of finished ones; after a failure no chain is started."""
+    """Run all chains, one a processor at a time, and yield how many are finished; after a failure none is started."""
 
     def run_chain(chain: Sequence[Step]) -> None:
         for step in chain:
             run(step)
 
-    with ThreadPoolExecutor(JOBS) as pool:
+    with ThreadPoolExecutor(_processors()) as pool:
         tasks = [pool.submit(run_chain, chain) for chain in chains]
         try:
             yield 0
@@ -222,18 +232,25 @@ def _run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None])
             raise
 
 
-def _compile_step(name: str, compiler: Compiler) -> Step:
-    return Step(name, (*compiler.command, *FLAGS["c"], *FLAGS["user"], "-c", name, "-o", _object_file(name)))
+def _processors() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _wrapper_steps(module: str, compiler: Compiler, include: Path) -> list[Step]:
-    """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation."""
-    pyx, c = f"{module}.pyx", f"{module}.c"
-    cython = (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c)
-    return [
-        Step(pyx, cython),
-        Step(c, (*compiler.command, *FLAGS["wrapper"], "-I", str(include), "-c", c, "-o", _object_file(c))),
-    ]
+def _compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
+    return Step(name, (*compiler.command, *flags, "-c", name, "-o", _object_file(name)))
+
+
+def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path, translated: bool) -> list[Step]:
+    """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation.
+
+    The wrapper has one name for all models; a macro gives its initialisation the name under which Python imports it.
+    """
+    pyx, c = f"{wrapper}.pyx", f"{wrapper}.c"
+    cython = Step(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
+    name = () if wrapper == module else (f"-DPyInit_{wrapper}=PyInit_{module}",)
+    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", _object_file(c))
+    return [*([] if translated else [cython]), Step(c, command)]
 
 
 def _link_command(compiler: Compiler) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.cache import MANIFEST_NAME, Entry, Manifest, cache_root
+from msfp_gen.jit.translation import remove_translations
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 # Models, those for batches in vector lanes of earlier versions, and unfinished ones.
@@ -27,8 +28,8 @@ class CachedModel:
     Attributes:
         folder: the folder.
         spec: name of the model, `ModelSpec.key`; "?" where the manifest cannot be read.
-        state: "current" (usable by this version), "other version", "damaged or old" (without a valid manifest), or
-            "unfinished" (of a build that is running or was killed).
+        state: "current" (of this version, for whatever processor), "other version", "damaged or old" (without a valid
+            manifest), or "unfinished" (of a build that is running or was killed).
         size: total size of its files [bytes].
         used: time of last use or of the build [s since 1970].
     """
@@ -71,6 +72,7 @@ def prune(days: float) -> tuple[list[CachedModel], list[CachedModel]]:
     """
     if not days >= 0:
         raise InputError(f"days = {days}: give a number of days, 0 or more")
+    remove_translations(days)
     removed: list[CachedModel] = []
     in_use: list[CachedModel] = []
     for item in cached_models():
@@ -86,7 +88,7 @@ def total(items: Iterable[CachedModel]) -> int:
 
 
 def _current_inputs() -> dict[str, object]:
-    """Inputs of the cache key in this version; all but "spec" are the same for every model."""
+    """Inputs of the cache key in this version; all but "spec" and "processor" are the same for every model."""
     try:
         return Entry.of(ModelSpec(Layout.dfp())).inputs
     except CompileError:  # without a compiler no entry of the cache is usable
@@ -111,7 +113,8 @@ def _cached_model(folder: Path, inputs: dict[str, object]) -> CachedModel | None
     elif manifest is None:
         state = "damaged or old"
     else:
-        state = "current" if inputs | {"spec": spec} == manifest.inputs else "other version"
+        own = {name: manifest.inputs.get(name) for name in ("spec", "processor")}
+        state = "current" if inputs | own == manifest.inputs else "other version"
     return CachedModel(folder, spec, state, size, used)
 
 

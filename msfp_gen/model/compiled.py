@@ -1,4 +1,4 @@
-"""Types of the classes `Stack` and `Run` of a compiled module (`templates/module.pyx.jinja`)."""
+"""Types of the classes `Stack` and `Run` of a compiled module (`templates/msfp_module.pyx.jinja`)."""
 
 from __future__ import annotations
 

@@ -46,9 +46,7 @@ class Extremes:
             top_force=_largest(history.top_force),
             sliding=history.sliding.max(axis=0),
             gap=history.gap.min(axis=0),
-            slip_speed=np.where(separated(history), 0.0, np.hypot(*np.moveaxis(history.slip_velocity, 2, 0))).max(
-                axis=0
-            ),
+            slip_speed=speed.max(axis=0),
             least_normal=history.normal_force.min(axis=0),
             most_normal=history.normal_force.max(axis=0),
             least_friction=None if mu is None else mu.min(axis=0),

@@ -12,10 +12,17 @@
 extern "C" {
 #endif
 
-/* Functions that run on columns or on all surfaces are also compiled for wider vectors; the processor selects a version
- * when the model is loaded. No version fuses a multiplication with an addition, so all give the same numbers. */
-#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__)
+/* Functions that run on columns or on all surfaces are compiled for wider vectors: for those of the processor whose
+ * level MSFP_X86_64_LEVEL is, or, where it is not defined, once for each level, and the processor selects a version when
+ * the model is loaded. No version fuses a multiplication with an addition, so all give the same numbers. */
+#if !(defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__))
+#define MSFP_WIDE
+#elif !defined(MSFP_X86_64_LEVEL)
 #define MSFP_WIDE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#elif MSFP_X86_64_LEVEL >= 4
+#define MSFP_WIDE __attribute__((target("arch=x86-64-v4")))
+#elif MSFP_X86_64_LEVEL == 3
+#define MSFP_WIDE __attribute__((target("arch=x86-64-v3")))
 #else
 #define MSFP_WIDE
 #endif

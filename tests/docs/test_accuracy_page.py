@@ -12,6 +12,7 @@ TEMPLATE = (ROOT / "benchmarks" / "accuracy.md.in").read_text(encoding="utf-8")
 WRITTEN = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_one_command_writes_figures_numbers_and_page(tmp_path, monkeypatch):
     monkeypatch.setattr(page, "TOLERANCES", (1e-2, 1e-4))
     monkeypatch.setattr(page, "MODEL_TOLERANCES", (1e-2, 1e-4))

@@ -68,7 +68,7 @@ import msfp_gen
 print(msfp_gen.__file__)
 print("\\n".join(table.text for table in explain(scene)))
 print(scene.spec.key)
-print(generate(scene.spec, "some_model").files["msfp_model.h"])
+print(generate(scene.spec).files["msfp_model.h"])
 main(["generate", "--help"])
 """,
     )

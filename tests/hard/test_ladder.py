@@ -76,7 +76,11 @@ def jamming() -> Scene:
     return Scene(replace(bearing, bodies=bodies), orbit, top, REPORT, Solver(rtol=1e-5))
 
 
-@pytest.mark.parametrize("solver", [{}, {"rtol": 1e-7}, {"method": "dopri5", "rtol": 1e-6}], ids=str)
+@pytest.mark.parametrize(
+    "solver",
+    [{}, {"rtol": 1e-7}, pytest.param({"method": "dopri5", "rtol": 1e-6}, marks=pytest.mark.slow)],
+    ids=str,
+)
 def test_a_normal_force_without_a_bound_is_loss_of_regularity_whatever_solves_it(solver: dict[str, float]) -> None:
     """Steep slopes, friction and the upward throw feed N, which grows a thousandfold within microseconds: the moment is
     the same for methods that share no integrator. They used to call it newton, newton and step."""
@@ -163,6 +167,7 @@ def test_a_load_through_zero_is_uplift_for_the_explicit_method_too() -> None:
     assert ends[0] == pytest.approx(ends[1], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_first_step_that_is_too_long_does_not_decide_what_is_regular() -> None:
     """Nine bodies whose plate is held by friction alone stand still for a while. The sign of the determinant
     used to be that of a first step longer than the time in which they would fall: every shorter step was refused."""

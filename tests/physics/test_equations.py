@@ -16,8 +16,16 @@ from msfp_gen import Top
 
 LAYOUTS = [(2, 1, 0), (2, 0, 1), (3, 1, 1), (3, 2, 0), (5, 2, 2), (5, 3, 1), (7, 3, 3)]
 SPINS = ["locked", "patch", "free"]
-SPUN = [(2, 1, 0), (5, 3, 1)]  # layouts whose bodies may spin, with every change
-LAYOUTS_AND_SPINS = thinned(product(LAYOUTS, SPINS), lambda layout, spin: spin == "locked" or layout in SPUN)
+SPUN = (5, 2, 2)  # the layout whose bodies may spin with every change
+RARE = [(2, 0, 1), (3, 2, 0)]  # no case of their own: concave down is in (3, 1, 1), one way only in (2, 1, 0)
+
+
+def often(layout, spin):
+    return layout not in RARE if spin == "locked" else layout == SPUN
+
+
+LAYOUTS_AND_SPINS = thinned(product(LAYOUTS, SPINS), often)
+OFTEN_LAYOUTS = thinned([(layout,) for layout in LAYOUTS], lambda layout: layout not in RARE)
 SEEDS = [0, 1]
 
 
@@ -95,7 +103,10 @@ def test_laws_of_hysteresis_and_contact_damping_equal_the_reference(layout, law,
         assert np.abs(other.friction_rate - rates).max() < 1e-8 * np.abs(rates).max()
 
 
-@pytest.mark.parametrize(("layout", "law"), [*((layout, "report") for layout in LAYOUTS), ((5, 2, 2), "isotropic")])
+@pytest.mark.parametrize(
+    ("layout", "law"),
+    thinned([*product(LAYOUTS, ["report"]), ((5, 2, 2), "isotropic")], lambda layout, law: layout not in RARE),
+)
 def test_friction_rates_and_slip_equal_the_reference(layout, law):
     values, state, h, load = sensible(layout, 3)
     found = model_of(layout, bouc_wen=law).evaluate(bearing_of(values), state.q, state.v, h, **inputs(state, load))
@@ -106,7 +117,7 @@ def test_friction_rates_and_slip_equal_the_reference(layout, law):
     assert np.abs(found.friction_rate - want).max() < 1e-9 * np.abs(want).max()
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", OFTEN_LAYOUTS)
 def test_named_vectors_equal_the_report(layout):
     values, state, _, _ = sensible(layout, 4)
     base = state.base
@@ -130,7 +141,7 @@ def test_named_vectors_equal_the_report(layout):
         assert np.abs(found[f"t_{k}"] - turn.t[k]).max() < 1e-14
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", OFTEN_LAYOUTS)
 def test_velocity_and_acceleration_are_rates_of_position(layout):
     """v = dr/dt and a = dv/dt of the emitted C, by sixth-order differences along q(t) = q + v t + a t^2/2."""
     values, state, _, _ = sensible(layout, 5)
@@ -163,10 +174,11 @@ def test_velocity_and_acceleration_are_rates_of_position(layout):
 
 @pytest.mark.parametrize(
     ("layout", "spin"),
-    thinned(product([(2, 1, 0), (3, 2, 0), (5, 3, 1)], SPINS), lambda layout, spin: spin == "locked" or layout in SPUN),
+    thinned(product([(2, 1, 0), (3, 2, 0), (5, 2, 2), (5, 3, 1)], SPINS), often),
 )
 def test_report_jacobians_against_differences(layout, spin):
-    values, state, h, load = sensible(layout, 6)
+    # The steps of the differences must not cross a kink: in state 6 of (5,2,2) one is 0.3 to 1 mrad away.
+    values, state, h, load = sensible(layout, 7 if layout == SPUN else 6)
     bearing, model, count = bearing_of(values), model_of(layout, spin=spin), layout[0] - 1
     a, angles, normal = unknowns_of(np.random.default_rng(1), count)
     u = np.concatenate([a.ravel(), angles.ravel(), normal])
@@ -233,15 +245,18 @@ STACKS = ({}, {"spin": "free"}, {"spin": "patch"}, {"dimension": "planar"}, {"sl
 TOPS = (Top.rig(0.0, 1e6, 1e4, 1e7, 1e5), Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7))
 
 
-def often(layout, effects):
-    """Every layout, and every effect in one layout."""
-    return layout == (2, 1, 0) if effects.get("spin") else not effects or layout == (4, 2, 1)
+BELOW = [*product([(2, 1, 0), (4, 2, 1), (5, 2, 2), (5, 1, 3), (11, 5, 5)], STACKS), ((7, 3, 3), {})]
+
+
+def other_tests_build(layout, effects):
+    """Every effect in one layout; one surface, and numbers of surfaces that do not fill the vectors."""
+    if layout == (4, 2, 1):
+        return effects.get("dimension") == "planar"
+    return layout == (5, 2, 2) or (layout in ((2, 1, 0), (7, 3, 3)) and not effects)
 
 
 @pytest.mark.parametrize("top", TOPS, ids=str)
-@pytest.mark.parametrize(
-    ("layout", "effects"), thinned(product([(2, 1, 0), (4, 2, 1), (5, 1, 3), (11, 5, 5)], STACKS), often), ids=str
-)
+@pytest.mark.parametrize(("layout", "effects"), thinned(BELOW, other_tests_build), ids=str)
 def test_tangent_in_any_stack_below_any_top(layout, effects, top):
     """On a base that moves and turns, with every rim met."""
     tangent, want, away = tangents(layout, effects, 1e-3, top=top, base_moves=True, capacity=1e-4)

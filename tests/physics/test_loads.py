@@ -129,7 +129,7 @@ def test_overturning_tilts_a_plate_against_its_stiffness() -> None:
 
 def test_the_top_follows_a_support_that_turns_within_its_stiffness() -> None:
     rotation = Rotation.ramp(psi=0.003, theta=0.006, duration=10.0)
-    result = simulate(double(motion=STILL, top_rotation=rotation))
+    result = simulate(double(motion=STILL, top_rotation=rotation, effects=Effects(top_rotation=True)))
     psi, theta = result.history.tilt_angles[-1, :, :2].sum(axis=0)
     assert (psi, theta) == pytest.approx((0.003, 0.006), rel=1e-2)
 

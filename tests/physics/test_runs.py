@@ -111,6 +111,7 @@ def test_planar_run_equals_spatial_run(azimuth: float) -> None:
     assert np.abs(full.history.friction_state - flat.history.friction_state).max() < 2e-3
 
 
+@pytest.mark.slow
 def test_planar_run_at_any_azimuth_to_the_square_of_the_tilt() -> None:
     """Y, Z live on Euler bases that twist by psi' sin(theta): the isotropic law loses its direction by that much."""
     scene = scene_of("fenz-test2", {"bouc_wen": "isotropic"}, {"rtol": 1e-6}, output_step=0.1, duration=25.0)

@@ -85,7 +85,7 @@ def failure_of(scene: Scene) -> RunError:
 def thinned(cases: Iterable[Any], keep: Callable[..., bool]) -> list[Any]:
     """Parameters of a test: the cases that `keep` takes as they are, the others under the mark `slow`.
 
-    A model that no other test uses costs ten seconds of compiling; which kernels it holds is decided by its effects,
+    A model that no other test uses costs four seconds of compiling; which kernels it holds is decided by its effects,
     not by its layout, so that few of all combinations need to be built with every change.
     """
     rows = [case if isinstance(case, tuple) else (case,) for case in cases]

@@ -15,7 +15,7 @@ from msfp_gen.specification.layout import ModelSpec
 
 @cache
 def emitted(layout: tuple[int, int, int] = (5, 2, 2), **effects: object) -> Generated:
-    return generate(ModelSpec(Layout(*layout), Effects(**effects)), "some_model")  # type: ignore[arg-type]
+    return generate(ModelSpec(Layout(*layout), Effects(**effects)))  # type: ignore[arg-type]
 
 
 def text(name: str, layout: tuple[int, int, int] = (5, 2, 2), **effects: object) -> str:
@@ -24,7 +24,7 @@ def text(name: str, layout: tuple[int, int, int] = (5, 2, 2), **effects: object)
 
 def warnings_of(effects: dict[str, object], folder: Path, *mode: str) -> str:
     """What the compiler has to say about all C of a TFP with these effects; nothing, it is hoped."""
-    generated = generate(ModelSpec(Layout.tfp(), Effects(**effects)), "some_model")  # type: ignore[arg-type]
+    generated = generate(ModelSpec(Layout.tfp(), Effects(**effects)))  # type: ignore[arg-type]
     sources = runtime_sources() | generated.files
     for name, content in sources.items():
         (folder / name).write_text(content, encoding="utf-8")

@@ -20,12 +20,12 @@ def twice(double x):
 STAGES = {"derive": 0.25, "lower": 0.5, "emit": 0.125}
 
 
-def sources(module: str, kernel: str = KERNEL, wrapper: str = WRAPPER) -> dict[str, str]:
-    return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, f"{module}.pyx": wrapper}
+def sources(kernel: str = KERNEL, wrapper: str = WRAPPER) -> dict[str, str]:
+    return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, "msfp_module.pyx": wrapper}
 
 
-def generate(spec: object, module: str) -> SimpleNamespace:
-    return SimpleNamespace(files=sources(module), statements=1, operations=1, stages=dict(STAGES))
+def generate(spec: object) -> SimpleNamespace:
+    return SimpleNamespace(files=sources(), statements=1, operations=1, stages=dict(STAGES))
 
 
 def generator(function=generate) -> ModuleType:

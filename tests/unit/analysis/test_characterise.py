@@ -200,13 +200,13 @@ def test_area_of_an_ellipse() -> None:
 def single_pendulum() -> tuple[Scene, Characterisation]:
     """One slider in a bowl under a free plate, hardly any elastic slip, pushed slowly."""
     top = Body(height=0.02, centroid=0.01, mass=0.1, inertia=(1e-4, 1e-4), rim_radius=0.05)
-    surface = Surface(radius=0.5, capacity=0.3, friction=0.05, yield_displacement=1e-5)
+    surface = Surface(radius=0.5, capacity=0.3, friction=0.05, yield_displacement=1e-5, rim_stiffness=1e7)
     bearing = Bearing(layout=Layout(2, 1, 0), base_height=0.01, surfaces=[surface], bodies=[top])
     made = Scene(
         bearing,
         Motion.harmonic(0.1, 0.01, cycles=1.0),
         Top.rig(axial_load=1e5, stiffness=1e10),
-        Effects(dimension="planar", sliders="massless", rims=False),
+        Effects(dimension="planar", sliders="massless"),
         Solver(rtol=1e-6),
         output_step=0.05,
     )

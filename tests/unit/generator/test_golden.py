@@ -40,7 +40,7 @@ def difference(old: str, new: str) -> str:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_emitted_headers_are_the_golden_ones(name: str, update: bool) -> None:
-    files = generate(MODELS[name], "some_model").files
+    files = generate(MODELS[name]).files
     folder = GOLDEN / name
     if update:
         folder.mkdir(parents=True, exist_ok=True)

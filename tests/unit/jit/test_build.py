@@ -16,7 +16,7 @@ import pytest
 from support import fake_model
 
 from msfp_gen.errors import CompileError, InputError
-from msfp_gen.jit import build, cache, compiler
+from msfp_gen.jit import build, cache, compiler, pruning
 from msfp_gen.model import model
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -58,16 +58,16 @@ def run_child(house: Path, models: Path) -> subprocess.Popen[str]:
 
 
 def break_generator(monkeypatch: pytest.MonkeyPatch, **texts: str) -> None:
-    def generate(spec: ModelSpec, module: str) -> object:
-        generated = fake_model.generate(spec, module)
-        generated.files.update(fake_model.sources(module, **texts))
+    def generate(spec: ModelSpec) -> object:
+        generated = fake_model.generate(spec)
+        generated.files.update(fake_model.sources(**texts))
         return generated
 
     monkeypatch.setitem(sys.modules, "msfp_gen.generator", fake_model.generator(generate))
 
 
 def refuse_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    def generate(spec: ModelSpec, module: str) -> object:
+    def generate(spec: ModelSpec) -> object:
         raise AssertionError("the generator was called for a model that is in the cache")
 
     monkeypatch.setitem(sys.modules, "msfp_gen.generator", fake_model.generator(generate))
@@ -93,7 +93,7 @@ def test_cold_build_keeps_sources_log_and_manifest() -> None:
     assert "-Wextra" in log and "-m cython" in log and "[exit 0]" in log
     manifest = cache.Manifest.read(info.folder)
     assert set(manifest.files) == {path.name for path in info.folder.iterdir()} - {"manifest.json"}
-    assert {"unit.c", "msfp_model.h", f"{MODULE}.pyx", info.path.name} <= set(manifest.files)
+    assert {"unit.c", "msfp_model.h", "msfp_module.pyx", info.path.name} <= set(manifest.files)
     assert str(info.folder) not in log, "commands name files relative to the folder, so that it can move"
 
 
@@ -134,7 +134,7 @@ def test_key_follows_spec_flags_tools_and_compiler(monkeypatch: pytest.MonkeyPat
         patch.setitem(compiler.FLAGS, "c", (*compiler.FLAGS["c"], "-O3"))
         keys.add(cache.Entry.of(SPEC).key)
     with monkeypatch.context() as patch:
-        patch.setattr(cache, "_version", lambda tool: "99")
+        patch.setattr(cache, "tool_version", lambda tool: "99")
         keys.add(cache.Entry.of(SPEC).key)
     other = tmp_path / "mycc"
     other.write_text("#!/bin/sh\necho mycc 1.0\n")
@@ -159,6 +159,38 @@ def test_cache_of_a_checkout_and_of_an_installation(monkeypatch: pytest.MonkeyPa
     assert cache.cache_root() == tmp_path / "build" / "models"
 
 
+def test_models_of_processors_differ_in_the_key_and_not_in_the_identity(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = [cache.Entry.of(SPEC, portable=True)]
+    for level in (3, 4):
+        monkeypatch.setattr(cache, "processor_flags", lambda _, flag=f"-DMSFP_X86_64_LEVEL={level}": (flag,))
+        entries.append(cache.Entry.of(SPEC))
+    assert len({entry.key for entry in entries}) == len({entry.folder for entry in entries}) == 3
+    assert len({entry.identity for entry in entries}) == 1
+    assert cache.Entry.of(SPEC, portable=True) == entries[0]
+
+
+def test_flags_of_the_processor_reach_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=2",))
+    info = build.prepare(SPEC)
+    assert "-DMSFP_X86_64_LEVEL=2" in (info.folder / "build.log").read_text()
+    assert pruning.cached_models()[0].state == "current"
+    monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=3",))
+    assert cache.Entry.of(SPEC).find() is None
+    assert pruning.cached_models()[0].state == "current", "of this version, though not for this processor"
+
+
+# --- the wrapper
+
+
+def test_cython_translates_the_wrapper_of_all_models_once(models: Path) -> None:
+    folder = entry_of(models)
+    first, other = cache.Manifest.read(folder), build.prepare(ModelSpec(Layout.tfp()))
+    assert "-m cython" in (folder / "build.log").read_text()
+    assert not other.cached and "-m cython" not in (other.folder / "build.log").read_text()
+    assert cache.Manifest.read(other.folder).files["msfp_module.c"] == first.files["msfp_module.c"]
+    assert build.load_extension(other.path, "msfp_5_2_2").twice(2.0) == 4.0
+
+
 # --- failures
 
 
@@ -166,7 +198,7 @@ def test_cache_of_a_checkout_and_of_an_installation(monkeypatch: pytest.MonkeyPa
     ("texts", "line"),
     [
         ({"kernel": "int msfp_f(void)\n{\n  return nothing;\n}\n"}, "msfp_kernels.c:3:10: error: "),
-        ({"wrapper": "def f():\n    return nothing\n"}, f"{MODULE}.pyx:2:11: undeclared name"),
+        ({"wrapper": "def f():\n    return nothing\n"}, "msfp_module.pyx:2:11: undeclared name"),
     ],
 )
 def test_refused_sources_name_file_line_and_log(

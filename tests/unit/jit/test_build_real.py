@@ -16,7 +16,7 @@ from msfp_gen.specification.layout import ModelSpec
 WARM = """
 import json, sys
 from msfp_gen import Layout, build_model
-info = build_model(Layout.dfp()).info
+info = build_model(Layout.tfp()).info
 tools = sorted({"sympy", "Cython", "jinja2", "filelock", "msfp_gen.generator.derive"} & set(sys.modules))
 print(json.dumps([info.cached, str(info.path), tools]))
 """
@@ -28,7 +28,7 @@ def run(code: str, *options: str) -> str:
 
 @pytest.fixture(scope="module")
 def built() -> BuildInfo:
-    return build_model(Layout.dfp()).info  # type: ignore[no-any-return]
+    return build_model(Layout.tfp()).info  # type: ignore[no-any-return]
 
 
 def test_stages_and_counts_of_a_build(built: BuildInfo) -> None:
@@ -42,9 +42,9 @@ def test_second_process_takes_it_from_the_cache_without_the_tools(built: BuildIn
 
 
 def test_generated_folder_serves_a_plain_script(built: BuildInfo, tmp_path: Path) -> None:
-    info = generate_to(ModelSpec(Layout.dfp()), tmp_path / "out")
-    assert info.cached and info.stages == built.stages
-    code = f"import sys; sys.path.insert(0, {str(info.folder)!r}); import msfp_3_1_1; print(msfp_3_1_1.__file__)"
+    info = generate_to(ModelSpec(Layout.tfp()), tmp_path / "out")
+    assert info.key == built.key and "MSFP_X86_64_LEVEL" not in (info.folder / "build.log").read_text()
+    code = f"import sys; sys.path.insert(0, {str(info.folder)!r}); import msfp_5_2_2; print(msfp_5_2_2.__file__)"
     assert run(code).strip() == str(info.path)
 
 

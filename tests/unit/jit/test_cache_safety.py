@@ -19,6 +19,7 @@ from support import fake_model
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
 from msfp_gen.jit import build, cache, compiler, pruning
+from msfp_gen.jit.translation import find_translation, translation_path
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())
@@ -68,6 +69,10 @@ def assert_not_believed(entry: cache.Entry) -> None:
 def assert_works() -> None:
     info = build.prepare(SPEC)
     assert build.load_extension(info.path, MODULE).twice(2.0) == 4.0
+
+
+def translation() -> Path:
+    return translation_path(fake_model.WRAPPER)
 
 
 # --- what is not as it was written
@@ -125,11 +130,23 @@ def test_a_damaged_entry_is_replaced_by_a_sound_one(entry: cache.Entry) -> None:
     assert_works()
 
 
-def test_altered_sources_are_not_handed_out(entry: cache.Entry, tmp_path: Path) -> None:
-    (entry.folder / "unit.c").write_text("int evil;\n")
+def test_altered_sources_are_not_handed_out(tmp_path: Path) -> None:
+    (build.prepare(SPEC, portable=True).folder / "unit.c").write_text("int evil;\n")
     with pytest.warns(RuntimeWarning, match="damaged"):
         build.generate_to(SPEC, tmp_path / "out")
     assert (tmp_path / "out" / "unit.c").read_text() == fake_model.RUNTIME
+
+
+def test_an_altered_translation_of_the_wrapper_is_made_again(entry: cache.Entry) -> None:
+    whole, dice = translation().read_bytes(), random.Random(5)
+    assert find_translation(fake_model.WRAPPER) == whole.partition(b"\n")[2].decode()
+    for at in {0, 64, 65, len(whole) - 1, *(dice.randrange(len(whole)) for _ in range(50))}:
+        translation().write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        assert find_translation(fake_model.WRAPPER) is None
+        translation().write_bytes(whole[:at])
+        assert find_translation(fake_model.WRAPPER) is None
+    shutil.rmtree(entry.folder)
+    assert not build.prepare(SPEC).cached and translation().read_bytes() == whole
 
 
 # --- builds that are killed, and builds at the same time
@@ -152,7 +169,7 @@ def test_builds_killed_at_any_moment(house: Path, tmp_path: Path) -> None:
     assert run_child(house, models).communicate()[0].split()[1] == "42.0"
     names = sorted(path.name for path in models.iterdir())
     folder = cache.Entry.of(SPEC).folder.name
-    assert names == [folder, f"{folder}.lock"], "what the killed ones left is cleared away"
+    assert names == [folder, f"{folder}.lock", translation().name], "what the killed ones left is cleared away"
     assert_works()
 
 
@@ -245,8 +262,11 @@ def test_only_what_was_not_used_goes(stock: Callable[[], dict[str, str]], entry:
     removed, held = pruning.prune(30.0)
     assert {item.state for item in removed} == {"damaged or old", "other version", "unfinished"}
     assert len(removed) == 5 and not held
-    assert set(stock()) == {entry.folder.name, f"{entry.folder.name}.lock", "thesis", "msfp_notes.txt"}
-    assert pruning.prune(30.0) == ([], [])
+    kept = {entry.folder.name, f"{entry.folder.name}.lock", translation().name}
+    assert set(stock()) == kept | {"thesis", "msfp_notes.txt"}
+    then = time.time() - 40.0 * pruning.DAY
+    os.utime(translation(), (then, then))
+    assert pruning.prune(30.0) == ([], []) and not translation().exists()
     assert_works()
 
 

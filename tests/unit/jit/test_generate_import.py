@@ -15,6 +15,7 @@ from support import ROOT, Array
 
 from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
 from msfp_gen.jit.compiler import FLAGS, find_compiler
+from msfp_gen.jit.processor import x86_64_level
 from msfp_gen.motions.piecewise import hermite5
 
 LOAD = 112e3
@@ -85,28 +86,39 @@ def test_plain_script_imports_nothing_but_the_folder(folder: Path, tmp_path: Pat
 
 def test_folder_holds_sources_with_their_log_and_no_part_files(folder: Path) -> None:
     names = {path.name for path in folder.iterdir()}
-    assert {"msfp_model.h", "msfp_kernels.h", "msfp_runtime.h", "msfp_5_2_2.pyx", "build.log", "manifest.json"} <= names
+    assert {
+        "msfp_model.h",
+        "msfp_kernels.h",
+        "msfp_runtime.h",
+        "msfp_module.pyx",
+        "build.log",
+        "manifest.json",
+    } <= names
     assert not [name for name in names if name.startswith(".") or name.endswith(".o")]
+
+
+def run_program(folder: Path, place: Path, *flags: str) -> str:
+    """Compile the C program with the sources of a folder, and return what it prints."""
+    place.mkdir()
+    for path in (MAIN, *folder.glob("*.[ch]")):
+        if path.name not in ("msfp_module.c", "example.c"):  # the wrapper wants Python, the example has its own main
+            shutil.copy(path, place)
+    units = sorted(path.name for path in place.glob("*.c"))
+    command = [*find_compiler().command, *FLAGS["c"], *flags, "-Werror", *units, "-o", "program", *FLAGS["libraries"]]
+    built = subprocess.run(command, cwd=place, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    done = subprocess.run([place / "program"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-500:]
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
 def printed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Array]:
     """What the C program prints: one array of rows a name; the text of its status apart."""
-    place = tmp_path_factory.mktemp("program")
-    for path in (MAIN, *folder.glob("*.[ch]")):
-        if path.name not in (
-            "msfp_5_2_2.c",
-            "example.c",
-        ):  # the wrapper wants Python, the example has a main of its own
-            shutil.copy(path, place)
-    units = sorted(path.name for path in place.glob("*.c"))
-    command = [*find_compiler().command, *FLAGS["c"], "-Werror", *units, "-o", "program", *FLAGS["libraries"]]
-    built = subprocess.run(command, cwd=place, capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr
-    done = subprocess.run([place / "program"], capture_output=True, text=True)
+    output = run_program(folder, tmp_path_factory.mktemp("programs") / "all")
     rows: dict[str, list[list[float]]] = {}
-    *lines, last = done.stdout.splitlines()
-    assert (done.returncode, last) == (0, "status ok"), done.stdout[-500:]
+    *lines, last = output.splitlines()
+    assert last == "status ok", output[-500:]
     for line in lines:
         name, *numbers = line.split()
         rows.setdefault(name, []).append([float(x) for x in numbers])
@@ -115,7 +127,7 @@ def printed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 
 def test_only_the_wrapper_wants_python(folder: Path) -> None:
     wanting = {path.name for path in folder.glob("*.[ch]") if "Python.h" in path.read_text(encoding="utf-8")}
-    assert wanting == {"msfp_5_2_2.c"}
+    assert wanting == {"msfp_module.c"}
 
 
 def test_program_evaluates_as_python_does(printed: dict[str, Array]) -> None:
@@ -155,3 +167,15 @@ def test_program_runs_as_python_does(printed: dict[str, Array]) -> None:
     # the answer, but within the tolerance of the run.
     assert np.abs(printed["top_force"] - run.history.top_force).max() < scene.solver.rtol * peak
     assert peak > 0.05 * LOAD
+
+
+@pytest.mark.slow
+def test_programs_for_every_processor_give_the_same_numbers(folder: Path, tmp_path: Path) -> None:
+    """A model in the cache is compiled for one level of x86-64, so results do not depend on the machine."""
+    level = x86_64_level()
+    if level is None:
+        pytest.skip("no x86-64 processor")
+    printed = {run_program(folder, tmp_path / "all")}
+    for lower in range(1, level + 1):
+        printed.add(run_program(folder, tmp_path / str(lower), f"-DMSFP_X86_64_LEVEL={lower}"))
+    assert len(printed) == 1 and printed.pop().count("top_force") == 101

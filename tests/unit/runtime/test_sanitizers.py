@@ -94,7 +94,7 @@ def inputs(scene: Scene) -> str:
 
 def compiled(scene: Scene, folder: Path, flags: tuple[str, ...]) -> Path:
     """The program of one scene's model."""
-    sources = runtime_sources() | generate(scene.spec, "some_model").files
+    sources = runtime_sources() | generate(scene.spec).files
     for name, content in sources.items():
         (folder / name).write_text(content, encoding="utf-8")
     shutil.copy(REPLAY, folder)
@@ -144,6 +144,7 @@ def test_generated_c_is_clean_under_sanitizers(case: str, tmp_path: Path) -> Non
     same_as_python(scene, done.stdout)
 
 
+@pytest.mark.slow
 def test_a_run_is_clean_under_valgrind(tmp_path: Path) -> None:
     if shutil.which("valgrind") is None:
         pytest.skip("valgrind is not installed")
