@@ -26,6 +26,7 @@ STAMP = "written by msfp-gen"  # in the first line of each: a file without it be
 # Headers of the runtime that only its own sources include.
 PRIVATE = ("equations.h", "steppers.h", "run.h")
 PUBLIC = ("msfp_model.h", "msfp_kernels.h", "msfp_runtime.h")
+PYTHON_ONLY = ("msfp_module.c", "example.c")  # C files that are no part of the library
 HIDDEN = "-fvisibility=hidden"  # for the Python module; a library for C shows its functions
 
 
@@ -64,7 +65,7 @@ def write_guide(spec: ModelSpec, folder: Path, module: str) -> list[Path]:
 
 
 def _content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]:
-    sources = sorted(path.name for path in folder.glob("*.c") if path.name not in (f"{module}.c", "example.c"))
+    sources = sorted(path.name for path in folder.glob("*.c") if path.name not in PYTHON_ONLY)
     return {
         "stamp": f"{STAMP} {__version__} for {spec.key}",
         "spec": spec,

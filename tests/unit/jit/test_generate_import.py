@@ -19,6 +19,7 @@ from msfp_gen.jit.processor import x86_64_level
 from msfp_gen.motions.piecewise import hermite5
 
 LOAD = 112e3
+REPORT = Effects(bouc_wen="report")  # that of main.c
 MAIN = ROOT / "tests" / "support" / "c" / "main.c"
 
 STATE = {  # the same as in main.c
@@ -49,7 +50,7 @@ print(json.dumps(dict(status=status, acceleration=a.tolist(), friction_rate=rate
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("plain") / "model"
     try:
-        code = cli.main(["generate", "5", "2", "2", "-o", str(target)])
+        code = cli.main(["generate", "5", "2", "2", "--bouc-wen", "report", "-o", str(target)])
     except SystemExit as end:
         code = end.code
     assert not code
@@ -78,7 +79,7 @@ def test_plain_script_imports_nothing_but_the_folder(folder: Path, tmp_path: Pat
     assert found["status"] == "ok" and found["layout"] == [5, 2, 2] and found["foreign"] == []
     assert Path(found["file"]).parent == folder
     applied = {"base_acceleration": (0.5, 0.0, 0.0), "top_force": (0.0, 0.0, -LOAD)}
-    expected = build_model(Layout.tfp()).evaluate(presets.bearing("fenz-tfp"), **STATE, **applied)  # type: ignore[arg-type]
+    expected = build_model(Layout.tfp(), REPORT).evaluate(presets.bearing("fenz-tfp"), **STATE, **applied)  # type: ignore[arg-type]
     assert expected.acceleration is not None
     assert np.array(found["acceleration"]) == pytest.approx(expected.acceleration, rel=1e-9, abs=1e-6)
     assert np.array(found["friction_rate"]) == pytest.approx(expected.friction_rate, rel=1e-9)
@@ -132,7 +133,7 @@ def test_only_the_wrapper_wants_python(folder: Path) -> None:
 
 def test_program_evaluates_as_python_does(printed: dict[str, Array]) -> None:
     """main.c has its rig's springs, which pull a tilted stack back, so the same Top goes in here."""
-    model, bearing = build_model(Layout.tfp()), presets.bearing("fenz-tfp")
+    model, bearing = build_model(Layout.tfp(), REPORT), presets.bearing("fenz-tfp")
     stack = model.stack(bearing, Top.rig(LOAD, 1e8, 5.0, 1e6, 5.0))
     base = np.zeros((3, 6))
     base[2, 0] = 0.5
@@ -156,7 +157,7 @@ def test_program_runs_as_python_does(printed: dict[str, Array]) -> None:
         motion,
         Top.rig(LOAD, 1e8, 5.0, 1e6, 5.0),
         solver=Solver(rtol=1e-5),
-        effects=Effects(),
+        effects=REPORT,
         output_step=0.02,
     )
     run = simulate(scene)
