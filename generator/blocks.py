@@ -39,6 +39,8 @@ class Blocks:
     rim_coordinates: Block
     gap: Block
     top_wrench: Block
+    foot_stage: Block
+    foot: Block
     support: Block
     upright: Block
     linear: Block
@@ -101,6 +103,9 @@ def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("ja", "kg m^2", "its axial moment of inertia")
         .scalar("h", "m", "height of its centre above r_nn")
         .scalar("g", "m/s^2", "gravitational acceleration")
+        .scalar("mz", "kg", "supported mass that follows the top plate vertically; 0 on a vertical spring")
+        .scalar("kv", "N/m", "vertical stiffness between top plate and foot")
+        .scalar("cv", "N s/m", "vertical damping between top plate and foot")
         .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR)
         .build(),
     }
@@ -250,6 +255,18 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
         "top_wrench": new("top_wrench")
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
+        .build(),
+        "foot_stage": new("foot_stage")
+        .scalar("y", "m", "height of the foot that the earlier stages give, less beta^2 y''; y itself outside of a step")
+        .scalar("y1", "m/s", "its rate, less beta y''; y' itself outside of a step")
+        .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
+        .scalar("mobility", "1/kg", "1/(m + c beta + k beta^2); 0 where no mass rests on the spring")
+        .scalar("share", "-", "m times mobility; 1 where no mass rests on the spring")
+        .build(),
+        "foot": new("foot")
+        .scalar("y", "m", "height of the foot: the lower end of the supported mass, or the fixed end of the spring")
+        .scalar("y1", "m/s", "its velocity")
+        .scalar("y2", "m/s^2", "its acceleration")
         .build(),
         "support": new("support")
         .scalar("psi", "rad", "psi of the support of the top plate", 0)

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 _EVENT_KINDS = names(EVENT_KINDS)
 
 
-def history_of(model: Model, rows: Array, azimuth: float) -> History:
+def history_of(model: Model, rows: Array, azimuth: float, sprung: bool = False) -> History:
     """The rows of a segment, up to the first that is not finite, in the frame of the user.
 
-    rows: shape (T, row size). azimuth: of the frame of the model [rad].
+    rows: shape (T, row size). azimuth: of the frame of the model [rad]. sprung: whether the top has a vertical spring.
     """
     finite = np.isfinite(rows).all(axis=1)
     f = model.unpack(rows if finite.all() else rows[: int(finite.argmin())])
@@ -71,6 +71,7 @@ def history_of(model: Model, rows: Array, azimuth: float) -> History:
         energy=energy,
         friction_coefficient=f.get("mu"),
         temperature=f.get("temperature"),
+        top_settlement=f["top_settlement"] if sprung else None,
     )
 
 

@@ -212,7 +212,8 @@ def damping_share(scene: SceneParts) -> float:
     if isinstance(top, RigTop):
         sliding = min(surface.radius for surface in surfaces) ** 2 * friction
         reversal = top.rotational_stiffness * min(surface.yield_displacement for surface in surfaces)
-        share += top.damping * speed / friction + top.rotational_damping * speed / max(sliding, reversal)
+        linear = max(top.damping, top.vertical_damping)
+        share += linear * speed / friction + top.rotational_damping * speed / max(sliding, reversal)
     return share
 
 

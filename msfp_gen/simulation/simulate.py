@@ -21,6 +21,7 @@ from msfp_gen.result import Result
 from msfp_gen.results.history import Counters
 from msfp_gen.results.note import Note
 from msfp_gen.results.row_unpacking import events_of, history_of, joined
+from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
@@ -243,7 +244,8 @@ def _result(sequence: RunSequence) -> Result:
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
     }
-    history = joined([history_of(s.model, s.run.rows, s.azimuth) for s in segments], scene.output_step)
+    sprung = is_sprung(scene.top)
+    history = joined([history_of(s.model, s.run.rows, s.azimuth, sprung) for s in segments], scene.output_step)
     return Result(
         scene=scene,
         history=history,

@@ -80,6 +80,9 @@ void msfp_interpolate(const msfp_run *run, double share, msfp_state *out)
             out->heat[k][i] = inside(&w, a->heat[k][i], da[k][i], &m->heat[k][i], b->heat[k][i], db[k][i], h, share);
     }
 #endif
+    for (int i = 0; i < 2; ++i)
+        out->foot[i] = inside(&w, a->foot[i], a->foot[i + 1], &m->foot[i], b->foot[i], b->foot[i + 1], h, share);
+    out->foot[2] = (1.0 - share) * a->foot[2] + share * b->foot[2];
     for (int i = 0; i < MSFP_WORKS; ++i)
         out->work[i] = inside(&w, a->work[i], a->power[i], &m->work[i], b->work[i], b->power[i], h, share);
 }
@@ -92,6 +95,7 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
     memcpy(at->v, s->v, sizeof at->v);
     memcpy(at->a, s->a, sizeof at->a);
     memcpy(at->f, s->f, sizeof at->f);
+    memcpy(at->foot, s->foot, sizeof at->foot);
     msfp_heat_point(s, at);
 }
 
@@ -103,10 +107,23 @@ double msfp_absolute_tolerance(const msfp_run *run, int j, int d)
     return 10.0 * run->options.rtol * run->work.reference / run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KS];
 }
 
+/* Largest error of the height of the foot, and if `rates` of its velocity, over its tolerance [-]. The tolerance is
+ * that of the force of the spring, relative as for Y, Z: the share 10 rtol of the settlement under the supported mass.
+ */
+static double foot_error(const msfp_run *run, const msfp_increment *error, int rates)
+{
+    const double *t = run->parameters.top, mass = msfp_sprung_mass(&run->parameters);
+    const double weight = 10.0 * run->options.rtol * mass * run->parameters.gravity;
+    if (mass == 0.0)
+        return 0.0;
+    const double height = fabs(error->foot[0]) * t[MSFP_TOP_PARAMETERS_KV];
+    return fmax(height, rates ? fabs(error->foot[1]) * sqrt(t[MSFP_TOP_PARAMETERS_KV] * mass) : 0.0) / weight;
+}
+
 double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates)
 {
     const double rtol = run->options.rtol;
-    double worst = 0.0;
+    double worst = foot_error(run, error, rates);
     for (int k = 0; k < NB; ++k) {
         for (int i = 0; i < MSFP_ND; ++i) {
             const int d = unknown[i];
