@@ -108,12 +108,11 @@ double msfp_absolute_tolerance(const msfp_run *run, int j, int d)
 }
 
 /* Largest error of the height of the foot, and if `rates` of its velocity, over its tolerance [-]. The tolerance is
- * that of the force of the spring, relative as for Y, Z: the share 10 rtol of the settlement under the supported mass.
- */
+ * the share rtol of the settlement under the supported mass, or of the force of the spring: the error of N. */
 static double foot_error(const msfp_run *run, const msfp_increment *error, int rates)
 {
     const double *t = run->parameters.top, mass = msfp_sprung_mass(&run->parameters);
-    const double weight = 10.0 * run->options.rtol * mass * run->parameters.gravity;
+    const double weight = run->options.rtol * mass * run->parameters.gravity;
     if (mass == 0.0)
         return 0.0;
     const double height = fabs(error->foot[0]) * t[MSFP_TOP_PARAMETERS_KV];
