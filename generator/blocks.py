@@ -257,8 +257,8 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
         .build(),
         "foot_stage": new("foot_stage")
-        .scalar("y", "m", "height of the foot that the earlier stages give, less beta^2 y''; y itself outside of a step")
-        .scalar("y1", "m/s", "its rate, less beta y''; y' itself outside of a step")
+        .scalar("y", "m", "y of the foot less beta^2 y'', what the earlier stages give; y outside of a step")
+        .scalar("y1", "m/s", "its rate less beta y''; y' outside of a step")
         .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
         .scalar("mobility", "1/kg", "1/(m + c beta + k beta^2); 0 where no mass rests on the spring")
         .scalar("share", "-", "m times mobility; 1 where no mass rests on the spring")

@@ -72,7 +72,7 @@ class RigTop(Top):
 
     axial_load: downward [N]. stiffness, damping: k_top, c_top along E1 and E2 [N/m], [N s/m].
     rotational_stiffness, rotational_damping: against tilt and spin [N m/rad], [N m s/rad]. vertical_stiffness,
-    vertical_damping: of a rig that holds its height, in parallel with the axial load, without force at the height of the
+    vertical_damping: of a rig that holds its height, beside the axial load, without force at the height of the
     start [N/m], [N s/m]; 0: the load alone. Raises InputError.
     """
 

@@ -107,16 +107,20 @@ double msfp_absolute_tolerance(const msfp_run *run, int j, int d)
     return 10.0 * run->options.rtol * run->work.reference / run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KS];
 }
 
+/* A settlement below this counts as this [m]: a mass with a period below 20 ms follows the top plate. */
+static const double smallest_settlement = 1e-4;
+
 /* Largest error of the height of the foot, and if `rates` of its velocity, over its tolerance [-]. The tolerance is
- * the share rtol of the settlement under the supported mass, or of the force of the spring: the error of N. */
+ * the share rtol of the settlement under the supported mass, and so of the force of the spring, which N is. */
 static double foot_error(const msfp_run *run, const msfp_increment *error, int rates)
 {
-    const double *t = run->parameters.top, mass = msfp_sprung_mass(&run->parameters);
-    const double weight = run->options.rtol * mass * run->parameters.gravity;
+    const double gravity = run->parameters.gravity, stiffness = run->parameters.top[MSFP_TOP_PARAMETERS_KV];
+    const double mass = msfp_sprung_mass(&run->parameters);
     if (mass == 0.0)
         return 0.0;
-    const double height = fabs(error->foot[0]) * t[MSFP_TOP_PARAMETERS_KV];
-    return fmax(height, rates ? fabs(error->foot[1]) * sqrt(t[MSFP_TOP_PARAMETERS_KV] * mass) : 0.0) / weight;
+    const double settlement = fmax(mass * gravity / stiffness, smallest_settlement);
+    const double speed = sqrt(settlement * gravity); /* settlement times circular frequency */
+    return fmax(fabs(error->foot[0]) / settlement, rates ? fabs(error->foot[1]) / speed : 0.0) / run->options.rtol;
 }
 
 double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates)
