@@ -251,8 +251,8 @@ def _transferred_foot(at: RestartState, q: Array) -> Array:
     The separations that the earlier model did not have lower the top plate. The foot follows, so that the force of its
     spring does not change.
     """
-    lowered = q[:, 5].sum() if q.shape[1] > at.q.shape[1] else 0.0
-    return at.foot + np.array([lowered, 0.0])
+    lowered = float(q[:, 5].sum()) if q.shape[1] > at.q.shape[1] else 0.0
+    return np.array([at.foot[0] + lowered, at.foot[1]])
 
 
 def _significant_rise(scene: Scene, effects: Effects, selection: EffectSelection) -> float:
