@@ -241,13 +241,21 @@ def test_a_stiff_spring_tends_to_the_rigid_mass():
     assert rigid.top_settlement is None and np.abs(stiff.top_settlement).max() < 2e-6
 
 
-def test_at_rest_nothing_moves():
+@pytest.mark.parametrize("effects", [PLANAR, UPLIFT], ids=("closed", "uplift"))
+def test_at_rest_nothing_moves(effects):
     """The spring carries the weight from the start."""
     still = Motion(np.array([0.0, 2.0]), np.zeros((1, 6, 6)))
     for top in (sprung(), HELD):
-        history = simulate(scene(still, top)).history
+        history = simulate(scene(still, top, effects)).history
         assert np.ptp(history.top_settlement) < 1e-12 and np.abs(history.tilt_angles).max() < 1e-12
-        assert np.ptp(history.top_force[:, 2]) < 1e-6
+        assert np.ptp(history.top_force[:, 2]) < 1e-5
+
+
+def test_a_rig_that_lets_the_bearing_go_is_modelled_with_uplift():
+    """A base that sinks by 20 mm below a rig that holds its height unloads the bearing."""
+    sinking = motion(-0.02, 0.04, frequency=0.5)
+    chosen = [scene(sinking, replace(HELD, vertical_stiffness=k), Auto()).modelled.uplift for k in (1e5, 1e7)]
+    assert chosen == [False, True]
 
 
 # ---- runs that continue -------------------------------------------------------------------------------------------
