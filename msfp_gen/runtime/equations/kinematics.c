@@ -162,14 +162,16 @@ double msfp_sprung_mass(const msfp_parameters *p)
     return p->top[MSFP_TOP_PARAMETERS_M] - p->top[MSFP_TOP_PARAMETERS_MZ];
 }
 
-/* The block `foot_stage`. A spring on which no mass rests has a fixed end. */
+/* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
 static void load_foot(const msfp_parameters *p, const msfp_point *at, double *stage)
 {
+    memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
+    if (!msfp_top_is_sprung(p))
+        return;
     const double mass = msfp_sprung_mass(p), beta = mass > 0.0 ? at->foot_beta : 0.0;
     const double moving = mass + beta * (p->top[MSFP_TOP_PARAMETERS_CV] + beta * p->top[MSFP_TOP_PARAMETERS_KV]);
-    const int sprung = msfp_top_is_sprung(p);
-    stage[MSFP_FOOT_STAGE_Y] = sprung ? at->foot[0] : 0.0;
-    stage[MSFP_FOOT_STAGE_Y1] = sprung ? at->foot[1] : 0.0;
+    stage[MSFP_FOOT_STAGE_Y] = at->foot[0];
+    stage[MSFP_FOOT_STAGE_Y1] = at->foot[1];
     stage[MSFP_FOOT_STAGE_BETA] = beta;
     stage[MSFP_FOOT_STAGE_MOBILITY] = mass > 0.0 ? 1.0 / moving : 0.0;
     stage[MSFP_FOOT_STAGE_SHARE] = mass > 0.0 ? mass / moving : 1.0;
@@ -178,39 +180,32 @@ static void load_foot(const msfp_parameters *p, const msfp_point *at, double *st
 /* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
 static void move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
 {
-    double motion[3][3];
+    const double *plate = w->body[NB];
     if (msfp_top_is_sprung(p)) {
-        msfp_foot(p->top, w->body[NB], stage, w->foot);
+        msfp_foot(p->top, plate, stage, w->foot);
         return;
     }
-    msfp_body_C_get(w->body[NB], motion[0]);
-    msfp_body_V_get(w->body[NB], motion[1]);
-    msfp_body_A_get(w->body[NB], motion[2]);
-    for (int order = 0; order < 3; ++order)
-        w->foot[order] = motion[order][2];
+    w->foot[MSFP_FOOT_Y] = plate[MSFP_BODY_CZ];
+    w->foot[MSFP_FOOT_Y1] = plate[MSFP_BODY_VZ];
+    w->foot[MSFP_FOOT_Y2] = plate[MSFP_BODY_AZ];
 }
 
 void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2])
 {
-    double C[3], V[3];
+    const double *plate = w->body[NB];
     const int sprung = msfp_top_is_sprung(p);
-    msfp_body_C_get(w->body[NB], C);
-    msfp_body_V_get(w->body[NB], V);
-    settlement[0] = sprung ? C[2] - w->foot[MSFP_FOOT_Y] : 0.0;
-    settlement[1] = sprung ? V[2] - w->foot[MSFP_FOOT_Y1] : 0.0;
+    settlement[0] = sprung ? plate[MSFP_BODY_CZ] - w->foot[MSFP_FOOT_Y] : 0.0;
+    settlement[1] = sprung ? plate[MSFP_BODY_VZ] - w->foot[MSFP_FOOT_Y1] : 0.0;
 }
 
 void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
 {
     msfp_work w;
-    double C[3], V[3];
-    const double stiffness = p->top[MSFP_TOP_PARAMETERS_KV];
+    const double *plate = w.body[NB], stiffness = p->top[MSFP_TOP_PARAMETERS_KV];
     msfp_base(p, at, &w);
     msfp_kinematics(p, at, &w);
-    msfp_body_C_get(w.body[NB], C);
-    msfp_body_V_get(w.body[NB], V);
-    foot[0] = C[2] - (stiffness > 0.0 ? msfp_sprung_mass(p) * p->gravity / stiffness : 0.0);
-    foot[1] = msfp_sprung_mass(p) > 0.0 ? V[2] : 0.0;
+    foot[0] = plate[MSFP_BODY_CZ] - (stiffness > 0.0 ? msfp_sprung_mass(p) * p->gravity / stiffness : 0.0);
+    foot[1] = msfp_sprung_mass(p) > 0.0 ? plate[MSFP_BODY_VZ] : 0.0;
 }
 
 static void split_wrench(const double *wrench, double *force, double *moment)
