@@ -54,6 +54,7 @@ TITLES = {
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
     "gap": "Sliding and gap (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
+    "foot": "The foot of a supported mass on a vertical spring, at the end of a stage",
     "top_wrench": "The top (3.28), (3.29): rig springs, supported mass and outside load",
     "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",
     "surface_local": "Contact force and slip rotation in the basis of the body below (3.12), (3.19)",

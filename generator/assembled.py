@@ -32,7 +32,8 @@ NAMES = {
     "ddtheta_2": r"\ddot{\theta}_{2}",
 }
 NO_FORCE = {"Fx": sp.Integer(0), "Fz": sp.Integer(0)}
-NO_RIG = dict.fromkeys(("k", "c", "kr", "cr", "m", "jt", "ja", "h", "g", "x0x", "x0z"), sp.Integer(0))
+NO_RIG = dict.fromkeys(("k", "c", "kr", "cr", "m", "jt", "ja", "h", "g", "mz", "kv", "cv", "x0x", "x0z"), sp.Integer(0))
+NO_FOOT = dict.fromkeys(("y", "y1", "beta", "mobility", "share"), sp.Integer(0))
 
 
 def symbol(name: str) -> sp.Symbol:
@@ -111,6 +112,7 @@ def assembled() -> dict[str, sp.Expr]:
     top = evaluate(
         p["top_wrench"],
         par=NO_RIG,
+        y=NO_FOOT,
         b=body,
         x=coordinates(2),
         fe={"Fx": symbol("F_1"), "Fz": symbol("F_3")},

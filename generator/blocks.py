@@ -6,14 +6,10 @@ In a planar model polar vectors keep (E1, E3), axial ones keep E2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from .program import Block, BlockBuilder
-
-POLAR = (None, 0, None)
-AXIAL = (0, None, 0)
-Maker = Callable[[str], BlockBuilder]
+from .program import AXIAL, POLAR, Block, BlockBuilder, Maker
+from .top_blocks import top_blocks
 
 
 @dataclass(frozen=True)
@@ -39,6 +35,8 @@ class Blocks:
     rim_coordinates: Block
     gap: Block
     top_wrench: Block
+    foot_stage: Block
+    foot: Block
     support: Block
     upright: Block
     linear: Block
@@ -53,7 +51,7 @@ class Blocks:
 
 
 def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
-    """Parameters: dimensions, masses, surfaces, the top."""
+    """Parameters: dimensions, masses, surfaces."""
     return {
         "dimensions": new("dimensions")
         .scalar("height", "m", "l, height of the body")
@@ -90,18 +88,6 @@ def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("cs", "s/m", "damping of the unilateral contact, over its stiffness and compression")
         .scalar("ca", "-", "cosine of the half-angle of the footprint, friction angle included")
         .scalar("sa", "-", "sine of that angle")
-        .build(),
-        "top_parameters": new("top_parameters")
-        .scalar("k", "N/m", "horizontal stiffness of the rig")
-        .scalar("c", "N s/m", "horizontal damping of the rig")
-        .scalar("kr", "N m/rad", "rotational stiffness")
-        .scalar("cr", "N m s/rad", "rotational damping")
-        .scalar("m", "kg", "supported mass")
-        .scalar("jt", "kg m^2", "its transverse moment of inertia")
-        .scalar("ja", "kg m^2", "its axial moment of inertia")
-        .scalar("h", "m", "height of its centre above r_nn")
-        .scalar("g", "m/s^2", "gravitational acceleration")
-        .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR)
         .build(),
     }
 
@@ -245,22 +231,8 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
 
 
 def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
-    """Residuals of the balances of a body, and the boundary conditions at the top."""
+    """Residuals of the balances of a body."""
     return {
-        "top_wrench": new("top_wrench")
-        .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
-        .vector("M", "N m", "-M_top about r_nn", AXIAL)
-        .build(),
-        "support": new("support")
-        .scalar("psi", "rad", "psi of the support of the top plate", 0)
-        .scalar("theta", "rad", "theta of the support of the top plate")
-        .scalar("psi1", "rad/s", "d psi/dt", 0)
-        .scalar("theta1", "rad/s", "d theta/dt")
-        .build(),
-        "upright": new("upright")
-        .vector("e", "-", "axis of the support, in line with the t_3 of the top plate at rest", POLAR)
-        .vector("w", "rad/s", "its angular velocity", AXIAL)
-        .build(),
         "linear": new("linear")
         .vector("r", "N", "(3.26), (3.28): left side less right side, along E1, E2, E3", POLAR)
         .build(),
@@ -277,7 +249,8 @@ def make_blocks(planar: bool, uplift: bool = False) -> Blocks:
         return BlockBuilder(name, planar)
 
     groups = (_parameters, _motion, _interfaces, _rims, _balances)
-    return Blocks(**{name: block for group in groups for name, block in group(new, uplift).items()})
+    blocks = {name: block for group in groups for name, block in group(new, uplift).items()}
+    return Blocks(**blocks, **top_blocks(new))
 
 
 def _points(new: Maker) -> Block:

@@ -14,10 +14,10 @@ from typing import Any
 
 import sympy as sp
 
-from .blocks import AXIAL, POLAR, Blocks
+from .blocks import Blocks
 from .body import rate_of_angular_momentum, relative_turning
 from .contact import contact_basis
-from .program import Block, BlockBuilder, Program, Vector
+from .program import AXIAL, POLAR, Block, BlockBuilder, Program, Vector
 from .vectors import add, cross, project, scale, subtract
 
 Symbols = dict[str, Any]

@@ -68,6 +68,7 @@ def derive(spec: ModelSpec) -> Equations:
         body.angular_balance(blocks, massless),
         body.body_energy(blocks, massless),
         top.top_wrench(blocks, effects.top_rotation),
+        top.foot(blocks),
         top.top_energy(blocks),
         contact.gap(blocks),
     ]

@@ -7,13 +7,15 @@ result is named when it is formed. Expressions therefore stay small, and derivat
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import sympy as sp
 
 Vector = tuple[sp.Expr, sp.Expr, sp.Expr]
 AXES = "xyz"
+POLAR, AXIAL = (None, 0, None), (0, None, 0)
+"""Constant components of a vector in a planar model, which keeps (E1, E3) of a polar and E2 of an axial one."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,10 @@ class BlockBuilder:
     def build(self) -> Block:
         """The block with the fields added so far."""
         return Block(self.name, tuple(self.fields), self.quantities)
+
+
+Maker = Callable[[str], BlockBuilder]
+"""Begins the block of a given name."""
 
 
 @dataclass(frozen=True)

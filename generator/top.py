@@ -15,7 +15,10 @@ Symbols = dict[str, Any]
 
 
 def mass_point(p: Program, par: Symbols, body: Symbols) -> tuple[Vector, Vector, Vector]:
-    """Position r_nn + h t3 of the centre of the supported mass [m], its velocity [m/s] and acceleration [m/s^2]."""
+    """Position r_nn + h t3 of the centre of the supported mass [m], its velocity [m/s] and acceleration [m/s^2].
+
+    Where the mass rests on a vertical spring, C, V, A of `body` are the motion of its foot.
+    """
     p.declare_rates(body["C"], body["V"])
     p.declare_rates(body["V"], body["A"])
     p.declare_rates(body["w"], body["al"])
@@ -37,10 +40,44 @@ def upright(b: Blocks) -> Program:
     return p
 
 
+def vertical_spring(p: Program, par: Symbols, body: Symbols, stage: Symbols) -> tuple[sp.Expr, sp.Expr]:
+    """Force S of the vertical spring on the foot [N], and acceleration y'' of the foot [m/s^2].
+
+    The stage formula, y = Q + beta y' and y' = V + beta y'', eliminates y'' from m (y'' + (h t3)'' + g) = S. Where no
+    mass rests on the spring, its end does not move and beta is 0. Without a spring S is 0. `mass_point` has declared
+    the rates.
+    """
+    raised = p.rate(p.rate(par["h"] * body["t3"][2]))
+    weight = p.let(raised + par["g"], "weight")
+    spring = par["kv"] * (body["C"][2] - stage["y"]) + par["cv"] * (body["V"][2] - stage["y1"])
+    spring = p.let(spring, "spring")
+    zeta = p.let(stage["beta"] * (par["cv"] + par["kv"] * stage["beta"]), "zeta")
+    force = p.let(stage["share"] * (spring + zeta * weight), "S")
+    return force, stage["mobility"] * (spring - par["m"] * weight)
+
+
+def foot(b: Blocks) -> Program:
+    """Height of the foot of the supported mass with its derivatives, at the end of a stage."""
+    p = Program("foot", "height of the foot of the supported mass, from the stage formula and its balance")
+    par: Symbols = p.read(b.top_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    stage: Symbols = p.read(b.foot_stage, "y", active=False)
+    mass_point(p, par, body)
+    acceleration = p.let(vertical_spring(p, par, body, stage)[1])
+    step = p.let(stage["beta"] * acceleration)
+    p.write(
+        b.foot,
+        {"y": stage["y"] + stage["beta"] * step, "y1": stage["y1"] + step, "y2": acceleration},
+        tangents=False,
+    )
+    return p
+
+
 def top_wrench(b: Blocks, rotating_support: bool) -> Program:
     """Force -F_top and moment -M_top about r_nn, exerted by the bearing on its support: (3.28), (3.29)."""
     p = Program("top_wrench", "-F_top, -M_top of (3.28), (3.29): rig springs, prescribed load, supported mass")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
+    stage: Symbols = p.read(b.foot_stage, "y", active=False)
     body: Symbols = p.read(b.body, "b", active=("t3", "w", "al", "wp", "alp", "C", "V", "A"))
     x: Symbols = p.read(b.coordinates, "x", active=("phi",))
     force: Symbols = p.read(b.vector, "fe")
@@ -52,7 +89,9 @@ def top_wrench(b: Blocks, rotating_support: bool) -> Program:
         zero,
     )
     _, _, a = mass_point(p, par, body)
-    inertia = p.let_vector(scale(par["m"], add(a, (zero, zero, par["g"]))), "inertia")
+    spring, _ = vertical_spring(p, par, body, stage)
+    x_part, y_part, _ = scale(par["m"], a)
+    inertia = p.let_vector((x_part, y_part, par["mz"] * (a[2] + par["g"]) + spring), "inertia")
     f = add(p.let_vector(horizontal, "rig"), inertia, scale(sp.Integer(-1), force["F"]))
     t3 = body["t3"]
     axis, relative = (zero, zero, sp.Integer(1)), body["wp"]
@@ -79,6 +118,8 @@ def top_energy(b: Blocks) -> Program:
     par: Symbols = p.read(b.top_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
     base: Symbols = p.read(b.base_motion, "o", active=False)
-    r, v, _ = mass_point(p, par, body)
+    foot: Symbols = p.read(b.foot, "f", active=False)
+    heights = {"C": foot["y"], "V": foot["y1"], "A": foot["y2"]}
+    r, v, _ = mass_point(p, par, {**body, **{name: (*body[name][:2], z) for name, z in heights.items()}})
     p.write(b.energy, energy_terms(p, par, body, r, v, base), tangents=False)
     return p

@@ -13,16 +13,17 @@ EventRow = tuple[float, int, int, tuple[float, ...], tuple[float, ...]]
 class Stack(Protocol):
     """One bearing with its top. Arrays are contiguous float64 in SI units.
 
-    heat: keyword `rise`, the temperature above its start value [K], for friction laws with temperature.
+    state: keywords `rise`, the temperature above its start value [K], for friction laws with temperature; and `foot`,
+    height of the foot of a mass on a vertical spring and its rate [m], [m/s]; left out: at rest.
     """
 
     def accelerations(
-        self, q: Array, v: Array, f: Array, base: Array, load: Array, *, report: bool = False, **heat: Array
+        self, q: Array, v: Array, f: Array, base: Array, load: Array, *, report: bool = False, **state: Array
     ) -> tuple[str, Array, Array, Array, float, int, int, Array | None]:
         """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns."""
 
     def observe(
-        self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **heat: Array
+        self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **state: Array
     ) -> tuple[Array, Array, Array, int]:
         """Row, powers, friction rates, and the surface that would have to transmit tension (0: none)."""
 
@@ -38,7 +39,7 @@ class Stack(Protocol):
         cv: float,
         ca: float,
         beta: float,
-        **heat: Array,
+        **state: Array,
     ) -> tuple[str, Array, Array, Array]:
         """Status, residual, tangent, and Y, Z of the condensed equations."""
 

@@ -52,7 +52,7 @@ def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
     if isinstance(top, MassTop):
         inertia = top.inertia if isinstance(top.inertia, tuple) else (top.inertia, top.inertia)
         given = {**given, "inertia_transverse": inertia[0], "inertia_axial": inertia[1]}
-    values |= {name: value for name, value in given.items() if name in values}
+    values |= {name: value for name, value in given.items() if name in values and value is not None}
     return np.array([float(value) for value in values.values()])
 
 

@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.columns import state_columns, unknown_columns
 from msfp_gen.motions.piecewise import derivatives
-from msfp_gen.scene.top import load_values
+from msfp_gen.scene.top import is_sprung, load_values
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Stack
@@ -43,7 +43,7 @@ class Ode:
 
     `jac(t, y)` is exact: it follows from the balances (3.26)-(3.29) by the implicit function theorem. `y0`: centred and
     at rest. An instance unpacks as `fun, jac, y0`. Raises InputError for massless models, friction laws with
-    temperature, and a planar model with a motion outside the E1-E3 plane.
+    temperature, a top on a vertical spring, and a planar model with a motion outside the E1-E3 plane.
     """
 
     def __init__(self, model: Equations, bearing: Bearing, motion: Motion, top: Top) -> None:
@@ -53,6 +53,11 @@ class Ode:
             raise InputError(
                 f"as_ode: effects.friction = {model.effects.friction!r} has temperatures, which y does not contain; "
                 "use simulate, or a law without T"
+            )
+        if is_sprung(top):
+            raise InputError(
+                f"as_ode: top.vertical_stiffness = {top.vertical_stiffness!r}: y does not contain the height of the "  # type: ignore[attr-defined]
+                "foot; use simulate, or leave the vertical spring out"
             )
         if model.planar and motion.plane() != 0.0:
             raise InputError(

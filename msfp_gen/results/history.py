@@ -104,6 +104,10 @@ class History:
     # None unless the model has a friction law, or one with temperature.
     friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")] = None
     temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
+    # None unless the top has a vertical stiffness or damping.
+    top_settlement: Annotated[
+        Array | None, Rows((), "m", "compression of the vertical spring of the top, settlement of a supported mass")
+    ] = None
 
     def __post_init__(self) -> None:
         if not len(self.time):

@@ -25,10 +25,11 @@ def finite_rows(rows: Array) -> Array:
     return rows if finite.all() else rows[: int(finite.argmin())]
 
 
-def history_of(model: Model, rows: Array, azimuth: float) -> History:
+def history_of(model: Model, rows: Array, azimuth: float, sprung: bool = False) -> History:
     """The rows of a segment in the frame of the user.
 
-    rows: of `finite_rows`, one or more. azimuth: of the frame of the model [rad].
+    rows: of `finite_rows`, one or more. azimuth: of the frame of the model [rad]. sprung: whether the top has a
+    vertical spring.
     """
     f = model.unpack(rows)
     turn = azimuth
@@ -76,6 +77,7 @@ def history_of(model: Model, rows: Array, azimuth: float) -> History:
         energy=energy,
         friction_coefficient=f.get("mu"),
         temperature=f.get("temperature"),
+        top_settlement=f["top_settlement"] if sprung else None,
     )
 
 

@@ -74,6 +74,9 @@ typedef struct {
     /* Coordinates of the moving bodies psi, theta, phi [rad], with uplift the separation [m], and two derivatives. */
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];
     double f[MSFP_NB][2]; /* friction state Y, Z [-] */
+    /* Height of the foot of the supported mass and its rate, [m], [m/s]; in a stage with diagonal entry foot_beta [s]
+     * what the earlier stages give: y = foot[0] + foot_beta^2 y'', y' = foot[1] + foot_beta y''. */
+    double foot[2], foot_beta;
 #if MSFP_HEAT
     double rise[MSFP_NB], warming; /* temperature above the start [K] is rise + warming * flux of the surface */
 #endif
@@ -108,6 +111,7 @@ typedef struct {
                       [MSFP_COEFFICIENT_SIZE]; /* mu on entry is the first guess of Newton's method; 0 will do */
 #endif
     double lock[MSFP_NB]; /* axial moment that holds phi'' = 0 where spin is locked [N m] */
+    double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
     double reference;     /* weight and load, the scale of forces where no normal force is known [N] */
 #if MSFP_UPLIFT
     double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE];
@@ -133,6 +137,10 @@ typedef struct {
     int determinant; /* sign of the determinant of the equations solved: 1, -1 or 0 */
     double residual; /* largest residual relative to its natural size [-] */
 } msfp_solution;
+
+/* Height of the foot at which the vertical spring of the top carries the supported mass, and the vertical velocity of
+ * the top plate, into foot [m], [m/s]. */
+void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2]);
 
 /* Accelerations at a given state from the condensed equations, into at->a. Returns MSFP_OK or a status. */
 int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, msfp_solution *out);
@@ -243,6 +251,7 @@ typedef struct {
     int quasistatic; /* no force depends on rates beyond the tolerance: take quasi-static steps where the model can */
     double start_time;            /* [s] */
     const double *origin;         /* [3] r_01 - r_nn at the start of the whole run [m]; NULL: that of this start */
+    const double *foot;           /* [2] height of the foot of the supported mass and its rate; NULL: at rest */
     const double *heat;           /* [MSFP_NB][MSFP_HEAT] parts of the temperature rise [K]; NULL: zero */
     int monitors, monitor_stop; /* monitors that are active, and those that stop the run: bits 1 << MSFP_MONITOR_... */
     double monitor_normal;        /* least normal force [N] */
@@ -277,6 +286,7 @@ typedef struct {
     double t;                                                                 /* [s] */
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];     /* as in msfp_point */
     double f[MSFP_NB][2], df[MSFP_NB][2];                                     /* Y, Z [-] and their rates [1/s] */
+    double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
     double work[MSFP_WORKS], power[MSFP_WORKS];                               /* integrals [J] and integrands [W] */
     double prescribed_power; /* of everything that moves as prescribed, a part of power[MSFP_WORK_INPUT] [W] */
     double energy;           /* stored energy [J], see energy_balance.c */
@@ -289,7 +299,7 @@ typedef struct {
 /* Values at an interpolation node inside the last step. */
 typedef struct {
     double share; /* of the step, 0 to 1 */
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], work[MSFP_WORKS];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2], work[MSFP_WORKS];
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif

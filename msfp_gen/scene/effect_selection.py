@@ -171,7 +171,15 @@ def minimum_load(scene: SceneParts) -> float:
     vertical = scene.motion.evaluate(times, 2)[:, 2]
     bodies = sum(body.mass for body in scene.bearing.bodies)
     inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + vertical)
-    return float(np.min(inertial + _applied_load(scene, times)))
+    return float(np.min(inertial + _applied_load(scene, times) + _held_load(scene, times)))
+
+
+def _held_load(scene: SceneParts, times: Array) -> Array | float:
+    """Force of the vertical spring of a rig if the top plate rises and falls with the base, downward positive [N]."""
+    if not isinstance(scene.top, RigTop):
+        return 0.0
+    rise = scene.motion.evaluate(times)[:, 2] - scene.motion.evaluate(times[:1])[0, 2]
+    return np.asarray(scene.top.vertical_stiffness * rise)
 
 
 def _supported_mass(scene: SceneParts) -> float:
@@ -218,7 +226,8 @@ def damping_share(scene: SceneParts) -> float:
     if isinstance(top, RigTop):
         sliding = min(surface.radius for surface in surfaces) ** 2 * friction
         reversal = top.rotational_stiffness * min(surface.yield_displacement for surface in surfaces)
-        share += top.damping * speed / friction + top.rotational_damping * speed / max(sliding, reversal)
+        linear = max(top.damping, top.vertical_damping)
+        share += linear * speed / friction + top.rotational_damping * speed / max(sliding, reversal)
     return share
 
 

@@ -125,9 +125,10 @@ def _motion(motion: Motion) -> Table:
 
 def _top(top: Top) -> Table:
     rows = [
-        (name.replace("_", " "), f"{_value(getattr(top, name))} {rule.unit}")
+        (name.replace("_", " "), "rigid" if value is None else f"{_value(value)} {rule.unit}")
         for name, rule, _ in ruled_fields(type(top))
         if isinstance(rule, Quantity)
+        for value in (getattr(top, name),)
     ]
     return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
 

@@ -13,6 +13,7 @@ from msfp_gen.errors import InputError
 
 _ROTATIONAL_STIFFNESS = Quantity("N m/rad", least=0.0)
 _ROTATIONAL_DAMPING = Quantity("N m s/rad", least=0.0)
+_VERTICAL_DAMPING = Quantity("N s/m", least=0.0)
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,12 @@ class Top:
         damping: float = 0.0,
         rotational_stiffness: float = 0.0,
         rotational_damping: float = 0.0,
+        vertical_stiffness: float = 0.0,
+        vertical_damping: float = 0.0,
     ) -> RigTop:
         """A test rig as in chapter 4 of PEER 2017/07; see `RigTop`."""
-        return RigTop(axial_load, stiffness, damping, rotational_stiffness, rotational_damping)
+        restraint = (stiffness, damping, rotational_stiffness, rotational_damping)
+        return RigTop(axial_load, *restraint, vertical_stiffness, vertical_damping)
 
     @staticmethod
     def prescribed(
@@ -54,9 +58,12 @@ class Top:
         height: float,
         rotational_stiffness: float = 0.0,
         rotational_damping: float = 0.0,
+        vertical_stiffness: float | None = None,
+        vertical_damping: float = 0.0,
     ) -> MassTop:
         """A rigid supported mass; see `MassTop`."""
-        return MassTop(mass, inertia, height, rotational_stiffness, rotational_damping)
+        restraint = (rotational_stiffness, rotational_damping)
+        return MassTop(mass, inertia, height, *restraint, vertical_stiffness, vertical_damping)
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,9 @@ class RigTop(Top):
     """A test rig: constant axial load, springs and dampers at the centre of the top plate (PEER 2017/07, chapter 4).
 
     axial_load: downward [N]. stiffness, damping: k_top, c_top along E1 and E2 [N/m], [N s/m].
-    rotational_stiffness, rotational_damping: against tilt and spin [N m/rad], [N m s/rad]. Raises InputError.
+    rotational_stiffness, rotational_damping: against tilt and spin [N m/rad], [N m s/rad]. vertical_stiffness,
+    vertical_damping: of a rig that holds its height, beside the axial load, without force at the height of the
+    start [N/m], [N s/m]; 0: the load alone. Raises InputError.
     """
 
     kind: ClassVar[str] = "rig"
@@ -73,6 +82,8 @@ class RigTop(Top):
     damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
     rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
     rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
+    vertical_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
+    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,12 +97,14 @@ class PrescribedTop(Top):
 
 @dataclass(frozen=True)
 class MassTop(Top):
-    """A rigid supported mass fixed to the top plate.
+    """A rigid supported mass fixed to the top plate, or resting on it through a vertical spring.
 
     mass [kg]. inertia: (transverse, axial) about its centre of mass, or one value for both [kg m^2].
     height: of its centre of mass above the top of the top plate, r_nn [m].
     rotational_stiffness, rotational_damping: restraint against tilt, such as that of the remaining structure
-    [N m/rad], [N m s/rad]. Raises InputError.
+    [N m/rad], [N m s/rad]. vertical_stiffness, vertical_damping: between top plate and mass, of bearing and columns, k
+    and c of docs/model.md [N/m], [N s/m]; None: rigid. At the start the spring carries the weight at rest. Raises
+    InputError.
     """
 
     kind: ClassVar[str] = "mass"
@@ -101,6 +114,21 @@ class MassTop(Top):
     height: Annotated[float, Quantity("m", least=0.0)]
     rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
     rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
+    vertical_stiffness: Annotated[float | None, Quantity("N/m", above=0.0)] = None
+    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.vertical_damping and self.vertical_stiffness is None:
+            raise InputError(
+                f"top.vertical_damping = {self.vertical_damping!r}: a damper alone carries no weight; give "
+                "top.vertical_stiffness as well"
+            )
+
+
+def is_sprung(top: Top) -> bool:
+    """Whether a vertical spring or damper acts on the top plate."""
+    return isinstance(top, RigTop | MassTop) and bool(top.vertical_stiffness or top.vertical_damping)
 
 
 def load_values(top: Top) -> Array:

@@ -48,7 +48,8 @@ class RestartState:
     """The state in which a segment ended, from which the next one starts with another model.
 
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
-    separations, their rates, and its friction state. force: interface forces, shape (n-1, 3) [N]. origin: displacement
+    separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
+    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]. origin: displacement
     across the bearing at the start of the run, shape (3,) [m]. guard_heat, heat: states of the monitor of heat and
     of the temperature. All but azimuth and planar come from a snapshot of the run.
     """
@@ -59,6 +60,7 @@ class RestartState:
     q: Array
     v: Array
     f: Array
+    foot: Array
     force: Array
     origin: Array
     guard_heat: Array
@@ -132,6 +134,7 @@ def start_run(
         becomes_spatial = at.planar and not model.planar
         origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
         options |= {"origin": np.ascontiguousarray(origin), "guard_heat": at.guard_heat, "start_time": at.time}
+        options["foot"] = _transferred_foot(at, q)
         if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
             options["heat"] = at.heat
     run: Run = model.extension.Run(
@@ -240,6 +243,16 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
             separations = (-force / stiffness[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _transferred_foot(at: RestartState, q: Array) -> Array:
+    """Height of the foot of the supported mass and its rate, shape (2,) [m], [m/s], above a stack at `q`.
+
+    The separations that the earlier model did not have lower the top plate. The foot follows, so that the force of its
+    spring does not change.
+    """
+    lowered = float(q[:, 5].sum()) if q.shape[1] > at.q.shape[1] else 0.0
+    return np.array([at.foot[0] + lowered, at.foot[1]])
 
 
 def _significant_rise(scene: Scene, effects: Effects, selection: EffectSelection) -> float:

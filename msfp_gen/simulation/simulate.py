@@ -24,6 +24,7 @@ from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.note import Note
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of, joined
+from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
@@ -154,7 +155,8 @@ class RunSequence:
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
             raise RunError(_message(self.scene, last), status=last.status)
-        histories = [history_of(segment.model, rows, segment.azimuth) for segment, rows in parts]
+        sprung = is_sprung(self.scene.top)
+        histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
         return _result(self, joined(histories, self.given.output_step))
 
 

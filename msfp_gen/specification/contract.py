@@ -49,6 +49,8 @@ TOP = (
     Value("damping", "N s/m", "horizontal damping of the rig"),
     Value("rotational_stiffness", "N m/rad", "rotational stiffness"),
     Value("rotational_damping", "N m s/rad", "rotational damping"),
+    Value("vertical_stiffness", "N/m", "vertical stiffness of the rig or below the supported mass"),
+    Value("vertical_damping", "N s/m", "vertical damping beside it"),
     Value("mass", "kg", "supported mass"),
     Value("inertia_transverse", "kg m^2", "its moment of inertia about a horizontal axis"),
     Value("inertia_axial", "kg m^2", "its moment of inertia about the vertical axis"),

@@ -49,6 +49,7 @@ _ROW = (
     Quantity("top", (3,), "m", "position of r_nn at the top plate"),
     Quantity("top_force", (3,), "N", "force of the bearing on the top support"),
     Quantity("top_moment", (3,), "N m", "moment of the bearing on the top support at r_nn"),
+    Quantity("top_settlement", (), "m", "compression of the vertical spring of the top"),
     Quantity("kinetic", (), "J", "kinetic energy relative to the base"),
     Quantity("potential", (), "J", "potential energy"),
     Quantity("restraint", (), "J", "energy of the springs of the top"),

@@ -242,7 +242,13 @@ def test_combined_tangent_of_the_condensed_step(effects, beta, damped):
 
 
 STACKS = ({}, {"spin": "free"}, {"spin": "patch"}, {"dimension": "planar"}, {"sliders": "massless"})
-TOPS = (Top.rig(0.0, 1e6, 1e4, 1e7, 1e5), Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7))
+TOPS = (
+    Top.rig(0.0, 1e6, 1e4, 1e7, 1e5),
+    Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7),
+    Top.rig(0.0, 1e6, 1e4, 1e7, 1e5, vertical_stiffness=1e5, vertical_damping=1e3),
+    Top.mass(3e3, 2e3, 0.3, rotational_stiffness=1e7, vertical_stiffness=1e5, vertical_damping=1e3),
+)
+FOOT = np.array([0.0, 0.1])  # of the supported mass, far below the top plate: the springs press the stack together
 
 
 BELOW = [*product([(2, 1, 0), (4, 2, 1), (5, 2, 2), (5, 1, 3), (11, 5, 5)], STACKS), ((7, 3, 3), {})]
@@ -286,14 +292,15 @@ def tangents(layout, effects, beta, top=None, base_moves=False, capacity=None, d
     def residual(x: np.ndarray) -> np.ndarray:
         d = np.zeros_like(q)
         d[:, angles] = x.reshape(-1, len(angles))
-        status, r, _, _ = compiled.condensed(q + cq * d, v + cv * d, a + ca * d, f, base, ld, cq, cv, ca, beta)
+        moved = q + cq * d, v + cv * d, a + ca * d
+        status, r, _, _ = compiled.condensed(*moved, f, base, ld, cq, cv, ca, beta, foot=FOOT)
         assert status == "ok"
         return r
 
     n = (layout[0] - 1) * len(angles)
-    _, _, tangent, _ = compiled.condensed(q, v, a, f, base, ld, cq, cv, ca, beta)
+    _, _, tangent, _ = compiled.condensed(q, v, a, f, base, ld, cq, cv, ca, beta, foot=FOOT)
     want = differences(residual, np.zeros(n), np.full(n, 1e-5))
-    away = model.stack(bearing_of(values), top).condensed(q, v, a, f, base, ld, cq, cv, ca, beta)[2]
+    away = model.stack(bearing_of(values), top).condensed(q, v, a, f, base, ld, cq, cv, ca, beta, foot=FOOT)[2]
     return tangent, want, away
 
 

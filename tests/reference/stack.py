@@ -21,6 +21,10 @@ class Load:
     moment: Array
 
 
+Top = Load | Callable[[Rotation, Points], Load]
+"""A load, or what a structure exerts on the top plate that moves like this."""
+
+
 class Interfaces(NamedTuple):
     """Everything that acts between bodies: (n-1, 3) arrays, ON body g+1."""
 
@@ -86,7 +90,7 @@ def balances(
     h: Array,
     angles: Array,
     normal: Array,
-    load: Load,
+    load: Top,
     spin: str = "free",
     rims: bool = True,
     law: str = "report",
@@ -94,6 +98,7 @@ def balances(
     """(3.26)-(3.29) at given unknowns: state.a, contact angles (n-1, 2) [rad], normal (n-1,) [N]."""
     turn = rotation(state)
     at = points(bearing, state, turn)
+    load = load if isinstance(load, Load) else load(turn, at)
     act = interfaces(bearing, turn, at, h, angles, normal, spin, rims, law)
     linear, angular = [], []
     for k in range(2, bearing.layout.n + 1):
@@ -125,14 +130,16 @@ def _applied(bearing: Any, at: Points, act: Interfaces, load: Load, k: int) -> t
 
 
 def solve(
-    bearing: Any, state: State, h: Array, load: Load, spin: str = "free", rims: bool = True, law: str = "report"
+    bearing: Any, state: State, h: Array, load: Top, spin: str = "free", rims: bool = True, law: str = "report"
 ) -> Solution:
     """The unknowns (2.119) at a state (its `a` is the first guess), by a damped Newton with complex-step Jacobian.
 
     spin="locked" replaces the angular balance about t_3^k by phi_k'' = 0.
     """
     count = bearing.layout.n - 1
-    size = max(float(np.linalg.norm(load.force)), 1.0)
+    turn = rotation(state)
+    carried = load if isinstance(load, Load) else load(turn, points(bearing, state, turn))
+    size = max(float(np.linalg.norm(carried.force)), 1.0)
 
     def parts(x: Array) -> tuple[State, Array, Array]:
         return (

@@ -128,6 +128,12 @@ void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msf
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* The same with columns. dload: columns of the load [6][MSFP_DOF], or NULL. */
 void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload);
+/* Whether a vertical spring or damper acts on the top plate. */
+int msfp_top_is_sprung(const msfp_parameters *p);
+/* The mass that rests on it [kg]; 0 for that of a rig. */
+double msfp_sprung_mass(const msfp_parameters *p);
+/* Compression of that spring and its rate [m], [m/s]; 0 without one. */
+void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2]);
 #if MSFP_TOP_ROTATION
 /* Axis of the support of the top plate and its angular velocity, into the block `upright`. */
 void msfp_support_axis(const msfp_point *at, double *upright);

@@ -73,6 +73,9 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
     t[MSFP_TOP_PARAMETERS_JA] = top[MSFP_TOP_VALUE_INERTIA_AXIAL];
     t[MSFP_TOP_PARAMETERS_H] = top[MSFP_TOP_VALUE_HEIGHT];
     t[MSFP_TOP_PARAMETERS_G] = gravity;
+    t[MSFP_TOP_PARAMETERS_KV] = top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS];
+    t[MSFP_TOP_PARAMETERS_CV] = top[MSFP_TOP_VALUE_VERTICAL_DAMPING];
+    t[MSFP_TOP_PARAMETERS_MZ] = msfp_top_is_sprung(p) ? 0.0 : t[MSFP_TOP_PARAMETERS_M];
     const double anchor[3] = { top[MSFP_TOP_VALUE_ANCHOR_X], top[MSFP_TOP_VALUE_ANCHOR_Y], 0.0 };
     msfp_top_parameters_x0_put(t, anchor);
     p->weight = top[MSFP_TOP_VALUE_MASS] * gravity;
@@ -149,6 +152,62 @@ void msfp_support_axis(const msfp_point *at, double *upright)
 }
 #endif
 
+int msfp_top_is_sprung(const msfp_parameters *p)
+{
+    return p->top[MSFP_TOP_PARAMETERS_KV] > 0.0 || p->top[MSFP_TOP_PARAMETERS_CV] > 0.0;
+}
+
+double msfp_sprung_mass(const msfp_parameters *p)
+{
+    return p->top[MSFP_TOP_PARAMETERS_M] - p->top[MSFP_TOP_PARAMETERS_MZ];
+}
+
+/* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
+static void load_foot(const msfp_parameters *p, const msfp_point *at, double *stage)
+{
+    memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
+    if (!msfp_top_is_sprung(p))
+        return;
+    const double mass = msfp_sprung_mass(p), beta = mass > 0.0 ? at->foot_beta : 0.0;
+    const double moving = mass + beta * (p->top[MSFP_TOP_PARAMETERS_CV] + beta * p->top[MSFP_TOP_PARAMETERS_KV]);
+    stage[MSFP_FOOT_STAGE_Y] = at->foot[0];
+    stage[MSFP_FOOT_STAGE_Y1] = at->foot[1];
+    stage[MSFP_FOOT_STAGE_BETA] = beta;
+    stage[MSFP_FOOT_STAGE_MOBILITY] = mass > 0.0 ? 1.0 / moving : 0.0;
+    stage[MSFP_FOOT_STAGE_SHARE] = mass > 0.0 ? mass / moving : 1.0;
+}
+
+/* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
+static void move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
+{
+    const double *plate = w->body[NB];
+    if (msfp_top_is_sprung(p)) {
+        msfp_foot(p->top, plate, stage, w->foot);
+        return;
+    }
+    w->foot[MSFP_FOOT_Y] = plate[MSFP_BODY_CZ];
+    w->foot[MSFP_FOOT_Y1] = plate[MSFP_BODY_VZ];
+    w->foot[MSFP_FOOT_Y2] = plate[MSFP_BODY_AZ];
+}
+
+void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2])
+{
+    const double *plate = w->body[NB];
+    const int sprung = msfp_top_is_sprung(p);
+    settlement[0] = sprung ? plate[MSFP_BODY_CZ] - w->foot[MSFP_FOOT_Y] : 0.0;
+    settlement[1] = sprung ? plate[MSFP_BODY_VZ] - w->foot[MSFP_FOOT_Y1] : 0.0;
+}
+
+void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
+{
+    msfp_work w;
+    const double *plate = w.body[NB], stiffness = p->top[MSFP_TOP_PARAMETERS_KV];
+    msfp_base(p, at, &w);
+    msfp_kinematics(p, at, &w);
+    foot[0] = plate[MSFP_BODY_CZ] - (stiffness > 0.0 ? msfp_sprung_mass(p) * p->gravity / stiffness : 0.0);
+    foot[1] = msfp_sprung_mass(p) > 0.0 ? plate[MSFP_BODY_VZ] : 0.0;
+}
+
 static void split_wrench(const double *wrench, double *force, double *moment)
 {
     memcpy(force, wrench, FORCE * sizeof *force);
@@ -157,29 +216,33 @@ static void split_wrench(const double *wrench, double *force, double *moment)
 
 MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
-    double force[FORCE], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE];
+    double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE];
     load_top(at, force, moment);
+    load_foot(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
     msfp_support_axis(at, upright);
 #endif
-    msfp_top_wrench(p->top, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench);
+    msfp_top_wrench(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
+    move_foot(p, stage, w);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
 MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload)
 {
     static const double zero[6 * DOF];
-    double force[FORCE], moment[MOMENT], wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
+    double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE],
+        dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     load_top(at, force, moment);
+    load_foot(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
     msfp_support_axis(at, upright);
 #endif
     const double *df = dload ? dload : zero, *dm = dload ? dload + FORCE * DOF : zero;
-    msfp_top_wrench_tangent(p->top, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench,
-                            w->dbody[NB], w->dx[NB], df, dm, dwrench);
+    msfp_top_wrench_tangent(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright),
+                            wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
     memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);

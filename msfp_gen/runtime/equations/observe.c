@@ -35,7 +35,7 @@ msfp_mechanical msfp_mechanical_energy(const msfp_parameters *p, const msfp_poin
         msfp_body_energy(p->body[k], w->body[k], base, one);
         add_energy(&total, one);
     }
-    msfp_top_energy(p->top, w->body[NB], base, one);
+    msfp_top_energy(p->top, w->body[NB], base, w->foot, one);
     add_energy(&total, one);
     return total;
 }
@@ -136,12 +136,16 @@ double msfp_load_power(const msfp_point *at, const msfp_work *w)
 double msfp_prescribed_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     const double *t = p->top;
-    double C[3], V[3], relative[3], turning[3], force[3], moment[3], anchor[3], power = 0.0;
+    double C[3], V[3], relative[3], turning[3], force[3], moment[3], anchor[3], settlement[2], power = 0.0;
     msfp_body_C_get(w->body[NB], C);
     msfp_body_V_get(w->body[NB], V);
     msfp_top_parameters_x0_get(t, anchor);
     for (int i = 0; i < 2; ++i)
         power += (t[MSFP_TOP_PARAMETERS_K] * (C[i] - anchor[i]) + t[MSFP_TOP_PARAMETERS_C] * V[i]) * at->base[1][i];
+    msfp_settlement(p, w, settlement);
+    if (msfp_sprung_mass(p) == 0.0) /* the vertical spring of a rig has a fixed end */
+        power += (t[MSFP_TOP_PARAMETERS_KV] * settlement[0] + t[MSFP_TOP_PARAMETERS_CV] * settlement[1]) *
+                 at->base[1][2];
     msfp_body_V_get(w->body[0], relative);
     msfp_body_wp_get(w->body[0], turning);
     msfp_force_F_get(w->force[0], force);
@@ -155,17 +159,19 @@ double msfp_prescribed_power(const msfp_parameters *p, const msfp_point *at, con
 static double drive_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, double *damped)
 {
     const double *body = w->body[NB], *t = p->top;
-    double V[3], turning[3], axis[3];
+    double V[3], turning[3], axis[3], settlement[2];
     msfp_body_V_get(body, V);
     msfp_body_wp_get(body, turning);
     msfp_body_t3_get(body, axis);
+    msfp_settlement(p, w, settlement);
     double power = msfp_load_power(at, w);
     power -= t[MSFP_TOP_PARAMETERS_KR] * msfp_coordinates_phi(w->x[NB]) * dot3(axis, turning);
 #if MSFP_TOP_ROTATION
     power += support_power(t, at, axis, turning);
 #endif
     *damped =
-        t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning);
+        t[MSFP_TOP_PARAMETERS_C] * (V[0] * V[0] + V[1] * V[1]) + t[MSFP_TOP_PARAMETERS_CR] * dot3(turning, turning) +
+        t[MSFP_TOP_PARAMETERS_CV] * settlement[1] * settlement[1];
     return power + msfp_prescribed_power(p, at, w);
 }
 
@@ -210,7 +216,7 @@ void msfp_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work
 static double restraint_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w)
 {
     const double *t = p->top;
-    double C[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, lean = 0.0;
+    double C[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, lean = 0.0, settlement[2];
     msfp_body_C_get(w->body[NB], C);
     msfp_body_t3_get(w->body[NB], axis);
     msfp_top_parameters_x0_get(t, anchor);
@@ -224,7 +230,9 @@ static double restraint_energy(const msfp_parameters *p, const msfp_point *at, c
 #endif
     for (int i = 0; i < 3; ++i) /* 1 - t3 . e, without cancellation at small tilt */
         lean += 0.5 * (axis[i] - held[i]) * (axis[i] - held[i]);
-    return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean;
+    msfp_settlement(p, w, settlement);
+    return 0.5 * t[MSFP_TOP_PARAMETERS_K] * (x * x + y * y) + t[MSFP_TOP_PARAMETERS_KR] * lean +
+           0.5 * t[MSFP_TOP_PARAMETERS_KV] * settlement[0] * settlement[0];
 }
 
 static double rim_energy(const msfp_parameters *p, const double *gap)
@@ -278,7 +286,7 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
 void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,
                  msfp_row *row)
 {
-    double sliding[MSFP_GAP_SIZE];
+    double sliding[MSFP_GAP_SIZE], settlement[2];
     memcpy(row->q, at->q, sizeof row->q);
     memcpy(row->v, at->v, sizeof row->v);
     memcpy(row->a, at->a, sizeof row->a);
@@ -307,6 +315,8 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     row->top[1] += MSFP_PLANAR ? at->base[0][1] : 0.0;
     msfp_force_F_get(w->force[NB], row->top_force);
     msfp_moment_M_get(w->moment[NB], row->top_moment);
+    msfp_settlement(p, w, settlement);
+    row->top_settlement = settlement[0];
     row->kinetic = mechanical->kinetic;
     row->potential = mechanical->potential;
     row->restraint = restraint_energy(p, at, w);

@@ -36,6 +36,7 @@ static int consistent_initial_state(msfp_run *run)
     if (status)
         return status;
     memcpy(run->now.a, at.a, sizeof at.a);
+    memcpy(run->now.foot, run->work.foot, sizeof run->now.foot);
     msfp_friction_rates(&run->work, run->now.df);
     msfp_heat_initial_state(run);
     run->now.mechanical = msfp_mechanical_energy(&run->parameters, &at, &run->work);
@@ -83,6 +84,12 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
 #endif
     while (run->next_jump < jump_count && jumps[run->next_jump] <= run->now.t)
         ++run->next_jump;
+    msfp_point at;
+    msfp_to_point(run, &run->now, &at);
+    if (options->foot)
+        memcpy(run->now.foot, options->foot, 2 * sizeof *options->foot);
+    else
+        msfp_foot_at_rest(p, &at, run->now.foot);
     run->status = consistent_initial_state(run);
     if (run->status)
         return run->status;

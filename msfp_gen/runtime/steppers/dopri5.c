@@ -22,7 +22,7 @@ static const double e[STAGES] = {
 };
 
 typedef struct {
-    double v[NB][NQ], a[NB][NQ], f[NB][2];
+    double v[NB][NQ], a[NB][NQ], f[NB][2], foot[2];
 } slope;
 
 /* State derivatives at a point: Newton's method on the momentum balances, starting from the solution of the last
@@ -50,6 +50,7 @@ static int slope_at(msfp_run *run, msfp_point *at, slope *s)
     }
     memcpy(s->v, at->v, sizeof s->v);
     memcpy(s->a, at->a, sizeof s->a);
+    memcpy(s->foot, run->work.foot + MSFP_FOOT_Y1, sizeof s->foot);
     msfp_friction_rates(&run->work, s->f);
     return MSFP_OK;
 }
@@ -60,6 +61,10 @@ static void combine(const msfp_state *now, const slope *k, const double *weights
     memcpy(at->q, now->q, sizeof at->q);
     memcpy(at->v, now->v, sizeof at->v);
     memcpy(at->f, now->f, sizeof at->f);
+    memcpy(at->foot, now->foot, sizeof at->foot);
+    for (int i = 0; i < count; ++i)
+        for (int d = 0; d < 2; ++d)
+            at->foot[d] += h * weights[i] * k[i].foot[d];
     for (int i = 0; i < count; ++i)
         for (int b = 0; b < NB; ++b) {
             for (int d = 0; d < NQ; ++d) {
@@ -131,6 +136,7 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
     memcpy(next->a, last->a, sizeof next->a);
     memcpy(next->f, at->f, sizeof next->f);
     memcpy(next->df, last->f, sizeof next->df);
+    memcpy(next->foot, run->work.foot, sizeof next->foot);
     next->mechanical = msfp_mechanical_energy(&run->parameters, at, &run->work);
     msfp_powers(&run->parameters, at, &run->work, &next->mechanical, next->power);
     return integrals(run, h);
@@ -156,6 +162,7 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
     memcpy(k[0].v, run->now.v, sizeof k[0].v);
     memcpy(k[0].a, run->now.a, sizeof k[0].a);
     memcpy(k[0].f, run->now.df, sizeof k[0].f);
+    memcpy(k[0].foot, run->now.foot + MSFP_FOOT_Y1, sizeof k[0].foot);
     for (int i = 1; i < STAGES; ++i) {
         sixth = at;
         msfp_point_at(run, run->now.t + c[i] * h, &at);
@@ -166,6 +173,9 @@ int msfp_step_dopri5(msfp_run *run, double h, double *error)
             return status;
         msfp_heat_stage(run, i, 0.0);
     }
+    for (int i = 0; i < STAGES; ++i)
+        for (int d = 0; d < 2; ++d)
+            estimate.foot[d] += h * e[i] * k[i].foot[d];
     for (int i = 0; i < STAGES; ++i)
         for (int b = 0; b < NB; ++b) {
             for (int d = 0; d < NQ; ++d) {

@@ -14,6 +14,7 @@ static const int unknown[ND] = MSFP_FREE;
 typedef struct {
     const msfp_tableau *method;
     double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS], prescribed[STAGES];
+    double foot[STAGES][2]; /* velocity and acceleration of the foot of the supported mass */
     msfp_stage now; /* the stage that is being solved */
 } stages;
 
@@ -25,22 +26,26 @@ MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double 
 
 /* Add the weighted rates of the first `count` stages to coordinates, their rates, and Y, Z. */
 static void add_stages(const stages *s, const double *weights, int count, double h, double q[NB][NQ], double v[NB][NQ],
-                       double f[NB][2])
+                       double f[NB][2], double foot[2])
 {
     for (int j = 0; j < count; ++j) {
         add(&q[0][0], &s->v[j][0][0], h * weights[j], NB * NQ);
         add(&v[0][0], &s->a[j][0][0], h * weights[j], NB * NQ);
         add(&f[0][0], &s->df[j][0][0], h * weights[j], 2 * NB);
+        add(foot, s->foot[j], h * weights[j], 2);
     }
 }
 
-/* Q, V and fp of stage i, in q = Q + beta v, v = V + beta a, f = fp + beta df. */
+/* Q, V and fp of stage i, in q = Q + beta v, v = V + beta a, f = fp + beta df, and the same of the foot. */
 static void prepare(const msfp_run *run, stages *s, int i, double h)
 {
     memcpy(s->now.Q, run->now.q, sizeof s->now.Q);
     memcpy(s->now.V, run->now.v, sizeof s->now.V);
     memcpy(s->now.seed.fp, run->now.f, sizeof s->now.seed.fp);
-    add_stages(s, s->method->a[i], i, h, s->now.Q, s->now.V, s->now.seed.fp);
+    memcpy(s->now.at.foot, run->now.foot, sizeof s->now.at.foot);
+    add_stages(s, s->method->a[i], i, h, s->now.Q, s->now.V, s->now.seed.fp, s->now.at.foot);
+    s->now.at.foot[0] += s->now.beta * s->now.at.foot[1];
+    s->now.at.foot_beta = s->now.beta;
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
@@ -132,6 +137,7 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
     memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
+    memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);
     msfp_friction_rates(&run->work, s->df[i]);
     run->next.mechanical = msfp_mechanical_energy(&run->parameters, &s->now.at, &run->work);
     msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]);
@@ -144,6 +150,7 @@ static int stage(msfp_run *run, stages *s, int i, double h)
         memcpy(node->q, s->now.at.q, sizeof node->q);
         memcpy(node->v, s->now.at.v, sizeof node->v);
         memcpy(node->f, s->now.f, sizeof node->f);
+        memcpy(node->foot, run->work.foot, sizeof node->foot);
         integrals(run, s, i, h, node->work);
     }
     return MSFP_OK;
@@ -189,6 +196,8 @@ static void filter(msfp_run *run, const stages *s, msfp_increment *estimate)
         for (int d = 0; d < 2; ++d)
             moved.seed.fp[k][d] += estimate->f[k][d];
     }
+    moved.at.foot[0] += estimate->foot[0] + moved.beta * estimate->foot[1];
+    moved.at.foot[1] += estimate->foot[1];
     if (!(msfp_stage_residual(run, &moved, &w, residual) < INFINITY))
         return;
     msfp_lu_solve(run->factors, DOF, run->pivots, residual);
@@ -201,6 +210,7 @@ static void filter(msfp_run *run, const stages *s, msfp_increment *estimate)
         for (int d = 0; d < 2; ++d)
             estimate->f[k][d] = moved.f[k][d] - s->now.f[k][d];
     }
+    estimate->foot[0] = w.foot[MSFP_FOOT_Y] - run->work.foot[MSFP_FOOT_Y];
 }
 
 int msfp_step_implicit(msfp_run *run, double h, double *error)
@@ -227,6 +237,7 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
+    memcpy(s.foot[0], now->foot + MSFP_FOOT_Y1, sizeof s.foot[0]);
     memcpy(s.power[0], now->power, sizeof s.power[0]);
     s.prescribed[0] = now->prescribed_power;
     msfp_heat_begin(run);
@@ -245,11 +256,12 @@ int msfp_step_implicit(msfp_run *run, double h, double *error)
     memcpy(next->v, s.now.at.v, sizeof next->v);
     memcpy(next->a, s.now.at.a, sizeof next->a);
     memcpy(next->f, s.now.f, sizeof next->f);
+    memcpy(next->foot, run->work.foot, sizeof next->foot);
     memcpy(next->df, s.df[last], sizeof next->df);
     memcpy(next->power, s.power[last], sizeof next->power);
     next->prescribed_power = s.prescribed[last];
     integrals(run, &s, last, h, next->work);
-    add_stages(&s, method->e, last + 1, h, estimate.q, estimate.v, estimate.f);
+    add_stages(&s, method->e, last + 1, h, estimate.q, estimate.v, estimate.f, estimate.foot);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < NQ; ++d)
             run->acceleration_slope[k][d] = (s.a[last][k][d] - s.a[0][k][d]) / h;

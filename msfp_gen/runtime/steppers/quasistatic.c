@@ -209,6 +209,7 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
     msfp_stage s;
     memset(&s, 0, sizeof s);
     parabola(run, &s, h);
+    memcpy(s.at.foot, run->now.foot, sizeof s.at.foot); /* no mass rests on a spring: its end is fixed */
     msfp_point_at(run, run->now.t + h, &s.at);
     run->node_count = 0;
     const int status = solve(run, &s, h);

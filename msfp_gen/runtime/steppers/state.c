@@ -80,6 +80,9 @@ void msfp_interpolate(const msfp_run *run, double share, msfp_state *out)
             out->heat[k][i] = inside(&w, a->heat[k][i], da[k][i], &m->heat[k][i], b->heat[k][i], db[k][i], h, share);
     }
 #endif
+    for (int i = 0; i < 2; ++i)
+        out->foot[i] = inside(&w, a->foot[i], a->foot[i + 1], &m->foot[i], b->foot[i], b->foot[i + 1], h, share);
+    out->foot[2] = (1.0 - share) * a->foot[2] + share * b->foot[2];
     for (int i = 0; i < MSFP_WORKS; ++i)
         out->work[i] = inside(&w, a->work[i], a->power[i], &m->work[i], b->work[i], b->power[i], h, share);
 }
@@ -92,6 +95,7 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
     memcpy(at->v, s->v, sizeof at->v);
     memcpy(at->a, s->a, sizeof at->a);
     memcpy(at->f, s->f, sizeof at->f);
+    memcpy(at->foot, s->foot, sizeof at->foot);
     msfp_heat_point(s, at);
 }
 
@@ -103,10 +107,26 @@ double msfp_absolute_tolerance(const msfp_run *run, int j, int d)
     return 10.0 * run->options.rtol * run->work.reference / run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KS];
 }
 
+/* A settlement below this counts as this [m]: a mass with a period below 20 ms follows the top plate. */
+static const double smallest_settlement = 1e-4;
+
+/* Largest error of the height of the foot, and if `rates` of its velocity, over its tolerance [-]. The tolerance is
+ * the share rtol of the settlement under the supported mass, and so of the force of the spring, which N is. */
+static double foot_error(const msfp_run *run, const msfp_increment *error, int rates)
+{
+    const double gravity = run->parameters.gravity, stiffness = run->parameters.top[MSFP_TOP_PARAMETERS_KV];
+    const double mass = msfp_sprung_mass(&run->parameters);
+    if (mass == 0.0)
+        return 0.0;
+    const double settlement = fmax(mass * gravity / stiffness, smallest_settlement);
+    const double speed = sqrt(settlement * gravity); /* settlement times circular frequency */
+    return fmax(fabs(error->foot[0]) / settlement, rates ? fabs(error->foot[1]) / speed : 0.0) / run->options.rtol;
+}
+
 double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates)
 {
     const double rtol = run->options.rtol;
-    double worst = 0.0;
+    double worst = foot_error(run, error, rates);
     for (int k = 0; k < NB; ++k) {
         for (int i = 0; i < MSFP_ND; ++i) {
             const int d = unknown[i];

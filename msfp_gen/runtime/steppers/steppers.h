@@ -38,11 +38,11 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share);
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out);
 /* Absolute tolerance of coordinate d of body j + 1: of an angle [rad], or of a separation (d >= 3) [m]. */
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d);
-/* A change of a state, such as the estimated error of a step: of q, v and of Y, Z. */
+/* A change of a state, such as the estimated error of a step: of q, v, of Y, Z, of the foot and its rate. */
 typedef struct {
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
+    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2];
 } msfp_increment;
-/* Largest error of a step over its tolerance [-]: of q, of Y, Z, and if `rates` of v. */
+/* Largest error of a step over its tolerance [-]: of q, of Y, Z, of the foot, and if `rates` of their rates. */
 double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates);
 /* Error of a step in which Y, Z change by more than 1/2, 0 otherwise. Such a step may span a reversal, its estimate is
  * not reliable and its interpolation meaningless. Cubed, because the step control takes the cube root. */

@@ -913,9 +913,9 @@ static inline void msfp_body_energy(const double *restrict par /* body_parameter
 }
 
 /* -F_top, -M_top of (3.28), (3.29): rig springs, prescribed load, supported mass.
- * 36 operations; out: top_wrench. */
+ * 50 operations; out: top_wrench. */
 MSFP_INLINED
-static inline void msfp_top_wrench(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict x /* coordinates */, const double *restrict fe /* force */, const double *restrict me /* moment */, double *restrict out)
+static inline void msfp_top_wrench(const double *restrict par /* top_parameters */, const double *restrict y /* foot_stage */, const double *restrict b /* body */, const double *restrict x /* coordinates */, const double *restrict fe /* force */, const double *restrict me /* moment */, double *restrict out)
 {
     const double par_k = par[0];
     const double par_c = par[1];
@@ -925,7 +925,14 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double par_jt = par[5];
     const double par_h = par[7];
     const double par_g = par[8];
-    const double par_x0x = par[9];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double par_x0x = par[12];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_share = y[4];
     const double b_t3x = b[2];
     const double b_t3z = b[3];
     const double b_wy = b[4];
@@ -933,7 +940,9 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double b_aly = b[6];
     const double b_alpy = b[7];
     const double b_Cx = b[8];
+    const double b_Cz = b[9];
     const double b_Vx = b[10];
+    const double b_Vz = b[11];
     const double b_Ax = b[12];
     const double b_Az = b[13];
     (void)x;
@@ -946,23 +955,28 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double rate_8 = b_Ax + par_h*rate_7;
     const double rate_9 = -b_aly*b_t3x - b_wy*dtx_1;
     const double rate_10 = b_Az + par_h*rate_9;
-    const double inertiax_11 = par_m*rate_8;
-    const double inertiaz_12 = par_m*(par_g + rate_10);
-    const double rigx_13 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
-    const double hdoty_17 = b_alpy*par_jt;
-    const double roty_18 = b_t3x*par_kr + b_wpy*par_cr;
-    const double leverx_19 = b_t3x*par_h;
-    const double leverz_20 = b_t3z*par_h;
-    const double out_21 = -fe_Fx + inertiax_11 + rigx_13;
-    const double out_22 = -fe_Fz + inertiaz_12;
-    const double out_23 = hdoty_17 + inertiax_11*leverz_20 - inertiaz_12*leverx_19 - me_My + roty_18;
-    out[0] = out_21; /* Fx */
-    out[1] = out_22; /* Fz */
-    out[2] = out_23; /* My */
+    const double rate_12 = par_h*rate_9;
+    const double weight_13 = par_g + rate_12;
+    const double spring_14 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double zeta_15 = y_beta*(par_cv + par_kv*y_beta);
+    const double S_16 = y_share*(spring_14 + weight_13*zeta_15);
+    const double inertiax_17 = par_m*rate_8;
+    const double inertiaz_18 = S_16 + par_mz*(par_g + rate_10);
+    const double rigx_19 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
+    const double hdoty_23 = b_alpy*par_jt;
+    const double roty_24 = b_t3x*par_kr + b_wpy*par_cr;
+    const double leverx_25 = b_t3x*par_h;
+    const double leverz_26 = b_t3z*par_h;
+    const double out_27 = -fe_Fx + inertiax_17 + rigx_19;
+    const double out_28 = -fe_Fz + inertiaz_18;
+    const double out_29 = hdoty_23 + inertiax_17*leverz_26 - inertiaz_18*leverx_25 - me_My + roty_24;
+    out[0] = out_27; /* Fx */
+    out[1] = out_28; /* Fz */
+    out[2] = out_29; /* My */
 }
 
 MSFP_INLINED
-static inline void msfp_top_wrench_tangent(const double *restrict par, const double *restrict b, const double *restrict x, const double *restrict fe, const double *restrict me, double *restrict out, const double *restrict db, const double *restrict dx, const double *restrict dfe, const double *restrict dme, double *restrict dout)
+static inline void msfp_top_wrench_tangent(const double *restrict par, const double *restrict y, const double *restrict b, const double *restrict x, const double *restrict fe, const double *restrict me, double *restrict out, const double *restrict db, const double *restrict dx, const double *restrict dfe, const double *restrict dme, double *restrict dout)
 {
     const double par_k = par[0];
     const double par_c = par[1];
@@ -972,7 +986,14 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double par_jt = par[5];
     const double par_h = par[7];
     const double par_g = par[8];
-    const double par_x0x = par[9];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double par_x0x = par[12];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_share = y[4];
     const double b_t3x = b[2];
     const double b_t3z = b[3];
     const double b_wy = b[4];
@@ -980,7 +1001,9 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double b_aly = b[6];
     const double b_alpy = b[7];
     const double b_Cx = b[8];
+    const double b_Cz = b[9];
     const double b_Vx = b[10];
+    const double b_Vz = b[11];
     const double b_Ax = b[12];
     const double b_Az = b[13];
     (void)x;
@@ -994,19 +1017,25 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double rate_8 = b_Ax + par_h*rate_7;
     const double rate_9 = -b_aly*b_t3x - b_wy*dtx_1;
     const double rate_10 = b_Az + par_h*rate_9;
-    const double inertiax_11 = par_m*rate_8;
-    const double inertiaz_12 = par_m*(par_g + rate_10);
-    const double rigx_13 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
-    const double hdoty_17 = b_alpy*par_jt;
-    const double roty_18 = b_t3x*par_kr + b_wpy*par_cr;
-    const double leverx_19 = b_t3x*par_h;
-    const double leverz_20 = b_t3z*par_h;
-    const double out_21 = -fe_Fx + inertiax_11 + rigx_13;
-    const double out_22 = -fe_Fz + inertiaz_12;
-    const double out_23 = hdoty_17 + inertiax_11*leverz_20 - inertiaz_12*leverx_19 - me_My + roty_18;
-    out[0] = out_21; /* Fx */
-    out[1] = out_22; /* Fz */
-    out[2] = out_23; /* My */
+    const double rate_12 = par_h*rate_9;
+    const double weight_13 = par_g + rate_12;
+    const double spring_14 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double zeta_15 = y_beta*(par_cv + par_kv*y_beta);
+    const double S_16 = y_share*(spring_14 + weight_13*zeta_15);
+    const double inertiax_17 = par_m*rate_8;
+    const double inertiaz_18 = S_16 + par_mz*(par_g + rate_10);
+    const double rigx_19 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
+    const double hdoty_23 = b_alpy*par_jt;
+    const double roty_24 = b_t3x*par_kr + b_wpy*par_cr;
+    const double leverx_25 = b_t3x*par_h;
+    const double leverz_26 = b_t3z*par_h;
+    const double out_27 = -fe_Fx + inertiax_17 + rigx_19;
+    const double out_28 = -fe_Fz + inertiaz_18;
+    const double out_29 = hdoty_23 + inertiax_17*leverz_26 - inertiaz_18*leverx_25 - me_My + roty_24;
+    out[0] = out_27; /* Fx */
+    out[1] = out_28; /* Fz */
+    out[2] = out_29; /* My */
+    const double p_S_16_weight_13 = y_share*zeta_15;
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_b_t3x = db[2 * MSFP_DOF + c];
         const double d_b_t3z = db[3 * MSFP_DOF + c];
@@ -1015,7 +1044,9 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
         const double d_b_aly = db[6 * MSFP_DOF + c];
         const double d_b_alpy = db[7 * MSFP_DOF + c];
         const double d_b_Cx = db[8 * MSFP_DOF + c];
+        const double d_b_Cz = db[9 * MSFP_DOF + c];
         const double d_b_Vx = db[10 * MSFP_DOF + c];
+        const double d_b_Vz = db[11 * MSFP_DOF + c];
         const double d_b_Ax = db[12 * MSFP_DOF + c];
         const double d_b_Az = db[13 * MSFP_DOF + c];
         const double d_fe_Fx = dfe[0 * MSFP_DOF + c];
@@ -1027,26 +1058,64 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
         const double d_rate_8 = d_b_Ax + par_h*d_rate_7;
         const double d_rate_9 = -b_t3x*d_b_aly - b_aly*d_b_t3x - dtx_1*d_b_wy - b_wy*d_dtx_1;
         const double d_rate_10 = d_b_Az + par_h*d_rate_9;
-        const double d_inertiax_11 = par_m*d_rate_8;
-        const double d_inertiaz_12 = par_m*d_rate_10;
-        const double d_rigx_13 = par_k*d_b_Cx + par_c*d_b_Vx;
-        const double d_hdoty_17 = par_jt*d_b_alpy;
-        const double d_roty_18 = par_kr*d_b_t3x + par_cr*d_b_wpy;
-        const double d_leverx_19 = par_h*d_b_t3x;
-        const double d_leverz_20 = par_h*d_b_t3z;
-        const double d_out_21 = -d_fe_Fx + d_inertiax_11 + d_rigx_13;
-        const double d_out_22 = -d_fe_Fz + d_inertiaz_12;
-        const double d_out_23 = d_hdoty_17 + leverz_20*d_inertiax_11 - leverx_19*d_inertiaz_12 - inertiaz_12*d_leverx_19 + inertiax_11*d_leverz_20 - d_me_My + d_roty_18;
-        dout[0 * MSFP_DOF + c] = d_out_21;
-        dout[1 * MSFP_DOF + c] = d_out_22;
-        dout[2 * MSFP_DOF + c] = d_out_23;
+        const double d_rate_12 = par_h*d_rate_9;
+        const double d_weight_13 = d_rate_12;
+        const double d_spring_14 = par_kv*d_b_Cz + par_cv*d_b_Vz;
+        const double d_S_16 = y_share*d_spring_14 + p_S_16_weight_13*d_weight_13;
+        const double d_inertiax_17 = par_m*d_rate_8;
+        const double d_inertiaz_18 = d_S_16 + par_mz*d_rate_10;
+        const double d_rigx_19 = par_k*d_b_Cx + par_c*d_b_Vx;
+        const double d_hdoty_23 = par_jt*d_b_alpy;
+        const double d_roty_24 = par_kr*d_b_t3x + par_cr*d_b_wpy;
+        const double d_leverx_25 = par_h*d_b_t3x;
+        const double d_leverz_26 = par_h*d_b_t3z;
+        const double d_out_27 = -d_fe_Fx + d_inertiax_17 + d_rigx_19;
+        const double d_out_28 = -d_fe_Fz + d_inertiaz_18;
+        const double d_out_29 = d_hdoty_23 + leverz_26*d_inertiax_17 - leverx_25*d_inertiaz_18 - inertiaz_18*d_leverx_25 + inertiax_17*d_leverz_26 - d_me_My + d_roty_24;
+        dout[0 * MSFP_DOF + c] = d_out_27;
+        dout[1 * MSFP_DOF + c] = d_out_28;
+        dout[2 * MSFP_DOF + c] = d_out_29;
     }
+}
+
+/* height of the foot of the supported mass, from the stage formula and its balance.
+ * 19 operations; out: foot. */
+MSFP_INLINED
+static inline void msfp_foot(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict y /* foot_stage */, double *restrict out)
+{
+    const double par_m = par[4];
+    const double par_h = par[7];
+    const double par_g = par[8];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double b_t3x = b[2];
+    const double b_t3z = b[3];
+    const double b_wy = b[4];
+    const double b_aly = b[6];
+    const double b_Cz = b[9];
+    const double b_Vz = b[11];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_mobility = y[3];
+    const double dtx_1 = b_t3z*b_wy;
+    const double rate_9 = -b_aly*b_t3x - b_wy*dtx_1;
+    const double rate_12 = par_h*rate_9;
+    const double weight_13 = par_g + rate_12;
+    const double spring_14 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double s_17 = y_mobility*(-par_m*weight_13 + spring_14);
+    const double s_18 = s_17*y_beta;
+    const double out_19 = s_18*y_beta + y_y;
+    const double out_20 = s_18 + y_y1;
+    out[0] = out_19; /* y */
+    out[1] = out_20; /* y1 */
+    out[2] = s_17; /* y2 */
 }
 
 /* energy of the supported mass in the frame moving with the base.
  * 28 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, double *restrict out)
+static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, const double *restrict f /* foot */, double *restrict out)
 {
     const double par_m = par[4];
     const double par_jt = par[5];
@@ -1056,19 +1125,19 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double b_t3z = b[3];
     const double b_wy = b[4];
     const double b_wpy = b[5];
-    const double b_Cz = b[9];
     const double b_Vx = b[10];
-    const double b_Vz = b[11];
     const double o_Ux = o[0];
     const double o_Uz = o[1];
     const double o_Bx = o[2];
     const double o_Bz = o[3];
     const double o_Oz = o[5];
+    const double f_y = f[0];
+    const double f_y1 = f[1];
     const double dtx_1 = b_t3z*b_wy;
     const double dtz_2 = -b_t3x*b_wy;
     const double rate_3 = b_Vx + dtx_1*par_h;
-    const double rate_4 = b_Vz + dtz_2*par_h;
-    const double rz_6 = b_Cz + b_t3z*par_h;
+    const double rate_4 = dtz_2*par_h + f_y1;
+    const double rz_6 = b_t3z*par_h + f_y;
     const double vx_11 = -o_Ux + rate_3;
     const double vz_12 = -o_Uz + rate_4;
     const double out_13 = (1.0/2.0)*(b_wpy*b_wpy)*par_jt + (1.0/2.0)*par_m*((vx_11*vx_11) + (vz_12*vz_12));

@@ -2019,9 +2019,9 @@ static inline void msfp_body_energy(const double *restrict par /* body_parameter
 }
 
 /* -F_top, -M_top of (3.28), (3.29): rig springs, prescribed load, supported mass.
- * 125 operations; out: top_wrench. */
+ * 139 operations; out: top_wrench. */
 MSFP_INLINED
-static inline void msfp_top_wrench(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict x /* coordinates */, const double *restrict fe /* force */, const double *restrict me /* moment */, double *restrict out)
+static inline void msfp_top_wrench(const double *restrict par /* top_parameters */, const double *restrict y /* foot_stage */, const double *restrict b /* body */, const double *restrict x /* coordinates */, const double *restrict fe /* force */, const double *restrict me /* moment */, double *restrict out)
 {
     const double par_k = par[0];
     const double par_c = par[1];
@@ -2032,8 +2032,15 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double par_ja = par[6];
     const double par_h = par[7];
     const double par_g = par[8];
-    const double par_x0x = par[9];
-    const double par_x0y = par[10];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double par_x0x = par[12];
+    const double par_x0y = par[13];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_share = y[4];
     const double b_t3x = b[6];
     const double b_t3y = b[7];
     const double b_t3z = b[8];
@@ -2051,8 +2058,10 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double b_alpz = b[20];
     const double b_Cx = b[21];
     const double b_Cy = b[22];
+    const double b_Cz = b[23];
     const double b_Vx = b[24];
     const double b_Vy = b[25];
+    const double b_Vz = b[26];
     const double b_Ax = b[27];
     const double b_Ay = b[28];
     const double b_Az = b[29];
@@ -2072,45 +2081,50 @@ static inline void msfp_top_wrench(const double *restrict par /* top_parameters 
     const double rate_13 = b_Ay + par_h*rate_12;
     const double rate_14 = b_alx*b_t3y - b_aly*b_t3x + b_wx*dty_2 - b_wy*dtx_1;
     const double rate_15 = b_Az + par_h*rate_14;
-    const double inertiax_16 = par_m*rate_11;
-    const double inertiay_17 = par_m*rate_13;
-    const double inertiaz_18 = par_m*(par_g + rate_15);
-    const double rigx_19 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
-    const double rigy_20 = b_Vy*par_c + par_k*(b_Cy - par_x0y);
-    const double s_21 = par_kr*x_phi;
-    const double s_22 = par_ja - par_jt;
-    const double s_23 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
-    const double s_24 = b_alpx*b_t3x + b_alpy*b_t3y + b_alpz*b_t3z;
-    const double gyx_25 = -b_t3y*b_wpz + b_t3z*b_wpy;
-    const double gyy_26 = b_t3x*b_wpz - b_t3z*b_wpx;
-    const double gyz_27 = -b_t3x*b_wpy + b_t3y*b_wpx;
-    const double s_28 = s_22*s_24;
-    const double s_29 = s_22*s_23;
-    const double hdotx_30 = b_alpx*par_jt + b_t3x*s_28 + gyx_25*s_29;
-    const double hdoty_31 = b_alpy*par_jt + b_t3y*s_28 + gyy_26*s_29;
-    const double hdotz_32 = b_alpz*par_jt + b_t3z*s_28 + gyz_27*s_29;
-    const double rotx_33 = b_t3x*s_21 - b_t3y*par_kr + b_wpx*par_cr;
-    const double roty_34 = b_t3x*par_kr + b_t3y*s_21 + b_wpy*par_cr;
-    const double rotz_35 = b_t3z*s_21 + b_wpz*par_cr;
-    const double leverx_36 = b_t3x*par_h;
-    const double levery_37 = b_t3y*par_h;
-    const double leverz_38 = b_t3z*par_h;
-    const double out_39 = -fe_Fx + inertiax_16 + rigx_19;
-    const double out_40 = -fe_Fy + inertiay_17 + rigy_20;
-    const double out_41 = -fe_Fz + inertiaz_18;
-    const double out_42 = hdotx_30 - inertiay_17*leverz_38 + inertiaz_18*levery_37 - me_Mx + rotx_33;
-    const double out_43 = hdoty_31 + inertiax_16*leverz_38 - inertiaz_18*leverx_36 - me_My + roty_34;
-    const double out_44 = hdotz_32 - inertiax_16*levery_37 + inertiay_17*leverx_36 - me_Mz + rotz_35;
-    out[0] = out_39; /* Fx */
-    out[1] = out_40; /* Fy */
-    out[2] = out_41; /* Fz */
-    out[3] = out_42; /* Mx */
-    out[4] = out_43; /* My */
-    out[5] = out_44; /* Mz */
+    const double rate_17 = par_h*rate_14;
+    const double weight_18 = par_g + rate_17;
+    const double spring_19 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double zeta_20 = y_beta*(par_cv + par_kv*y_beta);
+    const double S_21 = y_share*(spring_19 + weight_18*zeta_20);
+    const double inertiax_22 = par_m*rate_11;
+    const double inertiay_23 = par_m*rate_13;
+    const double inertiaz_24 = S_21 + par_mz*(par_g + rate_15);
+    const double rigx_25 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
+    const double rigy_26 = b_Vy*par_c + par_k*(b_Cy - par_x0y);
+    const double s_27 = par_kr*x_phi;
+    const double s_28 = par_ja - par_jt;
+    const double s_29 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
+    const double s_30 = b_alpx*b_t3x + b_alpy*b_t3y + b_alpz*b_t3z;
+    const double gyx_31 = -b_t3y*b_wpz + b_t3z*b_wpy;
+    const double gyy_32 = b_t3x*b_wpz - b_t3z*b_wpx;
+    const double gyz_33 = -b_t3x*b_wpy + b_t3y*b_wpx;
+    const double s_34 = s_28*s_30;
+    const double s_35 = s_28*s_29;
+    const double hdotx_36 = b_alpx*par_jt + b_t3x*s_34 + gyx_31*s_35;
+    const double hdoty_37 = b_alpy*par_jt + b_t3y*s_34 + gyy_32*s_35;
+    const double hdotz_38 = b_alpz*par_jt + b_t3z*s_34 + gyz_33*s_35;
+    const double rotx_39 = b_t3x*s_27 - b_t3y*par_kr + b_wpx*par_cr;
+    const double roty_40 = b_t3x*par_kr + b_t3y*s_27 + b_wpy*par_cr;
+    const double rotz_41 = b_t3z*s_27 + b_wpz*par_cr;
+    const double leverx_42 = b_t3x*par_h;
+    const double levery_43 = b_t3y*par_h;
+    const double leverz_44 = b_t3z*par_h;
+    const double out_45 = -fe_Fx + inertiax_22 + rigx_25;
+    const double out_46 = -fe_Fy + inertiay_23 + rigy_26;
+    const double out_47 = -fe_Fz + inertiaz_24;
+    const double out_48 = hdotx_36 - inertiay_23*leverz_44 + inertiaz_24*levery_43 - me_Mx + rotx_39;
+    const double out_49 = hdoty_37 + inertiax_22*leverz_44 - inertiaz_24*leverx_42 - me_My + roty_40;
+    const double out_50 = hdotz_38 - inertiax_22*levery_43 + inertiay_23*leverx_42 - me_Mz + rotz_41;
+    out[0] = out_45; /* Fx */
+    out[1] = out_46; /* Fy */
+    out[2] = out_47; /* Fz */
+    out[3] = out_48; /* Mx */
+    out[4] = out_49; /* My */
+    out[5] = out_50; /* Mz */
 }
 
 MSFP_INLINED
-static inline void msfp_top_wrench_tangent(const double *restrict par, const double *restrict b, const double *restrict x, const double *restrict fe, const double *restrict me, double *restrict out, const double *restrict db, const double *restrict dx, const double *restrict dfe, const double *restrict dme, double *restrict dout)
+static inline void msfp_top_wrench_tangent(const double *restrict par, const double *restrict y, const double *restrict b, const double *restrict x, const double *restrict fe, const double *restrict me, double *restrict out, const double *restrict db, const double *restrict dx, const double *restrict dfe, const double *restrict dme, double *restrict dout)
 {
     const double par_k = par[0];
     const double par_c = par[1];
@@ -2121,8 +2135,15 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double par_ja = par[6];
     const double par_h = par[7];
     const double par_g = par[8];
-    const double par_x0x = par[9];
-    const double par_x0y = par[10];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double par_x0x = par[12];
+    const double par_x0y = par[13];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_share = y[4];
     const double b_t3x = b[6];
     const double b_t3y = b[7];
     const double b_t3z = b[8];
@@ -2140,8 +2161,10 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double b_alpz = b[20];
     const double b_Cx = b[21];
     const double b_Cy = b[22];
+    const double b_Cz = b[23];
     const double b_Vx = b[24];
     const double b_Vy = b[25];
+    const double b_Vz = b[26];
     const double b_Ax = b[27];
     const double b_Ay = b[28];
     const double b_Az = b[29];
@@ -2161,41 +2184,47 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     const double rate_13 = b_Ay + par_h*rate_12;
     const double rate_14 = b_alx*b_t3y - b_aly*b_t3x + b_wx*dty_2 - b_wy*dtx_1;
     const double rate_15 = b_Az + par_h*rate_14;
-    const double inertiax_16 = par_m*rate_11;
-    const double inertiay_17 = par_m*rate_13;
-    const double inertiaz_18 = par_m*(par_g + rate_15);
-    const double rigx_19 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
-    const double rigy_20 = b_Vy*par_c + par_k*(b_Cy - par_x0y);
-    const double s_21 = par_kr*x_phi;
-    const double s_22 = par_ja - par_jt;
-    const double s_23 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
-    const double s_24 = b_alpx*b_t3x + b_alpy*b_t3y + b_alpz*b_t3z;
-    const double gyx_25 = -b_t3y*b_wpz + b_t3z*b_wpy;
-    const double gyy_26 = b_t3x*b_wpz - b_t3z*b_wpx;
-    const double gyz_27 = -b_t3x*b_wpy + b_t3y*b_wpx;
-    const double s_28 = s_22*s_24;
-    const double s_29 = s_22*s_23;
-    const double hdotx_30 = b_alpx*par_jt + b_t3x*s_28 + gyx_25*s_29;
-    const double hdoty_31 = b_alpy*par_jt + b_t3y*s_28 + gyy_26*s_29;
-    const double hdotz_32 = b_alpz*par_jt + b_t3z*s_28 + gyz_27*s_29;
-    const double rotx_33 = b_t3x*s_21 - b_t3y*par_kr + b_wpx*par_cr;
-    const double roty_34 = b_t3x*par_kr + b_t3y*s_21 + b_wpy*par_cr;
-    const double rotz_35 = b_t3z*s_21 + b_wpz*par_cr;
-    const double leverx_36 = b_t3x*par_h;
-    const double levery_37 = b_t3y*par_h;
-    const double leverz_38 = b_t3z*par_h;
-    const double out_39 = -fe_Fx + inertiax_16 + rigx_19;
-    const double out_40 = -fe_Fy + inertiay_17 + rigy_20;
-    const double out_41 = -fe_Fz + inertiaz_18;
-    const double out_42 = hdotx_30 - inertiay_17*leverz_38 + inertiaz_18*levery_37 - me_Mx + rotx_33;
-    const double out_43 = hdoty_31 + inertiax_16*leverz_38 - inertiaz_18*leverx_36 - me_My + roty_34;
-    const double out_44 = hdotz_32 - inertiax_16*levery_37 + inertiay_17*leverx_36 - me_Mz + rotz_35;
-    out[0] = out_39; /* Fx */
-    out[1] = out_40; /* Fy */
-    out[2] = out_41; /* Fz */
-    out[3] = out_42; /* Mx */
-    out[4] = out_43; /* My */
-    out[5] = out_44; /* Mz */
+    const double rate_17 = par_h*rate_14;
+    const double weight_18 = par_g + rate_17;
+    const double spring_19 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double zeta_20 = y_beta*(par_cv + par_kv*y_beta);
+    const double S_21 = y_share*(spring_19 + weight_18*zeta_20);
+    const double inertiax_22 = par_m*rate_11;
+    const double inertiay_23 = par_m*rate_13;
+    const double inertiaz_24 = S_21 + par_mz*(par_g + rate_15);
+    const double rigx_25 = b_Vx*par_c + par_k*(b_Cx - par_x0x);
+    const double rigy_26 = b_Vy*par_c + par_k*(b_Cy - par_x0y);
+    const double s_27 = par_kr*x_phi;
+    const double s_28 = par_ja - par_jt;
+    const double s_29 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
+    const double s_30 = b_alpx*b_t3x + b_alpy*b_t3y + b_alpz*b_t3z;
+    const double gyx_31 = -b_t3y*b_wpz + b_t3z*b_wpy;
+    const double gyy_32 = b_t3x*b_wpz - b_t3z*b_wpx;
+    const double gyz_33 = -b_t3x*b_wpy + b_t3y*b_wpx;
+    const double s_34 = s_28*s_30;
+    const double s_35 = s_28*s_29;
+    const double hdotx_36 = b_alpx*par_jt + b_t3x*s_34 + gyx_31*s_35;
+    const double hdoty_37 = b_alpy*par_jt + b_t3y*s_34 + gyy_32*s_35;
+    const double hdotz_38 = b_alpz*par_jt + b_t3z*s_34 + gyz_33*s_35;
+    const double rotx_39 = b_t3x*s_27 - b_t3y*par_kr + b_wpx*par_cr;
+    const double roty_40 = b_t3x*par_kr + b_t3y*s_27 + b_wpy*par_cr;
+    const double rotz_41 = b_t3z*s_27 + b_wpz*par_cr;
+    const double leverx_42 = b_t3x*par_h;
+    const double levery_43 = b_t3y*par_h;
+    const double leverz_44 = b_t3z*par_h;
+    const double out_45 = -fe_Fx + inertiax_22 + rigx_25;
+    const double out_46 = -fe_Fy + inertiay_23 + rigy_26;
+    const double out_47 = -fe_Fz + inertiaz_24;
+    const double out_48 = hdotx_36 - inertiay_23*leverz_44 + inertiaz_24*levery_43 - me_Mx + rotx_39;
+    const double out_49 = hdoty_37 + inertiax_22*leverz_44 - inertiaz_24*leverx_42 - me_My + roty_40;
+    const double out_50 = hdotz_38 - inertiax_22*levery_43 + inertiay_23*leverx_42 - me_Mz + rotz_41;
+    out[0] = out_45; /* Fx */
+    out[1] = out_46; /* Fy */
+    out[2] = out_47; /* Fz */
+    out[3] = out_48; /* Mx */
+    out[4] = out_49; /* My */
+    out[5] = out_50; /* Mz */
+    const double p_S_21_weight_18 = y_share*zeta_20;
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_b_t3x = db[6 * MSFP_DOF + c];
         const double d_b_t3y = db[7 * MSFP_DOF + c];
@@ -2214,8 +2243,10 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
         const double d_b_alpz = db[20 * MSFP_DOF + c];
         const double d_b_Cx = db[21 * MSFP_DOF + c];
         const double d_b_Cy = db[22 * MSFP_DOF + c];
+        const double d_b_Cz = db[23 * MSFP_DOF + c];
         const double d_b_Vx = db[24 * MSFP_DOF + c];
         const double d_b_Vy = db[25 * MSFP_DOF + c];
+        const double d_b_Vz = db[26 * MSFP_DOF + c];
         const double d_b_Ax = db[27 * MSFP_DOF + c];
         const double d_b_Ay = db[28 * MSFP_DOF + c];
         const double d_b_Az = db[29 * MSFP_DOF + c];
@@ -2235,47 +2266,90 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
         const double d_rate_13 = d_b_Ay + par_h*d_rate_12;
         const double d_rate_14 = b_t3y*d_b_alx - b_t3x*d_b_aly - b_aly*d_b_t3x + b_alx*d_b_t3y + dty_2*d_b_wx - dtx_1*d_b_wy - b_wy*d_dtx_1 + b_wx*d_dty_2;
         const double d_rate_15 = d_b_Az + par_h*d_rate_14;
-        const double d_inertiax_16 = par_m*d_rate_11;
-        const double d_inertiay_17 = par_m*d_rate_13;
-        const double d_inertiaz_18 = par_m*d_rate_15;
-        const double d_rigx_19 = par_k*d_b_Cx + par_c*d_b_Vx;
-        const double d_rigy_20 = par_k*d_b_Cy + par_c*d_b_Vy;
-        const double d_s_21 = par_kr*d_x_phi;
-        const double d_s_23 = b_wpx*d_b_t3x + b_wpy*d_b_t3y + b_wpz*d_b_t3z + b_t3x*d_b_wpx + b_t3y*d_b_wpy + b_t3z*d_b_wpz;
-        const double d_s_24 = b_t3x*d_b_alpx + b_t3y*d_b_alpy + b_t3z*d_b_alpz + b_alpx*d_b_t3x + b_alpy*d_b_t3y + b_alpz*d_b_t3z;
-        const double d_gyx_25 = -b_wpz*d_b_t3y + b_wpy*d_b_t3z + b_t3z*d_b_wpy - b_t3y*d_b_wpz;
-        const double d_gyy_26 = b_wpz*d_b_t3x - b_wpx*d_b_t3z - b_t3z*d_b_wpx + b_t3x*d_b_wpz;
-        const double d_gyz_27 = -b_wpy*d_b_t3x + b_wpx*d_b_t3y + b_t3y*d_b_wpx - b_t3x*d_b_wpy;
-        const double d_s_28 = s_22*d_s_24;
-        const double d_s_29 = s_22*d_s_23;
-        const double d_hdotx_30 = par_jt*d_b_alpx + s_28*d_b_t3x + s_29*d_gyx_25 + b_t3x*d_s_28 + gyx_25*d_s_29;
-        const double d_hdoty_31 = par_jt*d_b_alpy + s_28*d_b_t3y + s_29*d_gyy_26 + b_t3y*d_s_28 + gyy_26*d_s_29;
-        const double d_hdotz_32 = par_jt*d_b_alpz + s_28*d_b_t3z + s_29*d_gyz_27 + b_t3z*d_s_28 + gyz_27*d_s_29;
-        const double d_rotx_33 = s_21*d_b_t3x - par_kr*d_b_t3y + par_cr*d_b_wpx + b_t3x*d_s_21;
-        const double d_roty_34 = par_kr*d_b_t3x + s_21*d_b_t3y + par_cr*d_b_wpy + b_t3y*d_s_21;
-        const double d_rotz_35 = s_21*d_b_t3z + par_cr*d_b_wpz + b_t3z*d_s_21;
-        const double d_leverx_36 = par_h*d_b_t3x;
-        const double d_levery_37 = par_h*d_b_t3y;
-        const double d_leverz_38 = par_h*d_b_t3z;
-        const double d_out_39 = -d_fe_Fx + d_inertiax_16 + d_rigx_19;
-        const double d_out_40 = -d_fe_Fy + d_inertiay_17 + d_rigy_20;
-        const double d_out_41 = -d_fe_Fz + d_inertiaz_18;
-        const double d_out_42 = d_hdotx_30 - leverz_38*d_inertiay_17 + levery_37*d_inertiaz_18 + inertiaz_18*d_levery_37 - inertiay_17*d_leverz_38 - d_me_Mx + d_rotx_33;
-        const double d_out_43 = d_hdoty_31 + leverz_38*d_inertiax_16 - leverx_36*d_inertiaz_18 - inertiaz_18*d_leverx_36 + inertiax_16*d_leverz_38 - d_me_My + d_roty_34;
-        const double d_out_44 = d_hdotz_32 - levery_37*d_inertiax_16 + leverx_36*d_inertiay_17 + inertiay_17*d_leverx_36 - inertiax_16*d_levery_37 - d_me_Mz + d_rotz_35;
-        dout[0 * MSFP_DOF + c] = d_out_39;
-        dout[1 * MSFP_DOF + c] = d_out_40;
-        dout[2 * MSFP_DOF + c] = d_out_41;
-        dout[3 * MSFP_DOF + c] = d_out_42;
-        dout[4 * MSFP_DOF + c] = d_out_43;
-        dout[5 * MSFP_DOF + c] = d_out_44;
+        const double d_rate_17 = par_h*d_rate_14;
+        const double d_weight_18 = d_rate_17;
+        const double d_spring_19 = par_kv*d_b_Cz + par_cv*d_b_Vz;
+        const double d_S_21 = y_share*d_spring_19 + p_S_21_weight_18*d_weight_18;
+        const double d_inertiax_22 = par_m*d_rate_11;
+        const double d_inertiay_23 = par_m*d_rate_13;
+        const double d_inertiaz_24 = d_S_21 + par_mz*d_rate_15;
+        const double d_rigx_25 = par_k*d_b_Cx + par_c*d_b_Vx;
+        const double d_rigy_26 = par_k*d_b_Cy + par_c*d_b_Vy;
+        const double d_s_27 = par_kr*d_x_phi;
+        const double d_s_29 = b_wpx*d_b_t3x + b_wpy*d_b_t3y + b_wpz*d_b_t3z + b_t3x*d_b_wpx + b_t3y*d_b_wpy + b_t3z*d_b_wpz;
+        const double d_s_30 = b_t3x*d_b_alpx + b_t3y*d_b_alpy + b_t3z*d_b_alpz + b_alpx*d_b_t3x + b_alpy*d_b_t3y + b_alpz*d_b_t3z;
+        const double d_gyx_31 = -b_wpz*d_b_t3y + b_wpy*d_b_t3z + b_t3z*d_b_wpy - b_t3y*d_b_wpz;
+        const double d_gyy_32 = b_wpz*d_b_t3x - b_wpx*d_b_t3z - b_t3z*d_b_wpx + b_t3x*d_b_wpz;
+        const double d_gyz_33 = -b_wpy*d_b_t3x + b_wpx*d_b_t3y + b_t3y*d_b_wpx - b_t3x*d_b_wpy;
+        const double d_s_34 = s_28*d_s_30;
+        const double d_s_35 = s_28*d_s_29;
+        const double d_hdotx_36 = par_jt*d_b_alpx + s_34*d_b_t3x + s_35*d_gyx_31 + b_t3x*d_s_34 + gyx_31*d_s_35;
+        const double d_hdoty_37 = par_jt*d_b_alpy + s_34*d_b_t3y + s_35*d_gyy_32 + b_t3y*d_s_34 + gyy_32*d_s_35;
+        const double d_hdotz_38 = par_jt*d_b_alpz + s_34*d_b_t3z + s_35*d_gyz_33 + b_t3z*d_s_34 + gyz_33*d_s_35;
+        const double d_rotx_39 = s_27*d_b_t3x - par_kr*d_b_t3y + par_cr*d_b_wpx + b_t3x*d_s_27;
+        const double d_roty_40 = par_kr*d_b_t3x + s_27*d_b_t3y + par_cr*d_b_wpy + b_t3y*d_s_27;
+        const double d_rotz_41 = s_27*d_b_t3z + par_cr*d_b_wpz + b_t3z*d_s_27;
+        const double d_leverx_42 = par_h*d_b_t3x;
+        const double d_levery_43 = par_h*d_b_t3y;
+        const double d_leverz_44 = par_h*d_b_t3z;
+        const double d_out_45 = -d_fe_Fx + d_inertiax_22 + d_rigx_25;
+        const double d_out_46 = -d_fe_Fy + d_inertiay_23 + d_rigy_26;
+        const double d_out_47 = -d_fe_Fz + d_inertiaz_24;
+        const double d_out_48 = d_hdotx_36 - leverz_44*d_inertiay_23 + levery_43*d_inertiaz_24 + inertiaz_24*d_levery_43 - inertiay_23*d_leverz_44 - d_me_Mx + d_rotx_39;
+        const double d_out_49 = d_hdoty_37 + leverz_44*d_inertiax_22 - leverx_42*d_inertiaz_24 - inertiaz_24*d_leverx_42 + inertiax_22*d_leverz_44 - d_me_My + d_roty_40;
+        const double d_out_50 = d_hdotz_38 - levery_43*d_inertiax_22 + leverx_42*d_inertiay_23 + inertiay_23*d_leverx_42 - inertiax_22*d_levery_43 - d_me_Mz + d_rotz_41;
+        dout[0 * MSFP_DOF + c] = d_out_45;
+        dout[1 * MSFP_DOF + c] = d_out_46;
+        dout[2 * MSFP_DOF + c] = d_out_47;
+        dout[3 * MSFP_DOF + c] = d_out_48;
+        dout[4 * MSFP_DOF + c] = d_out_49;
+        dout[5 * MSFP_DOF + c] = d_out_50;
     }
+}
+
+/* height of the foot of the supported mass, from the stage formula and its balance.
+ * 27 operations; out: foot. */
+MSFP_INLINED
+static inline void msfp_foot(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict y /* foot_stage */, double *restrict out)
+{
+    const double par_m = par[4];
+    const double par_h = par[7];
+    const double par_g = par[8];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double b_t3x = b[6];
+    const double b_t3y = b[7];
+    const double b_t3z = b[8];
+    const double b_wx = b[9];
+    const double b_wy = b[10];
+    const double b_wz = b[11];
+    const double b_alx = b[15];
+    const double b_aly = b[16];
+    const double b_Cz = b[23];
+    const double b_Vz = b[26];
+    const double y_y = y[0];
+    const double y_y1 = y[1];
+    const double y_beta = y[2];
+    const double y_mobility = y[3];
+    const double dtx_1 = -b_t3y*b_wz + b_t3z*b_wy;
+    const double dty_2 = b_t3x*b_wz - b_t3z*b_wx;
+    const double rate_14 = b_alx*b_t3y - b_aly*b_t3x + b_wx*dty_2 - b_wy*dtx_1;
+    const double rate_17 = par_h*rate_14;
+    const double weight_18 = par_g + rate_17;
+    const double spring_19 = par_cv*(b_Vz - y_y1) + par_kv*(b_Cz - y_y);
+    const double s_22 = y_mobility*(-par_m*weight_18 + spring_19);
+    const double s_23 = s_22*y_beta;
+    const double out_24 = s_23*y_beta + y_y;
+    const double out_25 = s_23 + y_y1;
+    out[0] = out_24; /* y */
+    out[1] = out_25; /* y1 */
+    out[2] = s_22; /* y2 */
 }
 
 /* energy of the supported mass in the frame moving with the base.
  * 55 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, double *restrict out)
+static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, const double *restrict f /* foot */, double *restrict out)
 {
     const double par_m = par[4];
     const double par_jt = par[5];
@@ -2291,10 +2365,8 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double b_wpx = b[12];
     const double b_wpy = b[13];
     const double b_wpz = b[14];
-    const double b_Cz = b[23];
     const double b_Vx = b[24];
     const double b_Vy = b[25];
-    const double b_Vz = b[26];
     const double o_Ux = o[0];
     const double o_Uy = o[1];
     const double o_Uz = o[2];
@@ -2302,13 +2374,15 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double o_By = o[4];
     const double o_Bz = o[5];
     const double o_Oz = o[8];
+    const double f_y = f[0];
+    const double f_y1 = f[1];
     const double dtx_1 = -b_t3y*b_wz + b_t3z*b_wy;
     const double dty_2 = b_t3x*b_wz - b_t3z*b_wx;
     const double dtz_3 = -b_t3x*b_wy + b_t3y*b_wx;
     const double rate_4 = b_Vx + dtx_1*par_h;
     const double rate_5 = b_Vy + dty_2*par_h;
-    const double rate_6 = b_Vz + dtz_3*par_h;
-    const double rz_9 = b_Cz + b_t3z*par_h;
+    const double rate_6 = dtz_3*par_h + f_y1;
+    const double rz_9 = b_t3z*par_h + f_y;
     const double vx_16 = -o_Ux + rate_4;
     const double vy_17 = -o_Uy + rate_5;
     const double vz_18 = -o_Uz + rate_6;

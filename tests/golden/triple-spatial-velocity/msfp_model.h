@@ -206,22 +206,25 @@ enum {
     MSFP_TOP_PARAMETERS_JA = 6, /* [kg m^2] its axial moment of inertia */
     MSFP_TOP_PARAMETERS_H = 7, /* [m] height of its centre above r_nn */
     MSFP_TOP_PARAMETERS_G = 8, /* [m/s^2] gravitational acceleration */
-    MSFP_TOP_PARAMETERS_X0X = 9, /* [m] anchor of the rig springs (r_nn at the start when centred) */
-    MSFP_TOP_PARAMETERS_X0Y = 10, /* [m] anchor of the rig springs (r_nn at the start when centred) */
-    MSFP_TOP_PARAMETERS_X0Z = 11, /* [m] anchor of the rig springs (r_nn at the start when centred) */
-    MSFP_TOP_PARAMETERS_SIZE = 12
+    MSFP_TOP_PARAMETERS_MZ = 9, /* [kg] supported mass that follows the top plate vertically; 0 on a vertical spring */
+    MSFP_TOP_PARAMETERS_KV = 10, /* [N/m] vertical stiffness between top plate and foot */
+    MSFP_TOP_PARAMETERS_CV = 11, /* [N s/m] vertical damping between top plate and foot */
+    MSFP_TOP_PARAMETERS_X0X = 12, /* [m] anchor of the rig springs (r_nn at the start when centred) */
+    MSFP_TOP_PARAMETERS_X0Y = 13, /* [m] anchor of the rig springs (r_nn at the start when centred) */
+    MSFP_TOP_PARAMETERS_X0Z = 14, /* [m] anchor of the rig springs (r_nn at the start when centred) */
+    MSFP_TOP_PARAMETERS_SIZE = 15
 };
 static inline void msfp_top_parameters_x0_get(const double *block, double vector[3])
 {
-    vector[0] = block[9];
-    vector[1] = block[10];
-    vector[2] = block[11];
+    vector[0] = block[12];
+    vector[1] = block[13];
+    vector[2] = block[14];
 }
 static inline void msfp_top_parameters_x0_put(double *block, const double vector[3])
 {
-    block[9] = vector[0];
-    block[10] = vector[1];
-    block[11] = vector[2];
+    block[12] = vector[0];
+    block[13] = vector[1];
+    block[14] = vector[2];
 }
 static inline double msfp_top_parameters_k(const double *block)
 {
@@ -258,6 +261,18 @@ static inline double msfp_top_parameters_h(const double *block)
 static inline double msfp_top_parameters_g(const double *block)
 {
     return block[8];
+}
+static inline double msfp_top_parameters_mz(const double *block)
+{
+    return block[9];
+}
+static inline double msfp_top_parameters_kv(const double *block)
+{
+    return block[10];
+}
+static inline double msfp_top_parameters_cv(const double *block)
+{
+    return block[11];
 }
 
 /* coordinates */
@@ -963,6 +978,56 @@ static inline void msfp_top_wrench_M_put(double *block, const double vector[3])
     block[3] = vector[0];
     block[4] = vector[1];
     block[5] = vector[2];
+}
+
+/* foot_stage */
+enum {
+    MSFP_FOOT_STAGE_Y = 0, /* [m] y of the foot less beta^2 y'', what the earlier stages give; y outside of a step */
+    MSFP_FOOT_STAGE_Y1 = 1, /* [m/s] its rate less beta y''; y' outside of a step */
+    MSFP_FOOT_STAGE_BETA = 2, /* [s] diagonal entry of the stage formula; 0 outside of a step */
+    MSFP_FOOT_STAGE_MOBILITY = 3, /* [1/kg] 1/(m + c beta + k beta^2); 0 where no mass rests on the spring */
+    MSFP_FOOT_STAGE_SHARE = 4, /* [-] m times mobility; 1 where no mass rests on the spring */
+    MSFP_FOOT_STAGE_SIZE = 5
+};
+static inline double msfp_foot_stage_y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_foot_stage_y1(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_foot_stage_beta(const double *block)
+{
+    return block[2];
+}
+static inline double msfp_foot_stage_mobility(const double *block)
+{
+    return block[3];
+}
+static inline double msfp_foot_stage_share(const double *block)
+{
+    return block[4];
+}
+
+/* foot */
+enum {
+    MSFP_FOOT_Y = 0, /* [m] height of the foot: the lower end of the supported mass, or the fixed end of the spring */
+    MSFP_FOOT_Y1 = 1, /* [m/s] its velocity */
+    MSFP_FOOT_Y2 = 2, /* [m/s^2] its acceleration */
+    MSFP_FOOT_SIZE = 3
+};
+static inline double msfp_foot_y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_foot_y1(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_foot_y2(const double *block)
+{
+    return block[2];
 }
 
 /* support */
@@ -1957,6 +2022,8 @@ enum msfp_top_value {
     MSFP_TOP_VALUE_DAMPING, /* [N s/m] horizontal damping of the rig */
     MSFP_TOP_VALUE_ROTATIONAL_STIFFNESS, /* [N m/rad] rotational stiffness */
     MSFP_TOP_VALUE_ROTATIONAL_DAMPING, /* [N m s/rad] rotational damping */
+    MSFP_TOP_VALUE_VERTICAL_STIFFNESS, /* [N/m] vertical stiffness of the rig or below the supported mass */
+    MSFP_TOP_VALUE_VERTICAL_DAMPING, /* [N s/m] vertical damping beside it */
     MSFP_TOP_VALUE_MASS, /* [kg] supported mass */
     MSFP_TOP_VALUE_INERTIA_TRANSVERSE, /* [kg m^2] its moment of inertia about a horizontal axis */
     MSFP_TOP_VALUE_INERTIA_AXIAL, /* [kg m^2] its moment of inertia about the vertical axis */
@@ -2091,6 +2158,7 @@ typedef struct {
     double top[3]; /* [m] position of r_nn at the top plate */
     double top_force[3]; /* [N] force of the bearing on the top support */
     double top_moment[3]; /* [N m] moment of the bearing on the top support at r_nn */
+    double top_settlement; /* [m] compression of the vertical spring of the top */
     double kinetic; /* [J] kinetic energy relative to the base */
     double potential; /* [J] potential energy */
     double restraint; /* [J] energy of the springs of the top */
@@ -2118,7 +2186,8 @@ enum msfp_row_field {
     MSFP_ROW_TOP = MSFP_ROW_BASE + 3,
     MSFP_ROW_TOP_FORCE = MSFP_ROW_TOP + 3,
     MSFP_ROW_TOP_MOMENT = MSFP_ROW_TOP_FORCE + 3,
-    MSFP_ROW_KINETIC = MSFP_ROW_TOP_MOMENT + 3,
+    MSFP_ROW_TOP_SETTLEMENT = MSFP_ROW_TOP_MOMENT + 3,
+    MSFP_ROW_KINETIC = MSFP_ROW_TOP_SETTLEMENT + 1,
     MSFP_ROW_POTENTIAL = MSFP_ROW_KINETIC + 1,
     MSFP_ROW_RESTRAINT = MSFP_ROW_POTENTIAL + 1,
     MSFP_ROW_RIM_STORED = MSFP_ROW_RESTRAINT + 1,
@@ -2143,6 +2212,7 @@ MSFP_STATIC_ASSERT(offsetof(msfp_row, base) == MSFP_ROW_BASE * sizeof(double), r
 MSFP_STATIC_ASSERT(offsetof(msfp_row, top) == MSFP_ROW_TOP * sizeof(double), row_top);
 MSFP_STATIC_ASSERT(offsetof(msfp_row, top_force) == MSFP_ROW_TOP_FORCE * sizeof(double), row_top_force);
 MSFP_STATIC_ASSERT(offsetof(msfp_row, top_moment) == MSFP_ROW_TOP_MOMENT * sizeof(double), row_top_moment);
+MSFP_STATIC_ASSERT(offsetof(msfp_row, top_settlement) == MSFP_ROW_TOP_SETTLEMENT * sizeof(double), row_top_settlement);
 MSFP_STATIC_ASSERT(offsetof(msfp_row, kinetic) == MSFP_ROW_KINETIC * sizeof(double), row_kinetic);
 MSFP_STATIC_ASSERT(offsetof(msfp_row, potential) == MSFP_ROW_POTENTIAL * sizeof(double), row_potential);
 MSFP_STATIC_ASSERT(offsetof(msfp_row, restraint) == MSFP_ROW_RESTRAINT * sizeof(double), row_restraint);

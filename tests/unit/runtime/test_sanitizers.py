@@ -27,7 +27,9 @@ PROGRAM = "int main(void) { return 0; }\n"
 Values = dict[str, Any]
 
 
-def a_scene(layout: tuple[int, int, int], effects: Values, *, shaken: float = 0.0, **solver: Any) -> Scene:
+def a_scene(
+    layout: tuple[int, int, int], effects: Values, *, shaken: float = 0.0, sprung: bool = False, **solver: Any
+) -> Scene:
     """A short hard push over the rims, and up and down where bodies may part."""
     n = layout[0]
     law = {"friction_slow": 0.02, "velocity_rate": 50.0} if effects.get("friction") == "velocity" else {}
@@ -47,7 +49,8 @@ def a_scene(layout: tuple[int, int, int], effects: Values, *, shaken: float = 0.
     u[:, 1] = 0.0 if effects.get("dimension") == "planar" else 0.02 * wave
     u[:, 2] = shaken * wave * np.sin(60 * t)
     held = (0.0, 0.0) if n == 2 else (1e6, 1e3)  # the plate of a single pendulum is its slider
-    top = Top.rig(1e4, 1e6, 0.0, *held) if shaken == 0.0 else Top.mass(1e3, 100.0, 0.3, *held)
+    spring = {"vertical_stiffness": 6e6, "vertical_damping": 8e3} if sprung else {}
+    top = Top.rig(1e4, 1e6, 0.0, *held) if shaken == 0.0 else Top.mass(1e3, 100.0, 0.3, *held, **spring)
     return Scene(bearing, Motion.from_arrays(t, u), top, Effects(**effects), Solver(**{"rtol": 1e-3, **solver}))
 
 
@@ -62,6 +65,7 @@ CASES: dict[str, Scene] = {
     "friction by velocity": a_scene((3, 1, 1), {"friction": "velocity"}),
     "friction by pressure, velocity and temperature": a_scene((5, 2, 2), {"friction": "pvt"}),
     "order four": a_scene((3, 1, 1), {}, method="esdirk4"),
+    "a mass on a vertical spring": a_scene((3, 1, 1), {}, shaken=0.0005, sprung=True),
     "temperature, the report's method": a_scene((3, 1, 1), {"friction": "pvt"}, method="dopri5"),
 }
 QUICK = ("planar",)  # the others cost half a minute of compiling each
