@@ -84,7 +84,8 @@ def assembled_section() -> list[str]:
 
 def program_sections() -> list[str]:
     """The statements of every program."""
-    programs = {program.name: program for program in derive(ModelSpec(Layout.tfp(), Effects())).programs}
+    spec = ModelSpec(Layout.tfp(), Effects(bouc_wen="report"))
+    programs = {program.name: program for program in derive(spec).programs}
     parts = []
     for name, title in TITLES.items():
         rows = [f"{left} &= {right}" for left, right in statements(programs[name])]

@@ -89,7 +89,7 @@ def assembled() -> dict[str, sp.Expr]:
         `E1`, `E3`: linear momentum (3.28) [N]; `t2`: angular momentum (3.29) [N m], left side less right side as in
         `Model.residual`; `dY`: friction rate (3.18) [1/s].
     """
-    spec = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar", rims=False))
+    spec = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar", rims=False, bouc_wen="report"))
     p = {program.name: program for program in derive(spec).programs}
     R, zero = symbol("R_1"), sp.Integer(0)
     lower = evaluate(p["arms"], d=dimensions("ell_1", "z_1", zero, R))

@@ -87,11 +87,10 @@ def plastic_rates(p: Program, shear: Shear, u: sp.Expr, v: sp.Expr, dy: sp.Expr)
     square = p.let(trial[0] ** 2 + trial[1] ** 2)
     root = p.let(sp.sqrt(p.let(1 + Step(p.let(square - 1)) * (square - 1))))
     along = p.let(before[0] * u + before[1] * v)
-    edge = p.let(Step(p.let(square - 1 + ON_THE_EDGE)))
     timed = p.let(Step(shear.tau))
-    slipping = p.let(
-        timed * dy * (root - 1) / (shear.tau + 1 - timed) + (1 - timed) * edge * Step(along) * along, "slipping"
-    )
+    returned, limit = p.let(timed * dy / (shear.tau + 1 - timed)), p.let(1 - timed)
+    outward = p.let(limit * Step(p.let(square - 1 + ON_THE_EDGE)) * Step(along))
+    slipping = p.let(returned * (root - 1) + outward * along, "slipping")
     return {
         "dY": p.let((u - p.let(trial[0] / root) * slipping) / dy, "dY"),
         "dZ": p.let((v - p.let(trial[1] / root) * slipping) / dy, "dZ"),

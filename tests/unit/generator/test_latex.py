@@ -25,7 +25,7 @@ def page_script():
 
 @pytest.fixture(scope="module")
 def planar():
-    return build_model(Layout(2, 1, 0), Effects(dimension="planar"))
+    return build_model(Layout(2, 1, 0), Effects(dimension="planar", bouc_wen="report"))
 
 
 def random_numbers(rng, level):
@@ -46,7 +46,7 @@ def compiled(model, x):
         layout=Layout(2, 1, 0),
         base_height=x["ell_1"],
         gravity=x["g"],
-        surfaces=[Surface(x["R_1"], 1.3 * x["R_1"], x["mu_1"], x["d_1"], 1e7, 0.0)],
+        surfaces=[Surface(x["R_1"], 1.3 * x["R_1"], x["mu_1"], x["d_1"], 1e7, 0.0, contact_damping=0.0)],
         bodies=[Body(x["ell_2"], x["z_2"], x["m_2"], (x["lambda_2"], x["lambda_2"]))],
     )
     state = [[[0.0, x[f"{dots}theta_2"], 0.0]] for dots in ("", "d")]
@@ -122,7 +122,7 @@ def test_every_statement_parses_as_mathematics():
 
 
 def test_every_program_that_carries_the_motion_is_shown():
-    spec = ModelSpec(Layout.tfp(), Effects())
+    spec = ModelSpec(Layout.tfp(), Effects(bouc_wen="report"))
     hidden = {"named_points", "body_energy", "top_energy", "force_to_world"}  # the same again, or bookkeeping
     hidden |= {"twists", "transported_twist", "transported_force", "transported_wrench", "turning_balance"}
     hidden |= {"variation_of_rates", "local_variation", "force_to_local"}
