@@ -78,6 +78,9 @@ MEANINGS = {
     "rim_damping": "Damping of the rim.",
     "seat_stiffness": "Stiffness of the unilateral contact, with uplift ([uplift.md](uplift.md)).",
     "seat_damping": "Damping of that contact, over its stiffness and compression.",
+    "contact_damping": "Damping time T of the sheared contact ([hysteresis.md](hysteresis.md)).",
+    "friction_at": "What friction coefficients refer to: the surfaces, or the pivot as in data sheets"
+    " ([devices.md](devices.md)).",
     **dict.fromkeys(
         (
             "friction_slow",
@@ -147,6 +150,8 @@ MEANINGS = {
     "stiffness": "Stiffness of the horizontal springs that hold the top plate.",
     "rotational_stiffness": ROTATIONAL,
     "rotational_damping": ROTATIONAL,
+    "vertical_stiffness": "Vertical stiffness of the rig, or below the supported mass; without it rigid.",
+    "vertical_damping": "Vertical damping beside it.",
     "force": FORCE,
     "moment": MOMENT,
     "top.mass.mass": "Supported mass.",
@@ -198,6 +203,10 @@ SECTIONS: list[tuple[str, str, type]] = [
 ]
 
 
+# Keys that are no field of a part.
+EXTRA: dict[str, tuple[Rule, Any]] = {"friction_at": (Choice(("surface", "pivot")), "surface")}
+
+
 def meaning(path: str, key: str) -> str:
     """The meaning of a key of the table at `path`: the longest entry that fits. Raises KeyError where there is none."""
     head = path.split(".")[0] if path else "scene"
@@ -242,7 +251,7 @@ def section(title: str, path: str, kind: type) -> str:
     lines = [f"## {title}", "", "| key | takes | default | meaning |", "|---|---|---|---|"]
     fields = schema._TABLES[path].model_fields
     for key in sorted(fields, key=lambda name: not fields[name].is_required()):
-        rule, given = rules.get(key, (None, MISSING if fields[key].is_required() else None))
+        rule, given = EXTRA.get(key) or rules.get(key, (None, MISSING if fields[key].is_required() else None))
         shown = f'`"{kind.kind}"`' if key == "kind" else takes(rule)  # type: ignore[attr-defined]
         if key == "least_share":
             shown = takes(Quantity("", above=0.0))

@@ -118,7 +118,7 @@ class Effects:
             }
         ),
     ] = True
-    bouc_wen: Annotated[str, Choice({word: law.meaning for word, law in HYSTERESIS.items()})] = "plastic"
+    bouc_wen: Annotated[str, Choice({word: law.meaning for word, law in HYSTERESIS.items()})] = "report"
     friction: Annotated[str, Choice(FRICTION)] = "constant"
     friction_law: str | None = None
     uplift: Annotated[
@@ -191,7 +191,7 @@ class Auto:
     rims: Annotated[bool | None, Choice((True, False))] = None
     uplift: Annotated[bool | None, Choice((True, False))] = None
     spin: Literal["locked", "patch", "free"] = "locked"
-    bouc_wen: Annotated[str, Choice(HYSTERESIS)] = "plastic"
+    bouc_wen: Annotated[str, Choice(HYSTERESIS)] = "report"
     friction: Annotated[str | None, Choice(FRICTION)] = None
     friction_law: str | None = None
     error: Annotated[float, Quantity("", above=0.0)] = 0.005

@@ -225,7 +225,7 @@ def test_generate_says_what_was_built_and_where(capsys, monkeypatch, tmp_path):
     arguments = ["generate", "7", "3", "3", "-o", str(tmp_path), "--no-rims", "--dimension", "planar"]
     assert main(arguments) == 0
     out, err = capsys.readouterr()
-    assert calls == [("7_3_3-planar-locked-inertial-norims-plastic-constant", tmp_path)]
+    assert calls == [("7_3_3-planar-locked-inertial-norims-report-constant", tmp_path)]
     for words in (
         "derive 1.50 s",
         "compile 2.25 s",

@@ -98,10 +98,15 @@ def test_the_second_method_sees_a_wrong_run() -> None:
     assert deviation(scene) < 1e-3 < 3e-3 < deviation(wrong)
 
 
+def undamped(scene: Scene) -> Scene:
+    """The scene with the contacts of PEER 2017/07, for which its number was kept."""
+    return replace(scene, bearing=scene.bearing.replace(contact_damping=0.0))
+
+
 def test_no_step_goes_over_a_moment_without_a_solution() -> None:
     """A mass thrown against a rim; its normal force has no bound at 1.376 s. The default used to step over that and go
     on with 13 kJ where there had been 0.2 kJ. A run with a tolerance 300 times smaller ends there too."""
-    scene = fuzz_scenes.case(21, 1741).scene
+    scene = undamped(fuzz_scenes.case(21, 1741).scene)
     for rtol in (scene.solver.rtol, 1e-6):
         error = failure_of(replace(scene, solver=replace(scene.solver, rtol=rtol)))
         assert error.status == "irregular" and isinstance(error.result, Result)
@@ -111,7 +116,7 @@ def test_no_step_goes_over_a_moment_without_a_solution() -> None:
 
 def test_a_run_whose_energy_does_not_close_says_so() -> None:
     """Let go far from rest, a mass bounces on its slopes faster than the tolerance of the angles asks steps for."""
-    scene = fuzz_scenes.case(23, 2349).scene
+    scene = undamped(fuzz_scenes.case(23, 2349).scene)
     (note,) = [note for note in simulate(scene).notes if note.kind == "energy"]
     assert 0.02 < note.value < 0.2 and "give a smaller solver.rtol" in note.line
     assert not simulate(replace(scene, solver=replace(scene.solver, rtol=1e-6))).notes

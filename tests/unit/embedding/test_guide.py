@@ -13,7 +13,7 @@ from support import ROOT, Array
 
 from msfp_gen import Bearing, Body, Effects, InputError, Layout, Motion, Scene, Solver, Surface, Top, cli, simulate
 from msfp_gen.embedding import GUIDE, values, write_guide
-from msfp_gen.specification import contract
+from msfp_gen.specification import contract, rows
 from msfp_gen.specification.layout import ModelSpec
 
 STRICT = "-std=c99 -O1 -Wall -Wextra -Wpedantic -Werror -ffp-contract=off"
@@ -102,7 +102,7 @@ def test_readme_names_every_file_value_and_status(folder: Path) -> None:
     files = {path.name for path in folder.iterdir()} - own - set(GUIDE)
     assert {name for name in files if not name.endswith((".o", ".so", ".pyd"))} <= named
     spec = ModelSpec(Layout.tfp(), Effects())
-    for entries in (contract.BODY, contract.SURFACE, contract.TOP, contract.row(spec.effects), contract.EVENT_KINDS):
+    for entries in (contract.BODY, contract.SURFACE, contract.TOP, rows.row(spec.effects), contract.EVENT_KINDS):
         for entry in entries:
             assert entry.meaning in text, entry.name
     assert {status.name for status in contract.STATUSES if status.compiled} <= named

@@ -17,6 +17,7 @@ from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, c
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.jit.processor import x86_64_level
 from msfp_gen.motions.piecewise import hermite5
+from msfp_gen.specification import contract
 
 LOAD = 112e3
 REPORT = Effects(bouc_wen="report")  # that of main.c
@@ -66,7 +67,7 @@ def values() -> dict[str, list[list[float]]]:
         [s.radius, s.capacity, s.friction, s.yield_displacement, s.rim_stiffness, s.rim_damping, s.contact_damping]
         for s in bearing.surfaces
     ]
-    return {"bodies": [base, *bodies], "surfaces": surfaces, "top": [0.0] * 10}  # type: ignore[list-item]
+    return {"bodies": [base, *bodies], "surfaces": surfaces, "top": [0.0] * len(contract.TOP)}  # type: ignore[list-item]
 
 
 def test_plain_script_imports_nothing_but_the_folder(folder: Path, tmp_path: Path) -> None:

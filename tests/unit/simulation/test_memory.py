@@ -30,13 +30,13 @@ def test_rows_that_cannot_fit_are_refused_before_anything_runs(
 ) -> None:
     monkeypatch.setattr(memory, "available", lambda: 8e9)
     scene = scene_of("fenz-test2", output_step=1e-6)
-    words = r"output_step = 1e-06: 5\.6e\+07 rows need 252 GB of memory and 8 GB are available; give at least 3\.3e-05"
+    words = r"output_step = 1e-06: 5\.6e\+07 rows need 256 GB of memory and 8 GB are available; give at least 3\.4e-05"
     with pytest.raises(InputError, match=words):
         simulate(scene)
     monkeypatch.setattr("msfp_gen.cli.inputs.build", None)  # not even built
     monkeypatch.setattr("msfp_gen.scene.file.loader.load_scene", lambda _: scene)
     assert main(["run", "fenz-test2", "-o", str(tmp_path / "run.nc")]) == 2
-    assert "give at least 3.3e-05 [s], or a shorter duration" in capsys.readouterr().err
+    assert "give at least 3.4e-05 [s], or a shorter duration" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
     assert memory._needed(replace(scene, output_step=3.3e-5)) < 8e9
 
@@ -77,7 +77,8 @@ def test_a_rest_for_ever_ends_with_what_there_is(monkeypatch: pytest.MonkeyPatch
 def test_the_size_of_a_row_is_that_of_the_result() -> None:
     history = preset_run("fenz-test2").history
     numbers = sum(values.size for values in history.arrays().values()) // len(history.time) + len(history.energy)
-    assert memory.row_size(4) == 8 * (numbers + 4 + 4)  # friction coefficients and temperatures, with other laws
+    others = 4 + 4 + 1  # friction coefficients, temperatures and the settlement, with other laws and tops
+    assert memory.row_size(4) == 8 * (numbers + others)
 
 
 MEASURED = """

@@ -57,7 +57,7 @@ def test_massless_sliders_leave_spin_undetermined():
 
 def test_key_names_every_choice():
     spec = ModelSpec(Layout.tfp(), Effects())
-    assert spec.key == "5_2_2-spatial-locked-inertial-rims-plastic-constant"
+    assert spec.key == "5_2_2-spatial-locked-inertial-rims-report-constant"
     changes = [
         {"dimension": "planar"},
         {"spin": "free"},
