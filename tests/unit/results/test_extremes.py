@@ -48,12 +48,12 @@ def test_extremes_hold_for_the_rows_and_the_file(tmp_path: Path) -> None:
 
 def test_a_turning_point_inside_a_step_counts() -> None:
     """Long steps: the largest displacement is that of rows close together, and the rows of the steps miss it."""
-    scene = scene_of("ridgecrest-clc", {}, {"rtol": 3e-2}, duration=8.0)
+    scene = scene_of("ridgecrest-clc", {}, {"rtol": 3e-2}, duration=14.0)
     steps, rows = (simulate(replace(scene, output_step=step)) for step in (None, 1e-3))
     exact = np.hypot(*rows.history.displacement[:, :2].T).max()
     missed = exact - np.hypot(*steps.history.displacement[:, :2].T).max()
     assert missed > 0
-    assert abs(steps.extremes.displacement[3] - exact) < 0.3 * missed  # rows a millisecond apart miss a little too
+    assert abs(steps.extremes.displacement[3] - exact) < 0.05 * missed
 
 
 def test_planar_extremes_are_those_of_the_user_in_any_plane() -> None:
