@@ -50,7 +50,7 @@ class RestartState:
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
     (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]. origin: displacement
-    across the bearing at the start of the run, shape (3,) [m]. guard_heat, heat: states of the monitor of heat and
+    across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
     of the temperature. All but azimuth and planar come from a snapshot of the run.
     """
 
@@ -63,7 +63,7 @@ class RestartState:
     foot: Array
     force: Array
     origin: Array
-    guard_heat: Array
+    monitor_heat: Array
     heat: Array | None = None
 
     @classmethod
@@ -133,7 +133,7 @@ def start_run(
     if at is not None:
         becomes_spatial = at.planar and not model.planar
         origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
-        options |= {"origin": np.ascontiguousarray(origin), "guard_heat": at.guard_heat, "start_time": at.time}
+        options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
         options["foot"] = _transferred_foot(at, q)
         if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
             options["heat"] = at.heat
@@ -276,11 +276,11 @@ def _monitor_options(
     checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
     left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}
     return checked | {
-        "guards": tuple(name for name, out in left_out.items() if out),
-        "guard_stop": tuple(stops),
-        "guard_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
-        "guard_inertia": inertia_limit(scene, selection.error),
-        "guard_time": slider_period(scene),
-        "guard_rise": _significant_rise(scene, effects, selection),
-        "guard_heating": np.array(heating_factors(scene.bearing)),
+        "monitors": tuple(name for name, out in left_out.items() if out),
+        "monitor_stop": tuple(stops),
+        "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "monitor_inertia": inertia_limit(scene, selection.error),
+        "monitor_time": slider_period(scene),
+        "monitor_rise": _significant_rise(scene, effects, selection),
+        "monitor_heating": np.array(heating_factors(scene.bearing)),
     }
