@@ -5,23 +5,34 @@
 
 enum { NB = MSFP_NB };
 
-static void take_largest(double *extreme, double value) { *extreme = fmax(*extreme, value); }
-static void take_least(double *extreme, double value) { *extreme = fmin(*extreme, value); }
+static void take_largest(double *extreme, double value)
+{
+    if (value > *extreme)
+        *extreme = value;
+}
+
+static void take_least(double *extreme, double value)
+{
+    if (value < *extreme)
+        *extreme = value;
+}
+
+static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1]); }
 
 /* Largest magnitudes along the axes and in the horizontal plane. */
 static void take_vector(double extreme[4], const double vector[3])
 {
     for (int i = 0; i < 3; ++i)
         take_largest(&extreme[i], fabs(vector[i]));
-    take_largest(&extreme[3], hypot(vector[0], vector[1]));
+    take_largest(&extreme[3], length(vector));
 }
 
 /* What follows from the positions alone. */
 static void take_positions(msfp_run *run, const msfp_row *row)
 {
-    double across[3];
-    msfp_displacement_across(run, row, across);
-    take_vector(run->extremes.displacement, across);
+    double displacement[3];
+    msfp_displacement_across(run, row, displacement);
+    take_vector(run->extremes.displacement, displacement);
     for (int j = 0; j < NB; ++j) {
         take_largest(&run->extremes.sliding[j], row->sliding[j]);
         take_least(&run->extremes.gap[j], row->gap[j]);
@@ -37,7 +48,7 @@ static void take_row(msfp_run *run, const msfp_row *row)
         take_least(&e->least_normal[j], row->normal[j]);
         take_largest(&e->most_normal[j], row->normal[j]);
         if (row->normal[j] > 0.0) /* of a closed surface */
-            take_largest(&e->slip_speed[j], hypot(row->slip[j][0], row->slip[j][1]));
+            take_largest(&e->slip_speed[j], length(row->slip[j]));
 #if MSFP_LAW
         take_least(&e->least_friction[j], row->mu[j]);
         take_largest(&e->most_friction[j], row->mu[j]);
@@ -48,15 +59,22 @@ static void take_row(msfp_run *run, const msfp_row *row)
     }
 }
 
+static double across(const msfp_run *run, const msfp_row *row)
+{
+    double displacement[3];
+    msfp_displacement_across(run, row, displacement);
+    return length(displacement);
+}
+
 /* Rate of the squared horizontal displacement, over 2 [m^2/s], at the evaluation in run->work. */
 static double outward_rate(const msfp_run *run, const msfp_point *at, const msfp_row *row)
 {
-    double across[3], top[3], rate = 0.0;
-    msfp_displacement_across(run, row, across);
+    double displacement[3], top[3], rate = 0.0;
+    msfp_displacement_across(run, row, displacement);
     msfp_body_V_get(run->work.body[NB], top);
     top[1] += MSFP_PLANAR ? at->base[1][1] : 0.0;
     for (int i = 0; i < 2; ++i)
-        rate += across[i] * (at->base[1][i] - top[i]);
+        rate += displacement[i] * (at->base[1][i] - top[i]);
     return rate;
 }
 
@@ -78,16 +96,22 @@ void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
     run->outward_rate = 0.0;
 }
 
+static const double near_extreme = 0.95; /* a turning point inside a step is looked at if its end is as near as this */
+
 /* Where the bearing turns back inside the step, the positions there count too. */
 void msfp_extremes_step(msfp_run *run)
 {
-    msfp_row row;
-    msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &row);
-    take_row(run, &row);
-    const double before = run->outward_rate, after = outward_rate(run, &run->reached, &row);
+    msfp_row own;
+    const msfp_row *row = &own;
+    if (run->options.output_step <= 0.0) /* the row has just been written */
+        row = &run->rows[run->row_count - 1];
+    else
+        msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &own);
+    take_row(run, row);
+    const double before = run->outward_rate, after = outward_rate(run, &run->reached, row);
     run->outward_rate = after;
-    if (before > 0.0 && after < 0.0) {
-        msfp_row_inside(run, before / (before - after), &row);
-        take_positions(run, &row);
+    if (before > 0.0 && after < 0.0 && across(run, row) > near_extreme * run->extremes.displacement[3]) {
+        msfp_row_inside(run, before / (before - after), &own);
+        take_positions(run, &own);
     }
 }

@@ -201,12 +201,12 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     run->restart = run->retry_after_newton = 0;
     if (run->stability_limit_steps >= STABILITY_LIMIT_STEPS)
         run->status = msfp_classify_failure(run, MSFP_E_STIFF);
-    msfp_extremes_step(run);
     const int stop = msfp_record_events(run, before, after);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);
     if (run->status)
         return 0;
+    msfp_extremes_step(run);
     if (run->options.sampled && at_stop(run)) /* the slope of the accelerations changes here */
         memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
     run->now = run->next;

@@ -30,7 +30,7 @@ void msfp_monitor_begin(msfp_run *run);
 
 /* Extremes of the first row. */
 void msfp_extremes_begin(msfp_run *run, const msfp_row *row);
-/* Extremes with those of the accepted step, from the evaluation that ended it. */
+/* Extremes with those of the accepted step, after its rows are written. */
 void msfp_extremes_step(msfp_run *run);
 
 /* ---- energy_balance.c ---- */
