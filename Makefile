@@ -3,10 +3,11 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+RUNS   := $(VENV)/.runs
 
 .PHONY: demo test slow lint types package bounds clang fuzz figures docs clean
 
-demo: $(STAMP)
+demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
 
 test: $(STAMP)
@@ -46,9 +47,14 @@ figures: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -W error -m pdoc --math -o build/docs msfp_gen
 
-$(STAMP): pyproject.toml
+# With what running needs; the tools of the tests and checks come on top.
+$(RUNS): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "msfp-gen needs Python 3.11 or newer: make PYTHON=python3.11 test")'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e .
+	touch $@
+
+$(STAMP): $(RUNS)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[test]"
 	touch $@
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
 
-DEMO = ("ridgecrest-clc", "fenz-test5")
+DEMO = ("ridgecrest-ccc", "fenz-test5")
 
 app = typer.Typer()
 
