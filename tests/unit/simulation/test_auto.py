@@ -266,6 +266,23 @@ def test_positions_and_friction_are_carried_over_exactly() -> None:
         np.testing.assert_array_equal(getattr(result.history, name)[: row + 1], getattr(alone.history, name)[: row + 1])
 
 
+def test_energies_go_on_over_a_change_of_models() -> None:
+    """No term jumps where another model takes over, and all of them end where those of the full model do."""
+    scene = replace(load_scene("fenz-test5"), output_step=0.02, duration=60.0, effects=Auto(bouc_wen="report"))
+    result, full = simulate(with_selection(scene, rims=False)), simulate(replace(scene, effects=FULL))
+    (time,) = [note.time for note in result.notes if note.action]
+    energy, rows = result.history.energy, result.history.time
+    row = int(np.searchsorted(rows, time))
+    peak = energy["input"].max()
+    for name, values in energy.items():
+        steps = np.abs(np.diff(values))
+        around = np.r_[steps[row - 10 : row - 2], steps[row + 2 : row + 10]].max()
+        assert steps[row - 2 : row + 2].max() <= 2 * around + 1e-4 * peak, name
+        if name not in ("kinetic", "numerical"):
+            assert values[-1] == pytest.approx(full.history.energy[name][-1], abs=5e-3 * peak), name
+    assert result.summary["energy"]["closure_error"] < 1e-3
+
+
 def test_notes_are_kept_in_the_file(tmp_path: Any) -> None:
     result = simulate(kumar())
     again = Result.from_netcdf(result.to_netcdf(tmp_path / "out.nc"))
