@@ -97,9 +97,8 @@ print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / mem
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems count in other units")
 def test_a_run_and_its_file_need_no_more_than_estimated(tmp_path: Path) -> None:
-    simulate(
-        replace(scene_of("fenz-test2"), effects=Auto(), output_step=1.0)
-    )  # a build in the process that is measured would be its largest need of memory
+    # A build in the process that is measured would be its largest need of memory.
+    simulate(replace(scene_of("fenz-test2"), effects=Auto(), output_step=1.0))
     command = [sys.executable, "-c", MEASURED, str(tmp_path / "run.nc")]
     share = float(subprocess.run(command, cwd=ROOT, text=True, capture_output=True, check=True).stdout)
     assert 0.3 < share < 1.0
