@@ -114,6 +114,19 @@ def test_no_step_goes_over_a_moment_without_a_solution() -> None:
         assert error.result.history.energy["kinetic"].max() < 200.0
 
 
+@pytest.mark.slow
+def test_a_spring_below_the_mass_keeps_plastic_friction_regular() -> None:
+    """206 t on sliders of 0.1 kg: where inner surfaces slide nothing but the inertia of the mass is left, through the
+    slopes, and friction gives it either sign. On its bearing's own stiffness it moves up and down instead."""
+    scene = fuzz_scenes.case(7, 106, short=True).scene
+    scene = replace(scene, effects=replace(scene.effects, bouc_wen="plastic"))
+    assert failure_of(scene).status == "irregular"
+    mass = scene.top.mass  # type: ignore[attr-defined]
+    stiffness = 8e9 / 13e6 * 9.8 * mass
+    spring = {"vertical_stiffness": stiffness, "vertical_damping": 0.1 * (stiffness * mass) ** 0.5}
+    assert simulate(replace(scene, top=replace(scene.top, **spring))).succeeded
+
+
 def test_a_run_whose_energy_does_not_close_says_so() -> None:
     """Let go far from rest, a mass bounces on its slopes faster than the tolerance of the angles asks steps for."""
     scene = undamped(fuzz_scenes.case(23, 2349).scene)
