@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -10,6 +10,7 @@ from msfp_gen.analysis.characterise import Characterisation, characterise
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.friction_parameters import proportional
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
 
 if TYPE_CHECKING:
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 CASES = ("lower", "nominal", "upper")
+# Word in the name of a model -> the effect that is then prescribed for all cases.
+WIDER: dict[str, tuple[str, Any]] = {
+    "spatial": ("dimension", "spatial"),
+    "inertial": ("sliders", "inertial"),
+    "rims": ("rims", True),
+    "uplift": ("uplift", True),
+    "pvt": ("friction", "pvt"),
+}
 Progress = Callable[[str], Callable[[float, float], None] | None]
 
 
@@ -119,7 +128,8 @@ class Bounds:
 def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
     """Run `scene` with its properties at their lower bounds, nominal values and upper bounds.
 
-    A case that fails is part of the result, and the other cases are run.
+    A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
+    ends with different ones, they are run again with what any of them needs.
 
     Args:
         scene: the nominal case.
@@ -130,7 +140,26 @@ def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None)
         InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
         RunError: only if the user interrupts.
     """
-    lambdas = _lambdas(scene.bearing, table)
+    cases = _cases(scene, table, progress)
+    if (common := _common_effects(scene, cases)) is not None:
+        cases = _cases(replace(scene, effects=common), table, progress)
+    return Bounds(table, _lambdas(scene.bearing, table), tuple(cases))
+
+
+def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
+    """`Auto` with every effect that the last model of any case has; None where all cases have the same model."""
+    if not isinstance(scene.effects, Auto):
+        return None
+    ran = [case.result.provenance["model"] for case in cases if case.result is not None]
+    models = [set(model.split(", then ")[-1].split("-")) for model in ran]
+    if all(model == models[0] for model in models):
+        return None
+    used = set().union(*models)
+    return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in used})
+
+
+def _cases(scene: Scene, table: FactorTable, progress: Progress | None) -> list[Case]:
+    """The runs of `bound`."""
     cases = []
     for name, bounded in bounded_scenes(scene, table).items():
         callback = progress(name) if progress else None
@@ -143,7 +172,7 @@ def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None)
             cases.append(Case(name, bounded, partial, None, str(error)))
         else:
             cases.append(Case(name, bounded, result, characterise(result)))
-    return Bounds(table, lambdas, tuple(cases))
+    return cases
 
 
 def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:

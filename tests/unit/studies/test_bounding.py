@@ -17,6 +17,7 @@ from support import ROOT
 from support.synthetic import loops
 
 from msfp_gen import (
+    Auto,
     Bearing,
     Body,
     Effects,
@@ -312,3 +313,15 @@ def test_command_on_a_test_of_the_report(tmp_path: Path, capsys: Any) -> None:
     stiffness = found["quantities"]["effective_stiffness"]
     assert stiffness["lower"] < stiffness["nominal"] < stiffness["upper"]
     assert found["governing"]["peak_force"] == "upper"
+
+
+def test_all_cases_have_the_same_effects() -> None:
+    """Auto leaves inertia out at the upper bound of friction only; then all three runs have it."""
+    scene = dataclasses.replace(load_scene("fenz-test2"), motion=Motion.harmonic(0.02, 1.0, cycles=2), duration=None)
+    scene = dataclasses.replace(scene, effects=Auto(error=7.937e-4))
+    chosen = {name: each.modelled.sliders for name, each in bounded_scenes(scene, load_factors("asce7")).items()}
+    assert chosen == {"lower": "inertial", "nominal": "inertial", "upper": "massless"}
+    found = bound(scene, load_factors("asce7"))
+    models = {case.result.provenance["model"].split(", then ")[-1] for case in found.cases if case.result}
+    assert len(models) == 1 and "inertial" in models.pop()
+    assert found.lambdas["friction"]["upper"][0] > 1 > found.lambdas["friction"]["lower"][0]
