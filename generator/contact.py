@@ -17,7 +17,7 @@ from .blocks import Blocks
 from .functions import ArcTan2, Modulus
 from .hysteresis import Shear, friction_rates
 from .program import Program, Vector
-from .vectors import add, dot, scale
+from .vectors import add, cross, dot, scale
 
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
@@ -183,7 +183,8 @@ def rim(b: Blocks) -> Program:
     """Rim contact (3.20)-(3.25): gap, force and its moment about the sphere centre.
 
     The force acts on the slider: the body above a concave-up surface, the body below a concave-down one. The runtime
-    applies it only while it is compressive (docs/model.md, choice 4).
+    applies it only while it is compressive (docs/model.md, choice 4). With uplift the gap follows the separation too,
+    so that the energy of the rim is a function of the position (docs/uplift.md).
     """
     p = Program("rim", "rim contact (3.20)-(3.25); applied only while the force is compressive")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
@@ -194,35 +195,31 @@ def rim(b: Blocks) -> Program:
     below: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(1))
     sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
     cosine = above[2]
-    gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
     for angle in ("psi", "theta"):
         if x[angle].is_Symbol:
             p.rates[x[angle]] = x[f"{angle}1"]
-    gap_rate = p.rate(gap)  # (2.102)
-    size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
     up = p.let((1 + par["sign"]) / 2)
     down = p.let((1 - par["sign"]) / 2)
     # (3.24): the axis of the other body, projected on the face of the slider and normalised.
     toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
+    lever = p.let(par["R"] - par["pr"])  # (3.25); the component r f_b is parallel to the force and has no moment
+    gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
+    separation: Vector | None = x.get("d")
+    if separation is not None:
+        p.declare_rates(separation, x["d1"])
+        gap = p.let(gap - par["R"] / lever * dot(separation, toward) / sine, "gap")
+    gap_rate = p.rate(gap)  # (2.102)
+    size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
     force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
     slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
-    arm = p.let(
-        -par["sign"] * (par["R"] - par["pr"])
-    )  # (3.25); the component r f_b is parallel to the force and has no moment
-    moment = p.let_vector(
-        scale(
-            arm,
-            (
-                slider[1] * force[2] - slider[2] * force[1],
-                slider[2] * force[0] - slider[0] * force[2],
-                slider[0] * force[1] - slider[1] * force[0],
-            ),
-        ),
-        "M",
-    )
+    moment = scale(p.let(-par["sign"] * lever), cross(slider, force))
+    if separation is not None:
+        # The separation across the plane of tilt turns the direction of the force with the tilt: the couple of that.
+        aside = p.let(dot(separation, cross(slider, force)) * -par["sign"])
+        moment = add(moment, scale(aside, add(slider, scale(p.let(-cosine / sine**2), toward))))
     p.write(
         b.rim,
-        {"f": force, "M": moment, "g": gap, "dg": gap_rate, "fc": size},
+        {"f": force, "M": p.let_vector(moment, "M"), "g": gap, "dg": gap_rate, "fc": size},
         tangents=("f", "M"),
         columns="MSFP_RIM_LOCAL",
     )

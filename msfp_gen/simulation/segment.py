@@ -10,6 +10,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.model.marshalling import separations_at_rest
+from msfp_gen.results.geometry.shape import rim_forces
 from msfp_gen.model.plane import (
     motion_in_plane,
     out_of_plane,
@@ -49,8 +50,8 @@ class RestartState:
 
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
-    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]. origin: displacement
-    across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
+    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
+    base_rotation: shape (3,) [rad]. origin: displacement across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
     of the temperature. All but azimuth and planar come from a snapshot of the run.
     """
 
@@ -62,6 +63,8 @@ class RestartState:
     f: Array
     foot: Array
     force: Array
+    rim_force: Array
+    base_rotation: Array
     origin: Array
     monitor_heat: Array
     heat: Array | None = None
@@ -223,9 +226,10 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
     Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
-    interface forces: the unilateral contacts are compressed by them.
+    interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
-    q, v, f, force = at.q, at.v, at.f, at.force
+    angles = np.vstack([at.base_rotation, at.q[:, :3]])
+    q, v, f, force = at.q, at.v, at.f, at.force - rim_forces(scene.bearing, angles[None], at.rim_force[None])[0]
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:

@@ -61,7 +61,8 @@ def poses(result: RunData) -> Poses:
     signs = np.array(bearing.layout.signs, float)[:, None]
     normal = _rotated(history.contact_angles, basis[:, :-1])[..., 2, :]  # t~_3 (3.13)
     contact = centre - signs * bearing.arrays()["radius"][:, None] * normal  # (3.14); concave down: + R
-    rim, rim_direction = _rims(bearing, basis, bottom, top)
+    rim_direction = _rim_directions(bearing, basis[:, :, 2])
+    rim = _rim_points(bearing, basis[:, :, 2], bottom, top, rim_direction)
     force = np.where(separated(history)[..., None], 0.0, history.interface_force)
     rim_force = -history.rim_force[..., None] * rim_direction  # (3.22), on the body above
     moment = np.cross(contact - centre, force - rim_force) + np.cross(rim - centre, rim_force)
@@ -124,18 +125,33 @@ def _rotated(angles: Array, below: Array) -> Array:
     return np.stack([first, second, cosine[..., 1, :] * between + sine[..., 1, :] * t1], axis=-2)
 
 
-def _rims(bearing: Bearing, basis: Array, bottom: Array, top: Array) -> tuple[Array, Array]:
-    """Point of every slider nearest to the rim (3.25), and the direction towards the rim (3.24), each (T, n-1, 3)."""
-    lengths, axis = bearing.arrays(), basis[:, :, 2]
-    points, directions = np.empty_like(axis[:, 1:]), np.empty_like(axis[:, 1:])
-    for surface, sign in enumerate(bearing.layout.signs):
+def rim_forces(bearing: Bearing, angles: Array, size: Array) -> Array:
+    """Rim forces on the bodies above (3.22), ndarray, shape (T, n-1, 3) [N].
+
+    angles: of bodies 1..n, shape (T, n, 3) [rad]. size: of the forces, shape (T, n-1) [N].
+    """
+    forces: Array = -size[..., None] * _rim_directions(bearing, body_bases(angles)[:, :, 2])
+    return forces
+
+
+def _rim_directions(bearing: Bearing, axis: Array) -> Array:
+    """Directions from the sliders towards the rims (3.24), shape (T, n-1, 3); zero where the slider is centred."""
+    directions = np.empty_like(axis[:, 1:])
+    for surface in range(bearing.layout.surfaces):
         body = bearing.slider(surface)
         own, other = axis[:, body], axis[:, surface if body == surface + 1 else surface + 1]
         along = other - np.sum(own * other, axis=-1, keepdims=True) * own
         norm = np.linalg.norm(along, axis=-1, keepdims=True)
-        direction = np.divide(along, norm, out=np.zeros_like(along), where=norm > 1e-12)  # undefined where centred
+        directions[:, surface] = np.divide(along, norm, out=np.zeros_like(along), where=norm > 1e-12)
+    return directions
+
+
+def _rim_points(bearing: Bearing, axis: Array, bottom: Array, top: Array, direction: Array) -> Array:
+    """Point of every slider nearest to the rim (3.25), shape (T, n-1, 3) [m]."""
+    lengths, points = bearing.arrays(), np.empty_like(direction)
+    for surface, sign in enumerate(bearing.layout.signs):
+        body = bearing.slider(surface)
         middle = bottom[:, body] if sign > 0 else top[:, body]
         radius, offset = lengths["rim_radius"][body], lengths["rim_offset"][body]
-        points[:, surface] = middle + sign * (radius * direction + offset * own)
-        directions[:, surface] = direction
-    return points, directions
+        points[:, surface] = middle + sign * (radius * direction[:, surface] + offset * axis[:, body])
+    return points
