@@ -22,6 +22,8 @@ from .vectors import add, cross, dot, scale
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
 """w_0 [rad/s] of the drilling moment (docs/model.md)."""
+ALIGNED = sp.Float("1e-9")
+"""Sine of a tilt, and distance [m], below which the direction of a rim force is not resolved."""
 
 
 def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
@@ -193,30 +195,40 @@ def rim(b: Blocks) -> Program:
     sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
     above: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))  # t_3 of the body above
     below: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(1))
-    sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
     cosine = above[2]
     for angle in ("psi", "theta"):
         if x[angle].is_Symbol:
             p.rates[x[angle]] = x[f"{angle}1"]
     up = p.let((1 + par["sign"]) / 2)
     down = p.let((1 - par["sign"]) / 2)
-    # (3.24): the axis of the other body, projected on the face of the slider and normalised.
+    # (3.24): the axis of the other body, projected on the face of the slider and normalised below.
     toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
+    slider = add(scale(up, above), scale(down, below))
+    dish = add(scale(down, above), scale(up, below))
     lever = p.let(par["R"] - par["pr"])  # (3.25); the component r f_b is parallel to the force and has no moment
-    gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
     separation: Vector | None = x.get("d")
-    if separation is not None:
+    if separation is None:
+        sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
+        gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
+    else:
         p.declare_rates(separation, x["d1"])
-        gap = p.let(gap - par["R"] / lever * dot(separation, toward) / sine, "gap")
+        sine = p.let(sp.sqrt(above[0] ** 2 + above[1] ** 2 + ALIGNED**2))
+        angle_ratio = p.let(ArcTan2(sine, cosine) / sine)
+        slider, dish = p.let_vector(slider, "slider"), p.let_vector(dish, "dish")
+        across = add(separation, scale(-p.let(dot(separation, slider)), slider))
+        aside = p.let_vector(add(scale(par["R"] * angle_ratio, toward), scale(par["R"] / lever, across)), "aside")
+        distance = p.let(sp.sqrt(dot(aside, aside) + ALIGNED**2))
+        gap = p.let(par["sc"] - distance, "gap")
     gap_rate = p.rate(gap)  # (2.102)
     size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
-    force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
-    slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
-    moment = scale(p.let(-par["sign"] * lever), cross(slider, force))
-    if separation is not None:
-        # The separation across the plane of tilt turns the direction of the force with the tilt: the couple of that.
-        aside = p.let(dot(separation, cross(slider, force)) * -par["sign"])
-        moment = add(moment, scale(aside, add(slider, scale(p.let(-cosine / sine**2), toward))))
+    if separation is None:
+        force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
+        moment = scale(p.let(-par["sign"] * lever), cross(p.let_vector(slider, "slider"), force))
+    else:
+        force = p.let_vector(scale(p.let(size / distance), aside), "f")
+        # The virtual work of the force over a rotation of the dish, which changes the angle and the projection.
+        slope = p.let((angle_ratio * cosine - 1) / sine**2 * dot(force, dish))  # d(angle/sine)/d(cosine)
+        moment = scale(p.let(-par["sign"] * lever), cross(dish, add(scale(slope, slider), scale(angle_ratio, force))))
     p.write(
         b.rim,
         {"f": force, "M": p.let_vector(moment, "M"), "g": gap, "dg": gap_rate, "fc": size},

@@ -18,13 +18,11 @@ static void rim_coordinates(const msfp_work *w, int j, double *x)
 #endif
 }
 
-/* Whether the rim of surface j needs no evaluation. */
+/* Whether the rim of surface j needs no evaluation: comparing cosines of the tilt avoids an arc cosine. With uplift the
+ * gap follows from the separation too. */
 static int rim_is_clear(const msfp_parameters *p, const msfp_work *w, int j)
 {
-    const double cosine = msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT];
-    /* Without separation, comparing cosines of the tilt avoids an arc cosine. With it the gap follows from both; where
-     * the tilt is zero its direction is not defined, and the gap is the capacity. */
-    return MSFP_UPLIFT ? cosine >= 1.0 : cosine > p->rim_cosine[j];
+    return !MSFP_UPLIFT && msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j];
 }
 #endif
 
