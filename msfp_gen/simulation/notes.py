@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.friction_parameters import RANGES
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
+FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
@@ -40,6 +42,8 @@ TEXTS = {
     "give a smaller contact_damping",
     "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
     "cycles; give bouc_wen = 'plastic'",
+    "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
+    "face: a real slider would tip; give effects.uplift = true",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
 
@@ -74,7 +78,8 @@ def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
     doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
-    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + creep_notes(scene, effects, history)
+    physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
+    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + physics
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
@@ -89,6 +94,24 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
         return ()
     share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note for each surface whose contact point (3.14) leaves the face of its slider, which then would tip.
+
+    With uplift the slider stands on its edge instead (docs/uplift.md).
+    """
+    if effects.uplift:
+        return ()
+    bearing, notes = scene.bearing, []
+    loaded = history.normal_force > FOOTPRINT_LOAD * np.median(history.normal_force, axis=0)
+    offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
+    faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
+    for j in np.flatnonzero(offsets.max(axis=0) > faces):
+        row, surface = int(offsets[:, j].argmax()), int(j) + 1
+        text = TEXTS["footprint"].format(surface=surface, value=offsets[row, j])
+        notes.append(Note(float(history.time[row]), "footprint", surface, float(offsets[row, j]), text))
+    return tuple(notes)
 
 
 def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
