@@ -257,6 +257,7 @@ typedef struct {
     const double *heat;           /* [MSFP_NB][MSFP_HEAT] parts of the temperature rise [K]; NULL: zero */
     int monitors, monitor_stop; /* monitors that are active, and those that stop the run: bits 1 << MSFP_MONITOR_... */
     double monitor_normal;        /* least normal force [N] */
+    double monitor_peak;          /* largest normal force [N]; 0: no limit */
     double monitor_inertia;       /* largest inertial force over normal force [-] */
     double monitor_time;          /* time over which a change of velocity is averaged [s] */
     double monitor_rise;          /* largest rise in temperature [K] */

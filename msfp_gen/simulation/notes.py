@@ -9,6 +9,7 @@ import numpy as np
 from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
+from msfp_gen.scene.effect_selection import rigid_mass_limit
 from msfp_gen.scene.friction_parameters import RANGES
 from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
@@ -28,7 +29,9 @@ CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked f
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
     "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
-    "uplift": "the normal force of surface {surface} is only {value:.4g} N; the model has no separation",
+    "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
+    "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
+    "not converge; give vertical_stiffness",
     "inertia": "the inertial force of body {body} is {value:.2g} of N on surface {surface}; the model has none",
     "heat": "friction may heat surface {surface} by {value:.3g} K; its friction law does not depend on temperature",
     "law_speed": "the slip velocity of surface {surface} is {value:.3g} m/s; its friction law was checked up to "
@@ -79,6 +82,7 @@ def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Not
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
     doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
     physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
+    physics += peak_notes(scene, effects, history)
     return doubts + energy_notes(scene, history) + damping_notes(scene, history) + physics
 
 
@@ -94,6 +98,17 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
         return ()
     share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where N under a rigid mass exceeds `rigid_mass_limit`."""
+    limit = rigid_mass_limit(scene)
+    row, surface = np.unravel_index(int(history.normal_force.argmax()), history.normal_force.shape)
+    peak = float(history.normal_force[row, surface])
+    if effects.uplift or not 0 < limit < peak:
+        return ()
+    text = TEXTS["peak"].format(surface=surface + 1, value=peak)
+    return (Note(float(history.time[row]), "peak", int(surface) + 1, peak, text),)
 
 
 def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.model.marshalling import separations_at_rest
-from msfp_gen.results.geometry.shape import rim_forces
 from msfp_gen.model.plane import (
     motion_in_plane,
     out_of_plane,
@@ -21,12 +20,14 @@ from msfp_gen.model.plane import (
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.results.geometry.shape import rim_forces
 from msfp_gen.scene.effect_selection import (
     UPLIFT_MONITOR_SHARE,
     EffectSelection,
     inertia_limit,
     load_at_rest,
     quasistatic,
+    rigid_mass_limit,
     slider_period,
 )
 from msfp_gen.scene.friction_parameters import checked_range
@@ -51,8 +52,8 @@ class RestartState:
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
     (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
-    base_rotation: shape (3,) [rad]. origin: displacement across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
-    of the temperature. All but azimuth and planar come from a snapshot of the run.
+    base_rotation: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
+    heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
     """
 
     time: float
@@ -283,6 +284,7 @@ def _monitor_options(
         "monitors": tuple(name for name, out in left_out.items() if out),
         "monitor_stop": tuple(stops),
         "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "monitor_peak": rigid_mass_limit(scene),
         "monitor_inertia": inertia_limit(scene, selection.error),
         "monitor_time": slider_period(scene),
         "monitor_rise": _significant_rise(scene, effects, selection),
