@@ -16,7 +16,7 @@ from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
-    from msfp_gen.results.history import History
+    from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
@@ -25,6 +25,7 @@ _MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
 FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
+LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
@@ -47,6 +48,8 @@ TEXTS = {
     "cycles; give bouc_wen = 'plastic'",
     "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
     "face: a real slider would tip; give effects.uplift = true",
+    "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
+    "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
 
@@ -109,6 +112,17 @@ def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, 
         return ()
     text = TEXTS["peak"].format(surface=surface + 1, value=peak)
     return (Note(float(history.time[row]), "peak", int(surface) + 1, peak, text),)
+
+
+def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
+    """A note for each surface that landed more than `LANDINGS` times within `LANDING_TIME`: it rattles."""
+    notes = []
+    for surface in sorted({event.surface for event in events if event.kind == "landing"}):
+        times = np.array([event.time for event in events if event.kind == "landing" and event.surface == surface])
+        if (times[LANDINGS:] - times[:-LANDINGS] < LANDING_TIME).any():
+            text = TEXTS["rattle"].format(surface=surface, value=len(times))
+            notes.append(Note(float(times[0]), "rattle", surface, float(len(times)), text))
+    return tuple(notes)
 
 
 def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:

@@ -32,7 +32,7 @@ def test_at_the_rims_uplift_gives_the_same_loop():
 
 
 def test_a_contact_outside_the_face_is_noted():
-    scene = load_scene("fenz-test5")
+    scene = load_scene("triple-push")
     narrow = replace(scene, bearing=scene.bearing.replace(rim_radius=[0.010, 0.0255, 0.0255, 0.010]))
     whole, tipping = simulate(scene), simulate(narrow)
     assert not [note for note in whole.notes if note.kind == "footprint"]
@@ -58,6 +58,14 @@ def test_peaks_of_a_rigid_mass_are_noted_where_the_effects_are_given():
         simulate(swayed(Effects(dimension="planar")))
     note = next(note for note in caught.value.result.notes if note.kind == "peak")
     assert "vertical_stiffness" in note.text and note.value > 1.5 * 11428.0 * 9.8
+
+
+def test_a_surface_that_rattles_is_noted():
+    loose, seated = simulate(shaken(1.4, sideways=0.03, duration=0.9)), simulate(shaken(0.5, duration=0.6))
+    notes = [note for note in loose.notes if note.kind == "rattle"]
+    landings = [event.surface for event in loose.events if event.kind == "landing"]
+    assert notes and all(note.value == landings.count(note.surface) > 20 for note in notes)
+    assert not [note for note in seated.notes if note.kind == "rattle"]
 
 
 def test_a_small_bounce_has_one_answer():
