@@ -106,6 +106,7 @@ typedef struct {
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */
     double rim_sum[MSFP_NB]; /* k_c gap + c_c dgap/dt of a closed gap [N]; positive where the damper would pull */
+    double rim_gap[MSFP_NB]; /* gap [m] of a closed rim, with uplift of every rim */
 #if MSFP_LAW
     double coefficient[MSFP_NB]
                       [MSFP_COEFFICIENT_SIZE]; /* mu on entry is the first guess of Newton's method; 0 will do */
@@ -114,10 +115,11 @@ typedef struct {
     double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
     double reference;     /* weight and load, the scale of forces where no normal force is known [N] */
 #if MSFP_UPLIFT
-    double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE];
+    double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE], rim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE];
     double below[MSFP_NB]
                 [MSFP_MOMENT_SIZE]; /* moment of a surface on the body below, about the sphere centre of that body */
-    double dunilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_DOF], dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
+    double dunilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_DOF], drim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE * MSFP_DOF],
+        dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
 #endif
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
@@ -255,6 +257,7 @@ typedef struct {
     const double *heat;           /* [MSFP_NB][MSFP_HEAT] parts of the temperature rise [K]; NULL: zero */
     int monitors, monitor_stop; /* monitors that are active, and those that stop the run: bits 1 << MSFP_MONITOR_... */
     double monitor_normal;        /* least normal force [N] */
+    double monitor_peak;          /* largest normal force [N]; 0: no limit */
     double monitor_inertia;       /* largest inertial force over normal force [-] */
     double monitor_time;          /* time over which a change of velocity is averaged [s] */
     double monitor_rise;          /* largest rise in temperature [K] */

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run
 UPLIFT_MONITOR_SHARE = 0.05  # share of the load at rest below which the monitor of uplift trips
+PEAK_LOAD_SHARE = 1.5  # N under a rigid mass over the largest load, above which the monitor of uplift trips
 MAX_PERIOD_RATIO = 0.05  # massless sliders: period of a slider over the time scale of the motion, at most
 MIN_PLANAR_SHARE = 0.5  # a run starts planar if its scene stays in one vertical plane for this share of the duration
 GIVEN = "given in the scene"  # reason of an effect that `Auto` fixes
@@ -167,11 +168,26 @@ def load_at_rest(scene: SceneParts) -> float:
 
 def minimum_load(scene: SceneParts) -> float:
     """Smallest vertical load on the lowest surface if all masses follow the vertical motion of the base [N]."""
+    return float(np.min(_loads(scene)))
+
+
+def rigid_mass_limit(scene: SceneParts) -> float:
+    """Normal force [N] above which the contacts of a stack under a rigid mass must not be rigid; 0 for other tops.
+
+    It is `PEAK_LOAD_SHARE` times the largest vertical load if all masses follow the vertical motion of the base. A
+    rigid mass on rigid contacts has peaks beyond it which do not converge (docs/model.md, "Where the model ends").
+    """
+    rigid = isinstance(scene.top, MassTop) and scene.top.vertical_stiffness is None
+    return PEAK_LOAD_SHARE * float(np.max(_loads(scene))) if rigid else 0.0
+
+
+def _loads(scene: SceneParts) -> Array:
+    """Vertical loads on the lowest surface if all masses follow the vertical motion of the base [N]."""
     times = _sampled_times(scene)
     vertical = scene.motion.evaluate(times, 2)[:, 2]
     bodies = sum(body.mass for body in scene.bearing.bodies)
     inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + vertical)
-    return float(np.min(inertial + _applied_load(scene, times) + _held_load(scene, times)))
+    return inertial + _applied_load(scene, times) + _held_load(scene, times)
 
 
 def _held_load(scene: SceneParts, times: Array) -> Array | float:

@@ -20,12 +20,14 @@ from msfp_gen.model.plane import (
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.results.geometry.shape import rim_forces
 from msfp_gen.scene.effect_selection import (
     UPLIFT_MONITOR_SHARE,
     EffectSelection,
     inertia_limit,
     load_at_rest,
     quasistatic,
+    rigid_mass_limit,
     slider_period,
 )
 from msfp_gen.scene.friction_parameters import checked_range
@@ -49,9 +51,9 @@ class RestartState:
 
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
-    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]. origin: displacement
-    across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
-    of the temperature. All but azimuth and planar come from a snapshot of the run.
+    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
+    base_rotation: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
+    heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
     """
 
     time: float
@@ -62,6 +64,8 @@ class RestartState:
     f: Array
     foot: Array
     force: Array
+    rim_force: Array
+    base_rotation: Array
     origin: Array
     monitor_heat: Array
     heat: Array | None = None
@@ -223,9 +227,10 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
     Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
-    interface forces: the unilateral contacts are compressed by them.
+    interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
-    q, v, f, force = at.q, at.v, at.f, at.force
+    angles = np.vstack([at.base_rotation, at.q[:, :3]])
+    q, v, f, force = at.q, at.v, at.f, at.force - rim_forces(scene.bearing, angles[None], at.rim_force[None])[0]
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:
@@ -279,6 +284,7 @@ def _monitor_options(
         "monitors": tuple(name for name, out in left_out.items() if out),
         "monitor_stop": tuple(stops),
         "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "monitor_peak": rigid_mass_limit(scene),
         "monitor_inertia": inertia_limit(scene, selection.error),
         "monitor_time": slider_period(scene),
         "monitor_rise": _significant_rise(scene, effects, selection),

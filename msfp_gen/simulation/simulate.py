@@ -29,7 +29,7 @@ from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
 from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
 from msfp_gen.simulation.memory import outgrown, require_memory
-from msfp_gen.simulation.notes import history_notes, notes_of
+from msfp_gen.simulation.notes import history_notes, landing_notes, notes_of
 from msfp_gen.simulation.segment import RestartState, Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.version import __version__
@@ -267,14 +267,15 @@ def _result(sequence: RunSequence, history: History) -> Result:
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
     }
+    events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))
     return Result(
         scene=scene,
         history=history,
-        events=tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth)),
+        events=events,
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
         message="" if last.status in ("ok", "stopped") else _message(scene, last),
         provenance=provenance,
-        notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history),
+        notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history) + landing_notes(events),
         recorded_extremes=_extremes(segments),
     )

@@ -81,7 +81,7 @@ static void restore_bounds(const msfp_run *run, msfp_row *row)
         if (row->normal[j] < 0.0)
             row->normal[j] = row->force[j][0] = row->force[j][1] = row->force[j][2] = 0.0;
         row->sliding[j] = sliding[j][MSFP_GAP_S];
-        row->gap[j] = sliding[j][MSFP_GAP_G];
+        row->gap[j] = MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]; /* with uplift it follows the separation too */
         row->rim[j] = row->gap[j] > 0.0 ? 0.0 : fmax(row->rim[j], 0.0); /* a rim only pushes, and only in contact */
     }
 }

@@ -840,6 +840,66 @@ static inline double msfp_rim_coordinates_theta1(const double *block)
     return block[1];
 }
 
+/* rim_wrench */
+enum {
+    MSFP_RIM_WRENCH_FX = 0, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_FZ = 1, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_TY = 2, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_SIZE = 3
+};
+static inline void msfp_rim_wrench_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = 0.0;
+    vector[2] = block[1];
+}
+static inline void msfp_rim_wrench_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[2];
+}
+static inline void msfp_rim_wrench_T_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[2];
+    vector[2] = 0.0;
+}
+static inline void msfp_rim_wrench_T_put(double *block, const double vector[3])
+{
+    block[2] = vector[1];
+}
+
+/* offset */
+enum {
+    MSFP_OFFSET_DX = 0, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_DZ = 1, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_D1X = 2, /* [m/s] rate of these components */
+    MSFP_OFFSET_D1Z = 3, /* [m/s] rate of these components */
+    MSFP_OFFSET_SIZE = 4
+};
+static inline void msfp_offset_d_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = 0.0;
+    vector[2] = block[1];
+}
+static inline void msfp_offset_d_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[2];
+}
+static inline void msfp_offset_d1_get(const double *block, double vector[3])
+{
+    vector[0] = block[2];
+    vector[1] = 0.0;
+    vector[2] = block[3];
+}
+static inline void msfp_offset_d1_put(double *block, const double vector[3])
+{
+    block[2] = vector[0];
+    block[3] = vector[2];
+}
+
 /* gap */
 enum {
     MSFP_GAP_S = 0, /* [m] sliding displacement (3.20) */
@@ -1752,7 +1812,7 @@ static inline const char *msfp_method_name(int value)
 /* Monitors of what a model leaves out. */
 enum msfp_monitor {
     MSFP_MONITOR_RIMS, /* a slider is beyond the capacity of its surface [m] */
-    MSFP_MONITOR_UPLIFT, /* a normal force is below its least value [N] */
+    MSFP_MONITOR_UPLIFT, /* a normal force is below its least value, or above its largest [N] */
     MSFP_MONITOR_INERTIA, /* inertial force of a slider over the normal force below it */
     MSFP_MONITOR_HEAT, /* bound of the temperature rise of a surface [K] */
     MSFP_MONITOR_LAW_SPEED, /* slip velocity outside the range in which the friction law was checked [m/s] */

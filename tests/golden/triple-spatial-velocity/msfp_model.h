@@ -930,6 +930,76 @@ static inline double msfp_rim_coordinates_theta1(const double *block)
     return block[3];
 }
 
+/* rim_wrench */
+enum {
+    MSFP_RIM_WRENCH_FX = 0, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_FY = 1, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_FZ = 2, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_TX = 3, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_TY = 4, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_TZ = 5, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_SIZE = 6
+};
+static inline void msfp_rim_wrench_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_rim_wrench_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_rim_wrench_T_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_rim_wrench_T_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+
+/* offset */
+enum {
+    MSFP_OFFSET_DX = 0, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_DY = 1, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_DZ = 2, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_D1X = 3, /* [m/s] rate of these components */
+    MSFP_OFFSET_D1Y = 4, /* [m/s] rate of these components */
+    MSFP_OFFSET_D1Z = 5, /* [m/s] rate of these components */
+    MSFP_OFFSET_SIZE = 6
+};
+static inline void msfp_offset_d_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_offset_d_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_offset_d1_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_offset_d1_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+
 /* gap */
 enum {
     MSFP_GAP_S = 0, /* [m] sliding displacement (3.20) */
@@ -2126,7 +2196,7 @@ static inline const char *msfp_method_name(int value)
 /* Monitors of what a model leaves out. */
 enum msfp_monitor {
     MSFP_MONITOR_RIMS, /* a slider is beyond the capacity of its surface [m] */
-    MSFP_MONITOR_UPLIFT, /* a normal force is below its least value [N] */
+    MSFP_MONITOR_UPLIFT, /* a normal force is below its least value, or above its largest [N] */
     MSFP_MONITOR_INERTIA, /* inertial force of a slider over the normal force below it */
     MSFP_MONITOR_HEAT, /* bound of the temperature rise of a surface [K] */
     MSFP_MONITOR_LAW_SPEED, /* slip velocity outside the range in which the friction law was checked [m/s] */
