@@ -1,5 +1,6 @@
-"""README of a folder of generated sources (docs/embedding.md)."""
+"""Models for other programs: the C library of `export`, and the README of a generated folder (docs/embedding.md)."""
 
 from msfp_gen.embedding.guide import README, check_guide, write_guide
+from msfp_gen.embedding.library import Library, export_library
 
-__all__ = ["README", "check_guide", "write_guide"]
+__all__ = ["README", "Library", "check_guide", "export_library", "write_guide"]
