@@ -99,7 +99,7 @@ def _export_library(specs: list[ModelSpec], prefix: Path) -> None:
     from msfp_gen.common.tables import Table
     from msfp_gen.embedding import export_library
 
-    with building() as progress:
+    with building(kept=False) as progress:
         library = export_library(specs, prefix, progress)
     rows = [*library.models.items(), ("prefix", str(library.prefix)), ("files", str(len(library.files)))]
     show([Table("C library msfp", (), rows)])

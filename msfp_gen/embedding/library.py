@@ -14,7 +14,7 @@ from typing import Any
 from msfp_gen.embedding import values
 from msfp_gen.embedding.rendering import render
 from msfp_gen.embedding.tree import Link, Tree, check_prefix, install
-from msfp_gen.errors import InputError
+from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION, CALL_ERRORS, effects_text, model_name, surface_values
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.jit.library import STATIC, BuiltLibrary, build_library
@@ -63,9 +63,14 @@ def export_library(
             "its names in C are those of the layout"
         )
     check_prefix(target)
-    folder = Path(tempfile.mkdtemp(prefix="msfp-gen-export-"))  # stays after an error, with the log that it names
-    built = build_library(list(models.values()), folder, progress or (lambda _, __: None))
-    tree = _tree(models, built)
+    folder = Path(tempfile.mkdtemp(prefix="msfp-gen-export-"))
+    try:
+        built = build_library(list(models.values()), folder, progress or (lambda _, __: None))
+        tree = _tree(models, built)
+    except BaseException as error:
+        if not (isinstance(error, CompileError) and error.log):  # else the folder stays, with the log
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
     shutil.rmtree(folder)
     try:
         install(tree, target)

@@ -209,6 +209,29 @@ def test_runs_in_threads_are_those_of_one_thread(prefix: Path, tmp_path: Path) -
     assert run([str(program)], tmp_path) == "same\n"
 
 
+@needs("pkg-config")
+def test_bad_values_are_refused_with_a_message(prefix: Path, tmp_path: Path) -> None:
+    """Each names the field and the remedy; no handle is made."""
+    values_header(prefix, tmp_path)
+    program = compiled(prefix, C / "refusals.c", tmp_path, f"-I{tmp_path}", "-Wno-unused-const-variable")
+    lines = [line.split("|") for line in run([str(program)], tmp_path).splitlines()]
+    assert len(lines) == 33 and all(len(line) == 3 for line in lines), lines
+    for what, status, message in lines:
+        if "=" in what:
+            assert status == "argument" and re.search(r"give |leave it|--", message), (what, message)
+            field = re.split("[:,]", message)[0]
+            assert field.rstrip("s") in what or (field == "motion" and "_time" in what), (what, message)
+    found = {what: status for what, status, _ in lines if "=" not in what}
+    assert found == {
+        "no bodies": "argument",
+        "no handle": "argument",
+        "accelerations of nothing": "argument",
+        "accelerations at NaN": "finite",
+        "no snapshot": "snapshot",
+        "no status": "unknown",
+    }
+
+
 @needs("nm")
 def test_the_shared_library_shows_the_tables_alone(prefix: Path) -> None:
     (shared,) = prefix.glob("lib/libmsfp.so.*")
@@ -220,10 +243,10 @@ def test_the_shared_library_shows_the_tables_alone(prefix: Path) -> None:
 
 
 def test_the_sources_compile_without_warnings(prefix: Path, tmp_path: Path) -> None:
-    """With the flags of the issue, from the folder of sources alone; the small model for time."""
-    for name in ("table.c", "scene.c", "bearing.c", "checks.c", "progress.c", "output.c"):
-        source = prefix / "share/msfp/src/msfp_3_1_1" / name
-        run([*find_compiler().command, *STRICT.split(), "-fsyntax-only", str(source)], tmp_path)
+    """From the folder of sources alone."""
+    sources = sorted(str(path) for path in (prefix / "share/msfp/src/msfp_3_1_1").glob("*.c"))
+    assert len(sources) > 20
+    run([*find_compiler().command, *STRICT.split(), "-fsyntax-only", *sources], tmp_path)
 
 
 @needs("make", "pkg-config", "valgrind")
