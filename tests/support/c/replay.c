@@ -4,7 +4,7 @@
  * Reads what tests/support/replay.py writes: gravity; bodies; surfaces; top; motion, load (count of pieces, knots,
  * coefficients); jumps; q, v, f; options. Everything variable is on the heap, so that no slip goes unseen. Halfway the
  * run is taken over by another, as from a checkpoint. Prints the last row, or with an argument all of them as a callback
- * receives them; then steps, then the status. MODEL is the function that returns the table.
+ * receives them, and with a second one the callback ends every call; then steps, then the status. MODEL is the function that returns the table.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,6 +84,13 @@ static int print_rows(void *user, const double *rows, size_t row_count)
     return 0;
 }
 
+/* The same, and run_advance is to return. */
+static int print_and_end(void *user, const double *rows, size_t row_count)
+{
+    print_rows(user, rows, row_count);
+    return 1;
+}
+
 int main(int argc, char **argv)
 {
     const msfp_api *api = MODEL();
@@ -118,7 +125,7 @@ int main(int argc, char **argv)
     if (progress.status == MSFP_OK)
         take_over(api, run, first);
     if (argc > 1)
-        api->run_on_rows(run, print_rows, (void *)api);
+        api->run_on_rows(run, argc > 2 ? print_and_end : print_rows, (void *)api);
     while (api->run_advance(run, 1000))
         ;
     const double *rows = api->run_rows(run, &row_count);
