@@ -29,7 +29,7 @@ def export(
     what: Annotated[
         list[str],
         typer.Argument(
-            metavar="RUN | N M P...",
+            metavar="RUN | N M P",
             help="A result (.nc), or a scene file or preset, which is run first. With --prefix: layouts, three numbers "
             "each, as of generate.",
         ),
