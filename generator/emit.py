@@ -16,9 +16,13 @@ from msfp_gen.version import __version__
 
 from .derive import Equations
 from .heat import HEAT_KERNEL
+from .interface import interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c
 from .program import Block, Use
+
+# Each is made from the template of its name.
+FILES = ("msfp.h", "msfp_symbols.h", "msfp_model.h", "msfp_kernels.h", "msfp_fields.h", "msfp_module.pyx")
 
 
 @dataclass(frozen=True)
@@ -285,6 +289,10 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...]) -> dict[str, str]:
         },
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
+        **interface_context(spec, shape_of(spec)),
     }
-    names = ("msfp_model.h", "msfp_kernels.h", "msfp_python.h", "msfp_module.pyx")
-    return {name: environment.get_template(f"{name}.jinja").render(context, file=name) for name in names}
+    names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
+    return {
+        file: environment.get_template(f"{template}.jinja").render(context, file=file)
+        for file, template in names.items()
+    }

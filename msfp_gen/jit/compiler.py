@@ -158,12 +158,12 @@ def compile_extension(
     c_flags = (*FLAGS["c"], *processor, *FLAGS["user"])
     chains = [
         _wrapper_steps(wrapper, module, compiler, include, translated=f"{wrapper}.c" in sources),
-        *([_compile_step(name, compiler, c_flags)] for name in units),
+        *([compile_step(name, compiler, c_flags)] for name in units),
     ]
-    for done in _run_parallel(chains, log.run):
+    for done in run_parallel(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
-    objects = [_object_file(name) for name in [*units, f"{wrapper}.c"]]
+    objects = [object_file(name) for name in [*units, f"{wrapper}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
     if not target.is_file():
@@ -213,7 +213,7 @@ def first_error(output: str, code: int) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
 
 
-def _run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
+def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
     """Run all chains, one a processor at a time, and yield how many are finished; after a failure none is started."""
 
     def run_chain(chain: Sequence[Step]) -> None:
@@ -237,8 +237,9 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
-    return Step(name, (*compiler.command, *flags, "-c", name, "-o", _object_file(name)))
+def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
+    """Compilation of one C file; the object lies beside it."""
+    return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
 
 
 def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path, translated: bool) -> list[Step]:
@@ -249,7 +250,7 @@ def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path,
     pyx, c = f"{wrapper}.pyx", f"{wrapper}.c"
     cython = Step(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
     name = () if wrapper == module else (f"-DPyInit_{wrapper}=PyInit_{module}",)
-    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", _object_file(c))
+    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", object_file(c))
     return [*([] if translated else [cython]), Step(c, command)]
 
 
@@ -259,8 +260,9 @@ def _link_command(compiler: Compiler) -> tuple[str, ...]:
     return (*compiler.command, *platform[1:])
 
 
-def _object_file(name: str) -> str:
-    return f"{Path(name).stem}.o"
+def object_file(name: str) -> str:
+    """Object of a C file, beside it."""
+    return str(Path(name).with_suffix(".o"))
 
 
 def _version(command: Sequence[str]) -> str:

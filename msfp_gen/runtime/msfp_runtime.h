@@ -154,19 +154,6 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 #define MSFP_ANGLES_C (MSFP_PLANAR ? 1 : 2) /* position angles of a normal */
 #define MSFP_UNKNOWNS (MSFP_NB * (MSFP_PLANAR ? 3 : 6))
 
-enum msfp_seed_kind {
-    MSFP_SEED_COORDINATE, /* index: body 0..MSFP_NB; field: 3*order + angle */
-    MSFP_SEED_CONTACT,    /* index: surface; field: psi~, theta~, N */
-    MSFP_SEED_FRICTION,   /* index: surface; field: Y, Z */
-    MSFP_SEED_BASE,       /* field: 3*order + axis */
-    MSFP_SEED_LOAD        /* field: 0..5, force and moment */
-};
-
-/* The variable of one column of the Jacobian of the balances. */
-typedef struct {
-    int kind, index, field;
-} msfp_variable;
-
 /* Residual [MSFP_UNKNOWNS] of the balances [N], [N m], body by body: linear, angular. jacobian: [MSFP_UNKNOWNS][count]
  * with respect to `variables`; rates: derivatives of dY/dt, dZ/dt [2 MSFP_NB][count], zeroed by the caller, or NULL. */
 void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, const double *unknowns, msfp_work *w,
@@ -218,7 +205,6 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
 
 /* ---- histories: piecewise polynomials in time ---------------------------------------------- */
 
-#define MSFP_DEGREE 5
 #define MSFP_CHANNELS 8 /* six, rounded up to full vectors */
 typedef struct {
     int pieces;
@@ -266,20 +252,6 @@ typedef struct {
     double law_speed, law_load[MSFP_NB][2], law_temperature[2];
 } msfp_options;
 
-/* The first detection of a monitor. value: see enum msfp_monitor. */
-typedef struct {
-    double time; /* [s] */
-    double value;
-    int surface; /* counted from 1; 0: nothing detected */
-} msfp_trip;
-
-typedef struct {
-    double time; /* [s] */
-    int surface; /* counted from 1; 0: none */
-    int kind;    /* enum msfp_event_kind */
-    double displacement[3], top_force[3]; /* across the bearing [m]; on the top support [N] */
-} msfp_event;
-
 /* Event functions of a run [m]: the gap of every rim (a lower bound of it while the gap is wide), what is left to the
  * stop displacement, and with uplift the compression of every unilateral contact. */
 #define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
@@ -321,7 +293,7 @@ typedef struct {
 } msfp_step_history;
 #endif
 
-typedef struct {
+struct msfp_run {
     msfp_parameters parameters;
     msfp_history motion, load;
 #if MSFP_TOP_ROTATION
@@ -369,6 +341,8 @@ typedef struct {
     double largest_energy;     /* so far [J], see energy_balance.c */
     int stability_limit_steps; /* consecutive steps of an explicit method at its limit of stability */
     int retry_after_newton;    /* the step at hand is a shorter one after Newton's method failed */
+    size_t rows_before; /* rows of the run that came before rows[0] and are no longer held */
+    size_t rows_taken;  /* rows of the run that the callback has received */
     long counts[MSFP_COUNTS];
     int status;         /* enum msfp_status */
     int status_surface; /* counted from 1; 0: none */
@@ -378,7 +352,9 @@ typedef struct {
     size_t row_count, row_capacity;
     msfp_event *events;
     size_t event_count, event_capacity;
-} msfp_run;
+    msfp_row_callback callback; /* NULL: rows are kept */
+    void *user;                 /* its first argument */
+};
 #define MSFP_SNAPSHOT_BEGIN offsetof(msfp_run, next_jump)
 #define MSFP_SNAPSHOT_END offsetof(msfp_run, rows)
 

@@ -52,7 +52,7 @@ class RestartState:
     time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
     (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
-    base_rotation: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
+    base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
     heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
     """
 
@@ -65,7 +65,7 @@ class RestartState:
     foot: Array
     force: Array
     rim_force: Array
-    base_rotation: Array
+    base_angles: Array
     origin: Array
     monitor_heat: Array
     heat: Array | None = None
@@ -229,7 +229,7 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
     Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
     interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
-    angles = np.vstack([at.base_rotation, at.q[:, :3]])
+    angles = np.vstack([at.base_angles, at.q[:, :3]])
     q, v, f, force = at.q, at.v, at.f, at.force - rim_forces(scene.bearing, angles[None], at.rim_force[None])[0]
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]

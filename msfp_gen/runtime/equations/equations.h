@@ -246,6 +246,15 @@ void msfp_heat_finish(msfp_run *run);
 /* Largest error of a temperature over its tolerance [-]; weights: of the method less the embedded ones. */
 double msfp_heat_error(const msfp_run *run, const double *weights, int stages, double h, double beta);
 #else
+/* In place of their prefixed names, see msfp_symbols.h. */
+#undef msfp_heat_point
+#undef msfp_heat_initial_state
+#undef msfp_heat_begin
+#undef msfp_heat_prepare
+#undef msfp_heat_stage
+#undef msfp_heat_node
+#undef msfp_heat_finish
+#undef msfp_heat_error
 #define msfp_heat_point(s, at) ((void)0)
 #define msfp_heat_initial_state(run) ((void)0)
 #define msfp_heat_begin(run) ((void)0)

@@ -21,8 +21,10 @@ static void *grown(void *items, size_t count, size_t *capacity, size_t size)
 {
     if (count < *capacity)
         return items;
-    *capacity = *capacity ? 2 * *capacity : 256;
-    return realloc(items, *capacity * size);
+    const size_t wider = *capacity ? 2 * *capacity : 256;
+    void *more = realloc(items, wider * size);
+    *capacity = more ? wider : *capacity; /* without memory the array stays as it is */
+    return more;
 }
 
 static msfp_row *new_row(msfp_run *run)
@@ -89,7 +91,7 @@ static void restore_bounds(const msfp_run *run, msfp_row *row)
 double msfp_next_output(const msfp_run *run)
 {
     const double step = run->options.output_step;
-    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->row_count);
+    return step * (floor(run->options.start_time / step + 1e-9) + (double)(run->rows_before + run->row_count));
 }
 
 int msfp_write_now(msfp_run *run)

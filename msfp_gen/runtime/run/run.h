@@ -60,4 +60,9 @@ void msfp_row_inside(msfp_run *run, double share, msfp_row *row);
 /* kind: enum msfp_event_kind; surface counted from 1, 0: none. */
 int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 
+/* ---- snapshot.c ---- */
+
+/* Whether all of `count` numbers are finite; NULL counts as finite. */
+int msfp_all_finite(const double *values, size_t count);
+
 #endif
