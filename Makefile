@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
 
-.PHONY: demo test slow lint types package bounds clang fuzz figures docs clean
+.PHONY: demo test slow lint types package wheels bounds clang fuzz figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -26,6 +26,10 @@ types: $(STAMP)
 # The sdist and the wheel, each built, installed and run outside the checkout.
 package: $(STAMP)
 	tests/packaging.sh
+
+# The wheel with compiled models for Linux on x86-64, in dist/prebuilt: two minutes; downloads ziglang (100 MB).
+wheels: $(STAMP)
+	tests/wheels.sh
 
 # The lowest versions of the dependencies that pyproject.toml allows.
 bounds: $(STAMP)
