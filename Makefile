@@ -4,6 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
+SITE   := $(VENV)/.site
 
 .PHONY: demo test slow lint types package wheels bounds clang fuzz figures docs clean
 
@@ -47,9 +48,9 @@ figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
 	$(BIN)/python docs/make_figures.py
 
-# The API reference, from the docstrings; a warning is an error.
-docs: $(STAMP)
-	$(BIN)/python -W error -m pdoc --math -o build/docs msfp_gen
+# The documentation site in build/docs, examples run; a warning is an error.
+docs: $(SITE)
+	$(BIN)/python docs/site/make_site.py
 
 # With what running needs; the tools of the tests and checks come on top.
 $(RUNS): pyproject.toml
@@ -60,6 +61,10 @@ $(RUNS): pyproject.toml
 
 $(STAMP): $(RUNS)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[test]"
+	touch $@
+
+$(SITE): $(RUNS)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[docs]"
 	touch $@
 
 clean:
