@@ -7,6 +7,7 @@ output are written to `build.log` beside the sources.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import shlex
@@ -27,6 +28,9 @@ from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 LOG_NAME = "build.log"
 EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
 PLATFORM_COMPILERS = ("cc", "gcc", "clang")
+# The compiler of the package ziglang compiles for the processor at hand and with traps for undefined behaviour, unless
+# it is told not to.
+ZIG_OPTIONS = ("cc", "-mcpu=baseline", "-fno-sanitize=undefined")
 
 # Warnings appear in the log only: a newer compiler of a user may warn where those of the tests (-Werror) do not.
 # MSFP_GEN_CFLAGS adds flags for the C code of models, such as -march=native.
@@ -79,7 +83,9 @@ class Step(NamedTuple):
 
 
 def find_compiler() -> Compiler:
-    """The compiler that `CC` names, else the one that built Python, else cc, gcc or clang on the path.
+    """The compiler that `CC` names, else the one that built Python, else cc, gcc or clang on the path, else ziglang.
+
+    ziglang is a package with a C compiler, the extra "compiler" of msfp-gen.
 
     Raises
     ------
@@ -92,16 +98,27 @@ def find_compiler() -> Compiler:
     words(CFLAGS)
     chosen = shlex.join(words(COMPILER))
     candidates = [chosen] if chosen else [sysconfig.get_config_var("CC") or "", *PLATFORM_COMPILERS]
-    for candidate in filter(None, candidates):
-        command = shlex.split(candidate)
+    commands = [shlex.split(candidate) for candidate in filter(None, candidates)]
+    if not chosen and (zig := zig_program()) is not None:
+        commands.append([str(zig), *ZIG_OPTIONS])
+    for command in commands:
         path = shutil.which(command[0])
         if path is not None and (version := _version(command)):
             return Compiler(tuple(command), path, version)
     tried = f"CC={chosen}" if chosen else ", ".join(dict.fromkeys(filter(None, candidates)))
     raise CompileError(
         f"no C compiler found (looked for {tried}): install one (apt install gcc, xcode-select --install, "
-        "conda install c-compiler) or name it with CC=..."
+        "conda install c-compiler, or pip install 'msfp-gen[compiler]') or name it with CC=..."
     )
+
+
+def zig_program() -> Path | None:
+    """The program of the package ziglang; None where it is not installed."""
+    found = importlib.util.find_spec("ziglang")
+    for folder in (found.submodule_search_locations or ()) if found is not None else ():
+        if (program := Path(folder) / "zig").is_file():
+            return program
+    return None
 
 
 def check_headers() -> Path:
