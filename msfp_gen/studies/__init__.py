@@ -1,1 +1,34 @@
-"""Studies that take several runs: accuracy and bounding analysis."""
+"""Studies that take several runs: accuracy, bounding, sweeps, and studies of many runs (docs/studies.md).
+
+The functions for studies of many runs, but `msfp_gen.study` itself, are here.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from msfp_gen.studies.study.loader import load_study
+    from msfp_gen.studies.study.run import Outcome
+    from msfp_gen.studies.study.status import Status, study_status
+
+# Public name -> the module that defines it.
+_MODULES = {
+    "Outcome": "study.run",
+    "Status": "study.status",
+    "load_study": "study.loader",
+    "study_status": "study.status",
+}
+
+__all__ = ["Outcome", "Status", "load_study", "study_status"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'msfp_gen.studies' has no attribute {name!r}")
+    value = getattr(import_module(f"msfp_gen.studies.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
