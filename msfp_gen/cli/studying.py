@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from msfp_gen.cli import study_analyses
 from msfp_gen.cli.console import Progress, note, say, show, whole_number
 from msfp_gen.errors import InputError
 
@@ -117,3 +118,6 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
         say(json.dumps(found.as_dict(), indent=2))
     else:
         show([status_table(found)])
+
+
+group.add_typer(study_analyses.app)

@@ -7,6 +7,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from msfp_gen.studies.assessment.figures import plot_fragility, plot_ida, plot_sobol, plot_tornado
+    from msfp_gen.studies.assessment.fragility import fragility
+    from msfp_gen.studies.assessment.ida import ida
+    from msfp_gen.studies.assessment.rows import read_study
+    from msfp_gen.studies.assessment.sensitivity import sobol, tornado
     from msfp_gen.studies.study.loader import load_study
     from msfp_gen.studies.study.run import Outcome
     from msfp_gen.studies.study.status import Status, study_status
@@ -14,12 +19,35 @@ if TYPE_CHECKING:
 # Public name -> the module that defines it.
 _MODULES = {
     "Outcome": "study.run",
+    "fragility": "assessment.fragility",
+    "ida": "assessment.ida",
+    "read_study": "assessment.rows",
+    "sobol": "assessment.sensitivity",
+    "tornado": "assessment.sensitivity",
+    "plot_fragility": "assessment.figures",
+    "plot_ida": "assessment.figures",
+    "plot_sobol": "assessment.figures",
+    "plot_tornado": "assessment.figures",
     "Status": "study.status",
     "load_study": "study.loader",
     "study_status": "study.status",
 }
 
-__all__ = ["Outcome", "Status", "load_study", "study_status"]
+__all__ = [
+    "Outcome",
+    "Status",
+    "fragility",
+    "ida",
+    "load_study",
+    "plot_fragility",
+    "plot_ida",
+    "plot_sobol",
+    "plot_tornado",
+    "read_study",
+    "sobol",
+    "study_status",
+    "tornado",
+]
 
 
 def __getattr__(name: str) -> Any:

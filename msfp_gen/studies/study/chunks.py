@@ -59,6 +59,7 @@ class Chunks:
             "factors": {name: asdict(table) for name, table in study.recipe.factors.items()},
             "axes": [(axis.name, axis.change, axis.paths, axis.surfaces, axis.random) for axis in study.axes],
             "keep": [study.keep.names, study.keep.formulas, study.keep.surfaces],
+            "intensity": study.table.get("records", {}).get("intensity"),
             "run_seconds": study.limits.run_seconds,
             "files": [study.contents[path] for path in sorted(study.contents) if path in _files_of(study)],
         }
@@ -98,7 +99,7 @@ class Chunks:
         about = {
             "runs": self.study.runs,
             "chunk": self.study.chunk,
-            "surfaces": self.study.keep.surfaces,
+            "samples": len(self.study.samples),
             "msfp_gen": __version__,
             "digest": self.digest,
         }
@@ -178,7 +179,7 @@ def study_table(folder: Path) -> dict[str, Any]:
         )
     try:
         table = toml_file(folder / STUDY_FILE)
-        runs, chunk = (int(table["about"][key]) for key in ("runs", "chunk"))
+        counts = {key: int(table["about"][key]) for key in ("runs", "chunk", "samples")}
     except (InputError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{folder / STUDY_FILE}: not written by msfp-gen ({error}); run the study again") from None
-    return {**table, "about": {**table["about"], "runs": runs, "chunk": chunk}}
+    return {**table, "about": {**table["about"], **counts}}

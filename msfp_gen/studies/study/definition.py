@@ -18,7 +18,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.simulate import check
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import Recipe, SceneMaker, rule_of, surface_values
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, rule_of, surface_values
 from msfp_gen.studies.study.sampling import Sampling
 
 MOST_RUNS = 100_000_000
@@ -175,7 +175,8 @@ def check_study(study: Study) -> Study:
             raise InputError(f"axes.{axis.name}.{error}") from None
     surfaces = max(len(scene.bearing.surfaces) for scene in _tried(study, SceneMaker(study.recipe)))
     found = replace(study, keep=replace(study.keep, surfaces=surfaces))
-    names = [*(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
+    reserved = [INTENSITY] if study.recipe.intensities else []
+    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
     return found

@@ -8,17 +8,17 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.common.fields import Quantity, ruled_fields
+from msfp_gen.common.fields import Quantity
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.motion_tables import is_file, resolved
-from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
+from msfp_gen.scene.file.motion_tables import RecordMotion, is_file, resolved
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.study.axes import Axis, axis_from, grid
+from msfp_gen.studies.study.axes import Axis, axis_from
 from msfp_gen.studies.study.definition import Limits, Study, check_study
+from msfp_gen.studies.study.fields import fields_of, known_keys
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import Recipe
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe
+from msfp_gen.studies.study.records import NOUN, records_from
 from msfp_gen.studies.study.sampling import Sampling
 
 Table = dict[str, Any]
@@ -26,7 +26,7 @@ Progress = Callable[[float, float], None]
 KEYS = {
     "name": "a text",
     "scene": "a scene file, the name of a preset, or a table",
-    "records": "a table with motions or the file of a suite, and scales",
+    "records": NOUN,
     "axes": "a table with one table for each axis",
     "sampling": "a table: how random axes are drawn",
     "keep": "a list of quantities",
@@ -35,7 +35,6 @@ KEYS = {
     "chunk": "a number of runs",
     "about": "written by msfp-gen",
 }
-RECORD_KEYS = ("suite", "motions", "scales")
 DEFAULT_KEEP = ("peak_displacement", "peak_top_force", "peak_sliding", "rims_met")
 _CHUNK = Quantity("", least=1, whole=True)
 
@@ -63,12 +62,12 @@ def load_study(source: str | Path | Mapping[str, Any], progress: Progress | None
 
 
 def _study(table: Table, folder: Path | None, progress: Progress | None) -> Study:
-    _known(table, KEYS, "")
+    known_keys(table, KEYS, "")
     if "scene" not in table:
         raise InputError(f"scene is missing: give {KEYS['scene']}")
     scene = _scene(table["scene"], folder)
-    records, suite = _records(table.get("records"), folder, progress)
-    axes = (*records, *(axis_from(name, each) for name, each in _table(table, "axes").items()))
+    records = records_from(table.get("records"), folder, progress)
+    axes = (*records.axes, *(axis_from(name, each) for name, each in _table(table, "axes").items()))
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")
     sampling = _sampling(table, axes)
@@ -76,16 +75,18 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
         _texts(table, "keep", DEFAULT_KEEP),
         tuple((name, _formula(name, text)) for name, text in _table(table, "quantities").items()),
         1,
-        tuple(axis.name for axis in axes if axis.numeric),
+        (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if records.intensities else [])),
     )
-    tables = {record.name: record.table for record in suite.records} if suite else {}
+    tables = records.tables
+    if tables and "motion" not in scene:
+        scene = {**scene, "motion": {"kind": RecordMotion.kind, **next(iter(tables.values()))}}
     factors = {
         path: load_factors(_beside(path, folder)) for axis in axes if axis.change == "factors" for path in axis.paths
     }
     complete = {
         **{key: value for key, value in table.items() if key != "about"},
         "scene": scene,
-        **({"records": {"motions": [*tables.values()], "scales": _scales(table)}} if suite else {}),
+        **({"records": records.table} if tables else {}),
     }
     contents = {
         path: sha256(Path(path).read_bytes()).hexdigest() for path in _files([scene.get("motion"), *tables.values()])
@@ -93,10 +94,10 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
     return check_study(
         Study(
             name=str(table.get("name", "")),
-            recipe=Recipe(scene, axes, tables, factors),
+            recipe=Recipe(scene, axes, tables, factors, records.intensities),
             sampling=sampling,
             keep=keep,
-            limits=Limits(**_fields(table, "limits", Limits)),
+            limits=Limits(**fields_of(table, "limits", Limits)),
             given_chunk=_chunk(table.get("chunk")),
             table=complete,
             contents=contents,
@@ -104,24 +105,11 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
     )
 
 
-def _known(table: Mapping[str, Any], keys: Any, where: str) -> None:
-    for key in table:
-        if key not in keys:
-            hint = suggestion(key, list(keys)) or f"; the keys here are {', '.join(keys)}"
-            raise InputError(f"{where}{key}: unknown key{hint}")
-
-
 def _table(table: Mapping[str, Any], key: str) -> Table:
     value = table.get(key, {})
     if not isinstance(value, Mapping):
         raise InputError(f"{key} = {value!r}: give {KEYS[key]}")
     return dict(value)
-
-
-def _fields(table: Mapping[str, Any], key: str, kind: type) -> Table:
-    given = _table(table, key)
-    _known(given, [name for name, _, _ in ruled_fields(kind)], f"{key}.")
-    return given
 
 
 def _scene(value: Any, folder: Path | None) -> Table:
@@ -145,39 +133,6 @@ def _beside(source: str, folder: Path | None) -> str:
     return str(path) if is_file(path) else source
 
 
-def _records(table: Any, folder: Path | None, progress: Progress | None) -> tuple[list[Axis], Suite | None]:
-    """The axes `record` and `scale` of `[records]`, and its motions."""
-    if table is None:
-        return [], None
-    if not isinstance(table, Mapping):
-        raise InputError(f"records = {table!r}: give {KEYS['records']}")
-    _known(table, RECORD_KEYS, "records.")
-    if ("suite" in table) == ("motions" in table):
-        raise InputError("records: give suite, the path of a suite file, or motions, a list of [[records.motions]]")
-    if "suite" in table:
-        if not isinstance(table["suite"], str):
-            raise InputError(f"records.suite = {table['suite']!r}: give a path in quotes")
-        suite = load_suite(_beside(table["suite"], folder), progress)
-    else:
-        try:
-            suite = suite_from_table({"records": table["motions"]}, folder, progress)
-        except InputError as error:
-            raise InputError(f"records.motions: {error}") from None
-    axes = [grid(Axis("record", "record"), [record.name for record in suite.records])]
-    if (scales := table.get("scales")) is not None:
-        try:
-            axes.append(grid(Axis("scale", "scale"), scales))
-        except InputError as error:
-            raise InputError(f"records.scales: {error}") from None
-        if not axes[1].numeric or min(axes[1].labels) <= 0:
-            raise InputError(f"records.scales = {scales!r}: give numbers above 0")
-    return axes, suite
-
-
-def _scales(table: Table) -> Any:
-    return table["records"].get("scales")
-
-
 def _sampling(table: Table, axes: tuple[Axis, ...]) -> Sampling | None:
     drawn = [axis.name for axis in axes if axis.random]
     if not drawn:
@@ -188,7 +143,7 @@ def _sampling(table: Table, axes: tuple[Axis, ...]) -> Sampling | None:
         raise InputError(
             f"sampling is missing: axes.{drawn[0]} has a distribution; give [sampling] with samples and seed"
         )
-    return Sampling(**_fields(table, "sampling", Sampling))
+    return Sampling(**fields_of(table, "sampling", Sampling))
 
 
 def _texts(table: Table, key: str, default: tuple[str, ...]) -> tuple[str, ...]:

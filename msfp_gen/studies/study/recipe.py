@@ -19,7 +19,7 @@ from msfp_gen.studies.bounding.factors import FactorTable
 from msfp_gen.studies.study.axes import Axis
 
 Table = dict[str, Any]
-SCALE = "motion.scale"
+INTENSITY = "intensity"  # column of the intensity measure of [records]
 KEPT_SCENES, KEPT_MOTIONS = 64, 8  # of one worker; a motion of a minute takes some MB
 _PARTS: dict[str, tuple[type, ...]] = {"bearing": (Bearing, Surface, Body)}
 
@@ -33,12 +33,20 @@ class Recipe:
         axes: in the order of the columns.
         records: name -> `[motion]` table, without its key `kind`.
         factors: name in the study file -> table of lambda factors.
+        intensities: name of a record -> its intensity measure at scale 1 [m/s^2]; empty where none is asked for.
     """
 
     scene: Table
     axes: tuple[Axis, ...]
     records: dict[str, Table]
     factors: dict[str, FactorTable]
+    intensities: dict[str, float]
+
+    def intensity(self, at: Mapping[str, Any]) -> dict[str, float]:
+        """The intensity measure of a run under its name [m/s^2]; empty where none is asked for. at: axis -> value."""
+        if not self.intensities:
+            return {}
+        return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
 class SceneMaker:

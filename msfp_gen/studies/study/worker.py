@@ -14,7 +14,7 @@ from msfp_gen.simulation.batch import raise_if_stopped, run_to_end
 from msfp_gen.simulation.simulate import check, settle
 from msfp_gen.studies.study.definition import Task
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import Recipe, SceneMaker
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -50,9 +50,10 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
     rows = []
     for offset, (values, labels) in enumerate(task.rows(axes), start=1):
         at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
-        numbers = {axis.name: at[axis.name] for axis in axes if axis.numeric}
+        intensity = order.recipe.intensity(at)
+        numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
         status, message, kept = _run(partial(maker.scene, values), order, numbers)
-        rows.append({"run": task.first + offset, **at, "status": status, "message": message, **kept})
+        rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
     failed = sum(row["status"] not in ENDED for row in rows)
     return _part(order, rows, failed), failed
 
@@ -116,4 +117,5 @@ def _schema(recipe: Recipe, keep: Keep) -> Any:
     """Columns of every part: run, axes, status, message, quantities."""
     axes = [(axis.name, "", not axis.numeric) for axis in recipe.axes]
     texts = [("status", "", True), ("message", "", True)]
-    return _schema_of((*axes, *texts, *(tuple(column) for column in keep.columns())))
+    intensity = [(INTENSITY, "m/s^2", False)] if recipe.intensities else []
+    return _schema_of((*axes, *texts, *intensity, *(tuple(column) for column in keep.columns())))

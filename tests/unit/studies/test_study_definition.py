@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 from scipy import stats
 from support import ROOT
-from support.study_tables import cheap_study
+from support.study_tables import cheap_study, rows_of
 
+import msfp_gen
 from msfp_gen import InputError, changed_scene, load_scene, simulate
+from msfp_gen.motions.records import response_spectrum
+from msfp_gen.motions.records.spectrum import MEASURES
 from msfp_gen.scene.file.loader import scene_from_table, toml_file
+from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies import load_study
 from msfp_gen.studies.study.loader import example_text
 from msfp_gen.studies.study.quantities import Keep, catalogue
@@ -97,6 +101,24 @@ def test_records_and_scales_are_axes() -> None:
                 scene.motion.acceleration(time), expected.acceleration(time), rtol=1e-12, atol=1e-12
             )
         assert scene.motion_table is not None and scene.motion_table["scale"] == scale
+
+
+def test_the_intensity_measure_is_that_of_the_spectrum(tmp_path: Any) -> None:
+    motions = [{"bundled": "ridgecrest-2019-ci-clc", "duration": 30.0, "name": "clc"}]
+    records = {"motions": motions, "scales": [0.1, 0.2], "intensity": {"period": 2.0, "component": "rotd100"}}
+    table = {"scene": "ridgecrest-ccc", "records": records, "quantities": {"twice": "2 * intensity"}}
+    study = load_study({**table, "axes": {"end": {"sets": "duration", "values": [0.1]}}})
+    spectrum = response_spectrum(RecordMotion(**motions[0]).build(), [2.0])
+    expected = spectrum.psa[0, MEASURES.index("rotd100")]
+    assert study.recipe.intensities == {"clc": pytest.approx(expected)}
+    msfp_gen.study(study, tmp_path, threads=True)
+    rows = rows_of(tmp_path)
+    np.testing.assert_allclose(rows.intensity, [0.1 * expected, 0.2 * expected])
+    np.testing.assert_allclose(rows.twice, 2 * rows.intensity)
+    del records["intensity"]["period"]
+    assert load_study(table).recipe.intensities["clc"] == pytest.approx(spectrum.pga[MEASURES.index("rotd100")])
+    with pytest.raises(InputError, match=r"records.intensity.component = 'rotd10': give one of"):
+        load_study({**table, "records": {**records, "intensity": {"component": "rotd10"}}})
 
 
 def test_factors_are_an_axis_of_bounds() -> None:
