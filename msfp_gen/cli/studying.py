@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli import study_analyses
+from msfp_gen.cli import study_analyses, study_search
 from msfp_gen.cli.console import Progress, note, say, show, whole_number
 from msfp_gen.errors import InputError
 
@@ -121,3 +121,4 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
 
 
 group.add_typer(study_analyses.app)
+group.add_typer(study_search.app)

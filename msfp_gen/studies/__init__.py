@@ -7,9 +7,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.assessment.figures import plot_fragility, plot_ida, plot_sobol, plot_tornado
+    from msfp_gen.studies.assessment.figures import (
+        plot_fragility,
+        plot_ida,
+        plot_pareto,
+        plot_sobol,
+        plot_tornado,
+    )
     from msfp_gen.studies.assessment.fragility import fragility
     from msfp_gen.studies.assessment.ida import ida
+    from msfp_gen.studies.assessment.pareto import Goals, pareto
     from msfp_gen.studies.assessment.rows import read_study
     from msfp_gen.studies.assessment.sensitivity import sobol, tornado
     from msfp_gen.studies.study.loader import load_study
@@ -19,6 +26,7 @@ if TYPE_CHECKING:
 # Public name -> the module that defines it.
 _MODULES = {
     "Outcome": "study.run",
+    "Goals": "assessment.pareto",
     "fragility": "assessment.fragility",
     "ida": "assessment.ida",
     "read_study": "assessment.rows",
@@ -26,6 +34,8 @@ _MODULES = {
     "tornado": "assessment.sensitivity",
     "plot_fragility": "assessment.figures",
     "plot_ida": "assessment.figures",
+    "pareto": "assessment.pareto",
+    "plot_pareto": "assessment.figures",
     "plot_sobol": "assessment.figures",
     "plot_tornado": "assessment.figures",
     "Status": "study.status",
@@ -34,13 +44,16 @@ _MODULES = {
 }
 
 __all__ = [
+    "Goals",
     "Outcome",
     "Status",
     "fragility",
     "ida",
     "load_study",
+    "pareto",
     "plot_fragility",
     "plot_ida",
+    "plot_pareto",
     "plot_sobol",
     "plot_tornado",
     "read_study",

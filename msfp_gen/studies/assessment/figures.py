@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.figures.style import COLOURS, FAINT, INK, THIN, Scale, engineering, headline, page
+from msfp_gen.figures.style import COLOURS, FAINT, INK, PALE, THIN, Scale, engineering, headline, page
 from msfp_gen.studies.assessment.rows import labelled
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from msfp_gen.studies.assessment.fragility import Fragility
     from msfp_gen.studies.assessment.ida import Ida
+    from msfp_gen.studies.assessment.pareto import Front
     from msfp_gen.studies.assessment.sensitivity import Sobol, Tornado
 
 POINTS = 300
@@ -128,6 +129,31 @@ def plot_sobol(found: Sobol, path: str | Path | None = None, title: str = "") ->
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"share of the variance of the {found.statistic} of {labelled(found.name, '')}")
         axes.legend(loc="lower right")
+    return figure
+
+
+def plot_pareto(found: Front, path: str | Path | None = None, title: str = "") -> Figure:
+    """The first two objectives: all designs, and those on the front joined by a line.
+
+    Raises InputError for a path that cannot be written.
+    """
+    first, second = found.goals.names[:2]
+    designs, front = found.designs, found.designs[found.designs.front].sort_values(first)
+    scales = [_scale(designs[name], found.units.get(name, "")) for name in (first, second)]
+    with page(WIDTH, HEIGHT, path) as figure:
+        headline(figure, title or "Pareto front")
+        axes = figure.subplots()
+        for chosen, marker, colour, label in (
+            (designs[~designs.feasible], "x", PALE, "not feasible"),
+            (designs[designs.feasible & ~designs.front], ".", FAINT, "dominated"),
+        ):
+            x, y = (scale.factor * chosen[name] for scale, name in zip(scales, (first, second), strict=True))
+            axes.plot(x, y, marker, color=colour, label=label)
+        x, y = (scale.factor * front[name] for scale, name in zip(scales, (first, second), strict=True))
+        line = "-" if len(found.goals.names) == 2 else "none"
+        axes.plot(x, y, "o", linestyle=line, color=COLOURS[0], label=f"front, {len(front)} designs")
+        axes.set(xlabel=labelled(first, scales[0].unit), ylabel=labelled(second, scales[1].unit))
+        axes.legend()
     return figure
 
 

@@ -114,8 +114,7 @@ class Study:
         drawn = [axis.distribution for axis in self.axes if axis.distribution is not None]
         if self.sampling is None:
             return np.zeros((1, 0))
-        shares = self.sampling.shares(len(drawn))
-        return np.column_stack([each.values(shares[:, index]) for index, each in enumerate(drawn)])
+        return self.sampling.drawn(drawn)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, TypeVar
@@ -60,6 +60,25 @@ class Engine:
                     "again: what is done is kept"
                 ) from error
             yield key, value
+
+
+def engine_from(
+    workers: int | None = None,
+    threads: bool = False,
+    executor: Executor | None = None,
+    dask: str | None = None,
+    mpi: bool = False,
+) -> AbstractContextManager[Engine]:
+    """The engine of these arguments of `study`. Raises InputError where they name two."""
+    choices = (("executor", executor), ("dask", dask), ("mpi", mpi), ("threads", threads))
+    given = [name for name, value in choices if value]
+    if len(given) > 1:
+        raise InputError(f"{given[0]} and {given[1]}: give one engine")
+    if executor is not None:
+        return given_engine(executor, workers)
+    if dask is not None:
+        return dask_engine(dask)
+    return mpi_engine() if mpi else local_engine(workers, threads)
 
 
 @contextmanager

@@ -44,21 +44,33 @@ def example_text() -> str:
     return (files(__package__) / "example.toml").read_text(encoding="utf-8")
 
 
-def load_study(source: str | Path | Mapping[str, Any], progress: Progress | None = None) -> Study:
+def load_study(
+    source: str | Path | Mapping[str, Any], progress: Progress | None = None, *, design: bool = False
+) -> Study:
     """The study in a TOML file, or of a table of the same keys. Paths in a file are relative to it.
 
-    progress: of the scaling of a suite of records. Raises InputError of one line that names the file, the path of the
+    progress: of the scaling of a suite of records. design: whether to try both ends of each random axis in place of
+    `[sampling]`, as the start of a search. Raises InputError of one line that names the file, the path of the
     field, the value and the remedy.
     """
     if isinstance(source, Mapping):
-        return _study(dict(source), None, progress)
+        return _study(_for_search(source) if design else dict(source), None, progress)
     path = Path(source)
     if not is_file(path):
         raise InputError(f"study = {str(source)!r}: no such file; `msfp-gen study --example` prints one to start from")
     try:
-        return _study(toml_file(path), path.parent, progress)
+        table = toml_file(path)
+        return _study(_for_search(table) if design else table, path.parent, progress)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _for_search(table: Mapping[str, Any]) -> Table:
+    """A study that tries its axes at both ends: what cannot be designed is found before the search."""
+    ends = {"method": "one-at-a-time", "quantiles": [1e-9, 1 - 1e-9]}
+    random = any(isinstance(axis, Mapping) and "distribution" in axis for axis in _table(table, "axes").values())
+    rest = {key: value for key, value in table.items() if key != "sampling"}
+    return {**rest, "sampling": ends} if random else rest
 
 
 def _study(table: Table, folder: Path | None, progress: Progress | None) -> Study:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
 from msfp_gen.studies.study.definition import Study, Task
-from msfp_gen.studies.study.engines import Engine, dask_engine, given_engine, local_engine, mpi_engine, require
+from msfp_gen.studies.study.engines import Engine, engine_from, require
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.recipe import SceneMaker
 from msfp_gen.studies.study.status import failures
@@ -85,12 +84,18 @@ def study(
     _check_shard(shard)
     require("pyarrow", "parquet", "study")
     found = source if isinstance(source, Study) else load_study(source)
-    folder = Path(output)
-    with _engine(workers, threads, executor, dask, mpi) as engine:
-        make_folder(folder, "output")
-        chunks = chunks_in(found, folder)
-        chunks.open()
-        return _run(chunks, engine, shard, progress)
+    with engine_from(workers, threads, executor, dask, mpi) as engine:
+        return run_on(engine, found, Path(output), shard, progress)
+
+
+def run_on(
+    engine: Engine, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+) -> Outcome:
+    """Compute what is missing of a study on an engine. Arguments and errors are those of `study`."""
+    make_folder(folder, "output")
+    chunks = chunks_in(study, folder)
+    chunks.open()
+    return _run(chunks, engine, shard, progress)
 
 
 def parsed_shard(text: str) -> tuple[int, int]:
@@ -107,21 +112,6 @@ def parsed_shard(text: str) -> tuple[int, int]:
 def _check_shard(shard: tuple[int, int]) -> None:
     if not 1 <= shard[0] <= shard[1]:
         raise InputError(f"shard = {shard[0]}/{shard[1]}: give i/n with i from 1 to n")
-
-
-def _engine(
-    workers: int | None, threads: bool, executor: Executor | None, dask: str | None, mpi: bool
-) -> AbstractContextManager[Engine]:
-    given = [
-        name for name, value in (("executor", executor), ("dask", dask), ("mpi", mpi), ("threads", threads)) if value
-    ]
-    if len(given) > 1:
-        raise InputError(f"{given[0]} and {given[1]}: give one engine")
-    if executor is not None:
-        return given_engine(executor, workers)
-    if dask is not None:
-        return dask_engine(dask)
-    return mpi_engine() if mpi else local_engine(workers, threads)
 
 
 def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progress | None) -> Outcome:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -27,6 +27,7 @@ METHODS = {
     "sobol-sequence": "a scrambled Sobol' sequence; give a power of two",
     "sobol-indices": "the (axes + 2) x `samples` values that Sobol' indices need (`msfp-gen study sobol`)",
     "one-at-a-time": "medians, and each axis alone at two quantiles (`msfp-gen study tornado`)",
+    "listed": "the rows of `values`, one value for each axis",
 }
 
 
@@ -111,24 +112,39 @@ class Sampling:
     """How the values of the random axes are drawn, together.
 
     method: a key of METHODS. samples: their number; for one-at-a-time it follows from the axes. seed: equal seeds give
-    equal values. quantiles: of each axis, for one-at-a-time. Raises InputError.
+    equal values. quantiles: of each axis, for one-at-a-time. values: of every sample, for listed. Raises InputError.
     """
 
     method: Annotated[str, Choice(METHODS)] = "latin-hypercube"
     samples: Annotated[int | None, Quantity("", least=1, whole=True)] = None
     seed: Annotated[int, Quantity("", least=0, whole=True)] = 0
     quantiles: Annotated[tuple[float, float], Quantity("", above=0.0, shape=(2,))] = (0.1, 0.9)
+    values: Annotated[tuple[tuple[float, ...], ...] | None, Quantity("", shape=(None, None))] = None
 
     def __post_init__(self) -> None:
         check_fields(self, "sampling")
         if self.samples is not None and self.samples > MOST:
             raise InputError(f"sampling.samples = {self.samples}: give at most {MOST}")
-        if (self.samples is None) != (self.method == "one-at-a-time"):
+        if (self.samples is None) != (self.method in ("one-at-a-time", "listed")):
             fact = "is missing" if self.samples is None else f"= {self.samples}"
-            rule = "leave it out: the axes give the number" if self.samples else "give the number of samples"
+            rule = "leave it out: the number follows" if self.samples else "give the number of samples"
             raise InputError(f"sampling.samples {fact}: {rule}, with method = {self.method!r}")
         if not self.quantiles[0] < self.quantiles[1] < 1:
             raise InputError(f"sampling.quantiles = {list(self.quantiles)}: give two, rising, between 0 and 1")
+        if bool(self.values) != (self.method == "listed"):
+            raise InputError("sampling.values: give one row for each sample, with method = 'listed' only")
+
+    def drawn(self, distributions: Sequence[Distribution]) -> Array:
+        """Values of the axes with these distributions, ndarray, shape (samples, axes). Raises InputError."""
+        count = len(distributions)
+        if self.values is not None:
+            if any(len(row) != count for row in self.values):
+                raise InputError(
+                    f"sampling.values: give {count} values in each row, one for each axis with a distribution"
+                )
+            return np.array(self.values)
+        shares = self.shares(count)
+        return np.column_stack([each.values(shares[:, index]) for index, each in enumerate(distributions)])
 
     def shares(self, axes: int) -> Array:
         """Shares of the distributions, ndarray, shape (samples, axes), in (0, 1); equal for equal seeds."""

@@ -160,6 +160,15 @@ def test_a_latin_hypercube_has_one_value_in_each_interval_and_a_seed() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_sampling_has_its_number_of_rows(method: str) -> None:
+    if method == "listed":
+        values = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+        axes = [Distribution("uniform", (0.0, 9.0))] * 3
+        assert Sampling(method, values=values).drawn(axes).tolist() == [list(row) for row in values]
+        with pytest.raises(InputError, match=r"sampling.values: give 2 values in each row"):
+            Sampling(method, values=values).drawn(axes[:2])
+        with pytest.raises(InputError, match=r"sampling.values: give one row for each sample"):
+            Sampling("random", 8, values=values)
+        return
     plan = Sampling(method, None if method == "one-at-a-time" else 8, seed=1)
     expected = {"sobol-indices": 8 * (3 + 2), "one-at-a-time": 1 + 2 * 3}.get(method, 8)
     shares = plan.shares(3)
