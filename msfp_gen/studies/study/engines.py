@@ -15,6 +15,7 @@ from msfp_gen.simulation.batch import Workers, worker_count
 T = TypeVar("T")
 S = TypeVar("S")
 AHEAD = 2  # calls that wait for each worker, so that none is idle
+CONNECT = "20s"  # until a Dask scheduler must have answered
 UNKNOWN = 64  # workers of an executor that does not say how many it has
 
 
@@ -104,7 +105,7 @@ def dask_engine(address: str) -> Iterator[Engine]:
 
     given = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
     try:
-        client = Client(**given, timeout="20s")
+        client = Client(**given, timeout=CONNECT)
     except (OSError, ValueError) as error:
         raise InputError(
             f"--dask = {address!r}: no scheduler answers there ({error}); start one: dask scheduler"
@@ -121,9 +122,12 @@ def dask_engine(address: str) -> Iterator[Engine]:
 def mpi_engine() -> Iterator[Engine]:
     """The other processes of `mpiexec -n N python -m mpi4py.futures -m msfp_gen ...`. Raises InputError."""
     require("mpi4py", "mpi", "--mpi")
-    from mpi4py import MPI
-    from mpi4py.futures import MPIPoolExecutor
-
+    try:
+        from mpi4py import MPI
+        from mpi4py.futures import MPIPoolExecutor
+    except (ImportError, RuntimeError) as error:
+        first = str(error).partition("\n")[0]
+        raise InputError(f"--mpi: {first}; install an MPI library, such as MPICH or Open MPI") from None
     count = MPI.COMM_WORLD.Get_size() - 1
     if count < 1:
         raise InputError(
