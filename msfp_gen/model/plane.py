@@ -34,7 +34,9 @@ class State:
 def rotated(vectors: Array, angle: float) -> Array:
     """Components (..., 3) of vectors in a frame that is rotated by `angle` [rad] about E3."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.ascontiguousarray(vectors @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    one, two, three = np.moveaxis(vectors, -1, 0)
+    # Component by component: the digits of a product of matrices depend on the number of vectors.
+    return np.stack([c * one + s * two, c * two - s * one, three], axis=-1)
 
 
 def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:

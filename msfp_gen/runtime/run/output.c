@@ -89,7 +89,16 @@ static void restore_bounds(const msfp_run *run, msfp_row *row)
 double msfp_next_output(const msfp_run *run)
 {
     const double step = run->options.output_step;
-    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->row_count);
+    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->dropped_rows + (double)run->row_count);
+}
+
+void msfp_drop_rows(msfp_run *run)
+{
+    if (run->row_count < 2)
+        return;
+    run->rows[0] = run->rows[run->row_count - 1];
+    run->dropped_rows += (long)run->row_count - 1;
+    run->row_count = 1;
 }
 
 int msfp_write_now(msfp_run *run)
