@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Model
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.row_file import RowFile
     from msfp_gen.specification.layout import Effects
 
 NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
@@ -78,7 +79,7 @@ class Segment:
     """A compiled run that has ended, with its model.
 
     azimuth: of the frame of the model [rad]. status: how the run ended. wall, setup: wall time of the integration, and
-    of build and preparation before it [s].
+    of build and preparation before it [s]. stored: its rows on disk but for the last, where they are streamed.
     """
 
     model: Model
@@ -87,6 +88,7 @@ class Segment:
     status: str
     wall: float
     setup: float
+    stored: RowFile | None = None
 
 
 @dataclass(frozen=True, eq=False)
