@@ -17,8 +17,9 @@ Ends = tuple[History, History]
 class Joint:
     """How segments become one history.
 
-    The first row of a later segment repeats the last row of the one before it and is left out. Energies continue from
-    their last values.
+    The first row of a later segment repeats the last row of the one before it and is left out. Where a run begins with
+    segments that took no step, the row of its start is that of the first model that went on: forces of massless sliders
+    at a start out of balance are not those of the run. Energies continue from their last values.
 
     Parameters
     ----------
@@ -43,11 +44,15 @@ class Joint:
         for first, last in ends[1:]:  # a segment that took no step adds no value
             self._added.append(end)
             end = {name: value + last.energy[name][0] - first.energy[name][0] for name, value in end.items()}
+        times = [first.time[0] for first, _ in ends]
+        beginning = (
+            sum(time == times[0] for time in times) - 1
+        )  # the first segment that took a step, or the last of all
         self.kept: list[tuple[int, int]] = []
         for index, ((_, last), count) in enumerate(zip(ends, counts, strict=True)):
             between = index < len(counts) - 1 and output_step is not None and _between(last.time[0], output_step)
-            begin = int(index > 0)
-            self.kept.append((begin, max(begin, count - int(between))))
+            begin = int(index > beginning)
+            self.kept.append((begin, max(begin, count - int(between))) if index >= beginning else (0, 0))
 
     def continued(self, index: int, rows: History) -> History:
         """Rows of segment `index` as rows of the whole."""

@@ -258,10 +258,13 @@ def _message(scene: Scene, segment: Segment) -> str:
 
 
 def _extremes(segments: Sequence[Segment]) -> Extremes | None:
-    """Extremes of all segments in the frame of the user; None where none of them could start."""
-    found = [
-        Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in segments if s.run.row_count
-    ]
+    """Extremes of all segments in the frame of the user; None where none of them could start.
+
+    Of segments that took no step only the last counts, where no other did: see `Joint`.
+    """
+    started = [s for s in segments if s.run.row_count]
+    counted = [s for s in started if s.run.counts["steps"]] or started[-1:]
+    found = [Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in counted]
     return reduce(or_, found) if found else None
 
 
