@@ -16,6 +16,7 @@ from msfp_gen.model.plane import (
     rotated_pairs,
     tilt_pieces,
     tilts_into_plane,
+    tilts_out_of_plane,
     wrench_in_plane,
 )
 from msfp_gen.motions.piecewise import ORDER
@@ -224,15 +225,19 @@ def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array
 def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
-    Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
-    interface forces: the unilateral contacts are compressed by them.
+    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
+    from the interface forces: the unilateral contacts are compressed by them.
     """
     q, v, f, force = at.q, at.v, at.f, at.force
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:
-        q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
-        f = out_of_plane(f, at.azimuth, "pair")
+        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
+            q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
+            f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
+        else:
+            q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
+            f = out_of_plane(f, at.azimuth, "pair")
         force = out_of_plane(force, at.azimuth, "vector")
         if separations is not None:
             separations = (
@@ -245,6 +250,11 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
             separations = (-force / stiffness[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _is_oblique(azimuth: float) -> bool:
+    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
+    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
 
 
 def _transferred_foot(at: RestartState, q: Array) -> Array:
