@@ -43,6 +43,7 @@ clang: $(STAMP)
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)
 	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
+	$(BIN)/python benchmarks/fuzz.py --combined --scenes 2000 --seed 91 --check 0
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py

@@ -84,18 +84,25 @@ class Run(Protocol):
 
     @property
     def row_count(self) -> int:
-        """Number of recorded rows."""
+        """Number of rows held: those recorded, less those dropped."""
+
+    @property
+    def dropped_rows(self) -> int:
+        """Number of rows dropped."""
 
     @property
     def rows(self) -> Array:
-        """Recorded rows, shape (T, row size)."""
+        """Rows held, shape (T, row size)."""
 
     @property
     def events(self) -> list[EventRow]:
         """Time, surface, kind, displacement and top force of every event."""
 
-    def advance(self, steps: int = 2000) -> bool:
-        """Take at most `steps` steps; False where the run has ended."""
+    def advance(self, steps: int = 2000, rows: int = 0) -> bool:
+        """Take at most `steps` steps, fewer once so many `rows` are held (0: any); False where the run has ended."""
+
+    def drop_rows(self) -> None:
+        """Forget all rows but the last, which the caller has stored elsewhere."""
 
     def record_now(self) -> None:
         """Record a row of the current state, unless there is one."""

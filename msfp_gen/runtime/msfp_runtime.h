@@ -228,6 +228,7 @@ typedef struct {
     double max_step, first_step; /* [s]; 0: chosen */
     double max_steps;
     double duration, output_step; /* [s]; output_step 0: a row at every step of the integrator */
+    size_t row_limit;             /* msfp_run_advance returns once so many rows are held; 0: no limit */
     double stop_displacement;     /* [m]; 0: none */
     int stop_all_rims;            /* stop once every rim is in contact */
     int sampled; /* the base acceleration is linear between samples: decides the first guess of Newton's method */
@@ -377,6 +378,8 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot);
 /* Continue from a snapshot of a run of the same scene and build. Returns MSFP_OK, MSFP_E_MEMORY, or MSFP_E_FINITE for
  * bytes that no run of this model writes; `run` is then unchanged. */
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
+/* Forget all rows but the last, which the caller has stored elsewhere. */
+void msfp_drop_rows(msfp_run *run);
 /* Record the present state unless it is the last row. Returns MSFP_OK or MSFP_E_MEMORY. */
 int msfp_write_now(msfp_run *run);
 /* Release rows and events. */

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.effect_switching import check
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling
-from msfp_gen.simulation.simulate import RunSequence, check, settle
+from msfp_gen.simulation.simulate import RunSequence, settle
 
 if TYPE_CHECKING:
     from types import TracebackType

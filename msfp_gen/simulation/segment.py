@@ -16,6 +16,7 @@ from msfp_gen.model.plane import (
     rotated_pairs,
     tilt_pieces,
     tilts_into_plane,
+    tilts_out_of_plane,
     wrench_in_plane,
 )
 from msfp_gen.motions.piecewise import ORDER
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from msfp_gen.model.model import Model
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.row_file import RowFile
     from msfp_gen.specification.layout import Effects
 
 NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
@@ -82,7 +84,7 @@ class Segment:
     """A compiled run that has ended, with its model.
 
     azimuth: of the frame of the model [rad]. status: how the run ended. wall, setup: wall time of the integration, and
-    of build and preparation before it [s].
+    of build and preparation before it [s]. stored: its rows on disk but for the last, where they are streamed.
     """
 
     model: Model
@@ -91,6 +93,7 @@ class Segment:
     status: str
     wall: float
     setup: float
+    stored: RowFile | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +229,7 @@ def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array
 def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
-    Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
+    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow from the
     interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
     angles = np.vstack([at.base_angles, at.q[:, :3]])
@@ -234,8 +237,12 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:
-        q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
-        f = out_of_plane(f, at.azimuth, "pair")
+        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
+            q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
+            f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
+        else:
+            q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
+            f = out_of_plane(f, at.azimuth, "pair")
         force = out_of_plane(force, at.azimuth, "vector")
         if separations is not None:
             separations = (
@@ -248,6 +255,11 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
             separations = (-force / stiffness[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _is_oblique(azimuth: float) -> bool:
+    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
+    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
 
 
 def _transferred_foot(at: RestartState, q: Array) -> Array:

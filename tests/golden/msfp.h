@@ -231,6 +231,7 @@ typedef struct {
     double value; /* what it failed with, as the meaning of the status says */
     double time;  /* reached [s] */
     double step;  /* length of the next step [s] */
+    size_t dropped_rows; /* rows that are no longer held, as a callback received them or by run_drop_rows */
 } msfp_progress;
 
 /* The state of a run; each array may be NULL, which leaves it out. */
@@ -331,6 +332,10 @@ typedef struct msfp_api {
     void (*run_on_rows)(msfp_run *run, msfp_row_callback callback, void *user);
     /* Record the present state unless it is the last row. */
     int (*run_record)(msfp_run *run);
+    /* run_advance returns once so many rows are held; 0, the default: no limit. */
+    void (*run_hold_rows)(msfp_run *run, size_t rows);
+    /* Forget all rows but the last. */
+    void (*run_drop_rows)(msfp_run *run);
 
     /* ---- snapshots: the state between two steps as bytes without pointers, with version and checksum ---- */
     /* rows: how many of the last rows that the run holds, without events; negative: all rows and events. snapshot

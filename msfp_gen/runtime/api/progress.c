@@ -9,7 +9,8 @@ enum { NB = MSFP_NB };
 
 void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress)
 {
-    *progress = (msfp_progress){ run->status, run->status_surface, run->status_value, run->now.t, run->h };
+    *progress = (msfp_progress){ run->status, run->status_surface, run->status_value, run->now.t, run->h,
+                                  run->rows_before };
 }
 
 static void give(double *to, const void *from, size_t size)
@@ -40,6 +41,8 @@ void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
         memcpy(state->monitor_heat + NB, run->monitor.peak, sizeof run->monitor.peak);
     }
 }
+
+void msfp_api_run_hold_rows(msfp_run *run, size_t rows) { run->options.row_limit = rows; }
 
 void msfp_api_run_counts(const msfp_run *run, int64_t *counts)
 {

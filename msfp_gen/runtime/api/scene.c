@@ -118,11 +118,7 @@ static int deliver(msfp_run *run)
     if (begin < count)
         ended = run->callback(run->user, (const double *)(run->rows + begin), count - begin);
     run->rows_taken = run->rows_before + count;
-    if (count > 1) {
-        run->rows[0] = run->rows[count - 1];
-        run->rows_before += count - 1;
-        run->row_count = 1;
-    }
+    msfp_drop_rows(run);
     return ended;
 }
 

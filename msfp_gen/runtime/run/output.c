@@ -94,6 +94,15 @@ double msfp_next_output(const msfp_run *run)
     return step * (floor(run->options.start_time / step + 1e-9) + (double)(run->rows_before + run->row_count));
 }
 
+void msfp_drop_rows(msfp_run *run)
+{
+    if (run->row_count < 2)
+        return;
+    run->rows[0] = run->rows[run->row_count - 1];
+    run->rows_before += run->row_count - 1;
+    run->row_count = 1;
+}
+
 int msfp_write_now(msfp_run *run)
 {
     if (run->row_count && run->rows[run->row_count - 1].time >= run->now.t)

@@ -7,6 +7,7 @@
 
 enum {
     NB = MSFP_NB,
+    ROWS_OF_STEP = 10000, /* rows inside one step, at most: those of a long rest need not fit into memory */
     STABILITY_LIMIT_STEPS =
         500 /* consecutive steps; rim contact causes a few (Hairer and Wanner, Solving ODEs II, IV.2: 15) */
 };
@@ -139,6 +140,8 @@ static double allowed_step(msfp_run *run, double h)
         h = fmin(h, o->span_steps[run->span]);
     for (int i = run->span; i + 1 < o->span_count && t + h > o->span_ends[i]; ++i)
         h = fmin(h, fmax(o->span_ends[i] - t, o->span_steps[i + 1]));
+    if (o->output_step > 0.0)
+        h = fmin(h, ROWS_OF_STEP * o->output_step);
     return o->max_step > 0.0 ? fmin(h, o->max_step) : h;
 }
 
@@ -281,6 +284,8 @@ int msfp_run_advance(msfp_run *run, long steps)
     for (long i = 0; i < steps && run->status == MSFP_OK; ++i) {
         if (finished(run))
             return 0;
+        if (run->options.row_limit && run->row_count >= run->options.row_limit)
+            break;
         if ((double)(run->counts[MSFP_COUNT_STEPS] + run->counts[MSFP_COUNT_REJECTED_STEPS]) >=
             run->options.max_steps) {
             run->status = MSFP_E_STEPS;

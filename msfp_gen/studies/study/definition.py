@@ -15,7 +15,7 @@ from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.simulate import check
+from msfp_gen.simulation.effect_switching import check
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, rule_of, surface_values
