@@ -229,8 +229,8 @@ def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array
 def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
-    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow from the
-    interface forces without those of the rims: the unilateral contacts are compressed by them.
+    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
+    from the interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
     angles = np.vstack([at.base_angles, at.q[:, :3]])
     q, v, f, force = at.q, at.v, at.f, at.force - rim_forces(scene.bearing, angles[None], at.rim_force[None])[0]

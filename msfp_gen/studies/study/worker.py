@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.simulation.batch import raise_if_stopped, run_to_end
-from msfp_gen.simulation.effect_switching import check, settle
+from msfp_gen.simulation.effect_switching import check
+from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.study.definition import Task
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
