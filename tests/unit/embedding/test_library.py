@@ -275,7 +275,12 @@ def test_the_headers_serve_cpp(prefix: Path, tmp_path: Path) -> None:
 
 # ---- the Fortran module has what the header has --------------------------------------------------------------------
 
-KINDS = {"int": "integer(c_int)", "double": "real(c_double)", "msfp_piecewise": "type(msfp_piecewise)"}
+KINDS = {
+    "int": "integer(c_int)",
+    "size_t": "integer(c_size_t)",
+    "double": "real(c_double)",
+    "msfp_piecewise": "type(msfp_piecewise)",
+}
 
 
 def structs_of_c(text: str) -> dict[str, list[tuple[str, str]]]:
