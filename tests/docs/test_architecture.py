@@ -18,8 +18,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "results", "analysis", "figures", "result", "simulation", "studies", "report", "", "cli",
-    "__main__",
+    "scene", "model", "coupling", "results", "analysis", "figures", "result", "simulation", "studies", "report", "",
+    "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.
@@ -189,7 +189,7 @@ def test_every_package_is_on_the_map():
 
 
 # The folders of the runtime, lowest first, and the headers that each may include beside its own.
-LAYERS = ("equations", "steppers", "run", "api")
+LAYERS = ("equations", "steppers", "run", "port", "api")
 RUNTIME = ROOT / "msfp_gen" / "runtime"
 GENERATED = {"msfp_model.h", "msfp_kernels.h"}
 OF_THE_TABLE = {"msfp_fields.h"}  # what the table of functions states about the model
@@ -198,7 +198,7 @@ SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_runtime_includes_one_way(path):
-    """api -> run -> steppers -> equations -> generated headers; msfp_runtime.h includes nothing of ours."""
+    """api -> port -> run -> steppers -> equations -> generated headers; msfp_runtime.h includes nothing of ours."""
     included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
     if path.parent == RUNTIME:
         assert not included
@@ -217,7 +217,7 @@ def test_names_of_runtime_files_are_unique():
 
 def test_headers_of_the_runtime_define_only_prefixed_macros():
     headers = [*RUNTIME.rglob("*.h"), *(ROOT / "templates").glob("*.h.jinja")]
-    assert len(headers) == 11
+    assert len(headers) == 12
     for path in headers:
         text = path.read_text(encoding="utf-8").replace("{{ name | upper }}", "MSFP_N_M_P")
         macros = re.findall(r"^\s*#\s*define\s+(\w+)", text, flags=re.MULTILINE)

@@ -112,9 +112,10 @@ enum msfp_call_error {
     MSFP_CALL_ERRORS
 };
 
-/* Opaque handles, of the model whose table made them: a bearing with its top; a run. */
+/* Opaque handles, of the model whose table made them: a bearing with its top; a run; a bearing between two ends. */
 typedef struct msfp_bearing msfp_bearing;
 typedef struct msfp_run msfp_run;
+typedef struct msfp_port msfp_port;
 
 /* One entry of a list of numbers: its name, unit and meaning, where it begins and its shape (rank 0: one number). */
 typedef struct {
@@ -347,6 +348,35 @@ typedef struct msfp_api {
     int (*snapshot_read)(msfp_run *run, const void *snapshot, size_t size);
     /* A run of no scene in the state of a snapshot, to read its state from; it takes no steps. */
     int (*snapshot_open)(const void *snapshot, size_t size, msfp_run **run);
+
+    /* ---- the two-port: a bearing between two ends that another program moves ---- */
+    /* End 0 holds the base, end 1 the far side of the interface: springs and dampers of the top on the top plate. Motion
+     * of the ends [2][3][6]: u_1..3 since the start [m] and rotation vector [rad], rates, accelerations. A wrench is force
+     * [N] and moment [N m] that an end exerts on the bearing, about the present position of that end. Spatial models with
+     * locked spin and rotation of the top have it.
+     * scene: bearing, state q, v, f, start_time and the solver; the rest is not read. axial_load: compression at rest [N].
+     * Returns a status; *port is NULL only after MSFP_E_ARGUMENT or MSFP_E_MEMORY. */
+    int (*port_new)(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
+    void (*port_free)(msfp_port *port);
+    /* Go from the committed state to `time` [s], at which the ends are at `ends`; on the way each number of a motion is the
+     * polynomial of degree five through both. It depends on nothing else. MSFP_E_ARGUMENT: `time` is not after that of the
+     * committed state, nor that time with its ends. The committed state remains whatever the status. */
+    int (*port_trial)(msfp_port *port, double time, const double *ends);
+    /* Of the last trial if it succeeded, else of the committed state: wrenches [2][6]; the row [row_size]. */
+    int (*port_wrench)(const msfp_port *port, double *wrench);
+    /* Derivatives [12][12] of the wrenches of the last trial with respect to the displacements (order 0: tangent), rates (1)
+     * or accelerations (2) of the ends, its steps held. MSFP_E_ARGUMENT: no trial over some time has succeeded. */
+    int (*port_derivative)(msfp_port *port, int order, double *derivative);
+    int (*port_row)(const msfp_port *port, double *row);
+    void (*port_progress)(const msfp_port *port, msfp_progress *trial); /* how the last trial ended */
+    void (*port_counts)(const msfp_port *port, int64_t *counts);        /* [MSFP_COUNTS] of the last trial */
+    double (*port_time)(const msfp_port *port);                         /* of the committed state [s] */
+    void (*port_commit)(msfp_port *port);                               /* accept the last trial, if it succeeded */
+    void (*port_revert)(msfp_port *port);                               /* forget it */
+    /* The committed state as bytes without pointers, for a port of the same values and build. */
+    size_t (*port_snapshot_size)(const msfp_port *port);
+    void (*port_snapshot_write)(const msfp_port *port, void *snapshot);
+    int (*port_snapshot_read)(msfp_port *port, const void *snapshot, size_t size);
 } msfp_api;
 
 #ifdef __cplusplus
