@@ -364,9 +364,10 @@ typedef struct msfp_api {
     int (*port_trial)(msfp_port *port, double time, const double *ends);
     /* Of the last trial if it succeeded, else of the committed state: wrenches [2][6]; the row [row_size]. */
     int (*port_wrench)(const msfp_port *port, double *wrench);
-    /* Derivatives [12][12] of the wrenches of the last trial with respect to the displacements (order 0: tangent), rates (1)
-     * or accelerations (2) of the ends, its steps held. MSFP_E_ARGUMENT: no trial over some time has succeeded. */
-    int (*port_derivative)(msfp_port *port, int order, double *derivative);
+    /* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends, its steps held.
+     * direction [3]: how displacements, rates and accelerations change together, (1, 0, 0) gives the tangent.
+     * MSFP_E_ARGUMENT: no trial over some time has succeeded, or the direction is zero. */
+    int (*port_derivative)(msfp_port *port, const double *direction, double *derivative);
     int (*port_row)(const msfp_port *port, double *row);
     void (*port_progress)(const msfp_port *port, msfp_progress *trial); /* how the last trial ended */
     void (*port_counts)(const msfp_port *port, int64_t *counts);        /* [MSFP_COUNTS] of the last trial */

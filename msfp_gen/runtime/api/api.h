@@ -66,7 +66,7 @@ int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
 int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
 int msfp_api_port_trial(msfp_port *port, double time, const double *ends);
 int msfp_api_port_wrench(const msfp_port *port, double *wrench);
-int msfp_api_port_derivative(msfp_port *port, int order, double *derivative);
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
 int msfp_api_port_row(const msfp_port *port, double *row);
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
 void msfp_api_port_counts(const msfp_port *port, int64_t *counts);

@@ -79,11 +79,15 @@ int msfp_api_port_wrench(const msfp_port *port, double *wrench)
     return MSFP_OK;
 }
 
-int msfp_api_port_derivative(msfp_port *port, int order, double *derivative)
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative)
 {
-    if (!derivative || order < 0 || order >= MSFP_ORDERS || !port->tried || !port->time_count)
+    if (!direction || !derivative || !port->tried || !port->time_count)
         return MSFP_E_ARGUMENT;
-    return msfp_port_derivative(port, order, derivative);
+    if (!msfp_all_finite(direction, MSFP_ORDERS))
+        return MSFP_E_FINITE;
+    if (direction[0] == 0.0 && direction[1] == 0.0 && direction[2] == 0.0)
+        return MSFP_E_ARGUMENT;
+    return msfp_port_derivative(port, direction, derivative);
 }
 
 int msfp_api_port_row(const msfp_port *port, double *row)
