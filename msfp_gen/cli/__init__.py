@@ -18,6 +18,7 @@ from msfp_gen.cli import (
     records,
     reporting,
     running,
+    serving,
     studying,
 )
 from msfp_gen.cli.console import fail, say
@@ -39,6 +40,7 @@ app = typer.Typer(
 # This order is the order of the commands in the help text.
 for group in (
     running, batching, studying, exporting, drawing, assessment_commands, benching, reporting, records, building,
+    serving,
     cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)
