@@ -40,8 +40,9 @@ from msfp_gen.simulation.checkpoint import (
 from msfp_gen.simulation.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.simulation.memory import outgrown, require_room
 from msfp_gen.simulation.notes import history_notes, landing_notes, notes_of
+from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
-from msfp_gen.simulation.segment import RestartState, Segment, start_run
+from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.simulation.streamed_rows import StreamedRows
 from msfp_gen.version import __version__
