@@ -15,11 +15,12 @@ from msfp_gen.studies import load_study
 from msfp_gen.studies.study.sampling import METHODS
 
 PAGE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
 EXAMPLE = ROOT / "examples" / "fragility" / "study.toml"
 
 
 def test_the_study_file_of_the_page_is_valid(tmp_path: Path) -> None:
-    text = next(block for block in re.findall(r"^```toml\n(.*?)^```$", PAGE, re.M | re.S) if "[sampling]" in block)
+    text = next(block for language, block in BLOCKS if language == "toml" and "[sampling]" in block)
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     scene = (ROOT / "examples" / "triple.toml").read_text(encoding="utf-8")
     (tmp_path / "scene.toml").write_text(
@@ -38,7 +39,7 @@ def test_every_sampling_is_on_the_page() -> None:
 def test_the_example_is_the_study_of_the_page() -> None:
     text, study = EXAMPLE.read_text(encoding="utf-8"), load_study(EXAMPLE)
     assert study.runs == 144 and "144 runs" in PAGE
-    shown = next(block for block in re.findall(r"^```toml\n(.*?)^```$", PAGE, re.M | re.S) if "asce7-quality" in block)
+    shown = next(block for language, block in BLOCKS if language == "toml" and "asce7-quality" in block)
     for line in shown.splitlines():
         assert "..." in line or line in text, line
     assert "#     msfp-gen study examples/fragility/study.toml -o out\n" in text
@@ -50,7 +51,7 @@ def test_commands_of_the_page_print_what_it_shows(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     part = PAGE.partition("## From a study file to a figure")[2].partition("\n## ")[0]
-    plain = [block.strip().splitlines() for block in re.findall(r"^```\n(.*?)^```$", part, re.M | re.S)]
+    plain = [text.splitlines() for language, text in BLOCKS if not language and text in part]
     commands = [line for block in plain for line in block if line.startswith("msfp-gen ")]
     assert len(commands) == 3
     for command in commands:
