@@ -226,10 +226,10 @@ class Model:
 
         q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2]. base: shape
         (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad], and their first and second derivatives; None: zero.
-        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], "v_..." [m/s], "a_..." [m/s^2], "omega_k" and
-        "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. In stacks of ten and
-        more bodies pairs have a stroke, "r_1_2", since "r_12" is the centre of body 12. Components along E1, E2, E3.
-        Raises InputError for wrong shapes and planar models.
+        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], rates of names with v for r [m/s] and
+        with a [m/s^2], "omega_k" and "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1,
+        t_2, t_3. In stacks of ten and more bodies pairs have a stroke, "r_1_2", since "r_12" is the centre of body 12.
+        Components along E1, E2, E3. Raises InputError for wrong shapes and planar models.
         """
         if self.planar:
             raise InputError("kinematics: not available for a planar model; build it with dimension = 'spatial'")
