@@ -139,6 +139,8 @@ def test_outline_has_the_height_and_the_spheres_of_its_data(layout):
         assert (shape[:, 0] >= 0).all()
     for surface, sign in enumerate(bearing.layout.signs):
         face, radius = slider_face(bearing, surface), bearing.surfaces[surface].radius
+        near = outline(bearing, bearing.slider(surface))[:, None] - face
+        assert np.linalg.norm(near, axis=-1).min(axis=0) == pytest.approx(np.zeros(len(face)), abs=1e-12)
         middle = (0 if sign > 0 else bearing.arrays()["height"][bearing.slider(surface)]) + sign * radius
         assert np.hypot(face[:, 0], face[:, 1] - middle) == pytest.approx(np.full(len(face), radius), rel=1e-9)
 
