@@ -166,13 +166,28 @@ def test_motion_that_leaves_its_plane_is_followed_out_of_it() -> None:
     assert result.summary["energy"]["closure_error"] < 1e-3
 
 
+@pytest.mark.parametrize("frequency", [0.18695163208365206, 0.8363174641294197])
+def test_a_change_of_models_at_an_output_time_writes_one_row(frequency: float) -> None:
+    """The plane is left a rounding error beside an output time."""
+    time = np.linspace(0.0, 4.0, 401)
+    moved = np.zeros((401, 3))
+    moved[:, 0] = 0.05 * np.sin(2 * np.pi * time) * np.sin(np.pi * time / 4) ** 2
+    moved[:, 1] = 0.025 * np.sin(np.pi * np.clip(time - 2.5, 0.0, None) / 1.5) ** 3
+    motion = Motion.from_arrays(time / frequency, moved)
+    step = motion.duration / 400
+    result = simulate(replace(TEST2, motion=motion, duration=None, effects=Auto(), output_step=step))
+    assert kinds(result) == ["plane"] and len(result.history.time) == 401
+    assert np.diff(result.history.time).min() > 0.99 * step
+
+
 def test_sliders_get_their_mass_back_when_the_load_falls() -> None:
     load = Load.from_arrays([0, 1, 3, 40], np.outer([0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 111.95e3]))
     top = Top.rig(112e3, stiffness=1e6, damping=5.0, rotational_stiffness=1e5, rotational_damping=5.0)
     motion = Motion.harmonic(0.05, 1.0, cycles=4)
     scene = Scene(presets.bearing("fenz-tfp"), motion, top, load=load, output_step=0.005, effects=Auto(uplift=False))
     scene = replace(scene, solver=replace(scene.solver, rtol=1e-5))
-    result, full = simulate(scene), simulate(replace(scene, effects=Effects(dimension="planar")))
+    wrong = with_selection(scene, sliders="massless")
+    result, full = simulate(wrong), simulate(replace(scene, effects=Effects(dimension="planar")))
     assert kinds(result) == ["inertia"] and result.provenance["model"].count("massless") == 1
     ignored = simulate(replace(scene, effects=Auto(uplift=False, sliders="massless")))
     assert [note.kind for note in ignored.notes if note.kind == "inertia"] and not kinds(ignored)
