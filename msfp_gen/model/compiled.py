@@ -113,6 +113,18 @@ class Run(Protocol):
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
+    def start_gradients(self, *, steps: Sequence[float] = (), **derivatives: Array) -> None:
+        """Begin derivatives with respect to parameters; of everything that the run is given (the wrapper names it)."""
+
+    def gradient_rows(self, count: int) -> Array:
+        """Derivatives of `rows` with respect to `count` parameters, shape (T, count, row size)."""
+
+    def gradient_events(self, count: int) -> Array:
+        """Derivatives of time, displacement and top force of the events, shape (events, count, 7)."""
+
+    def gradient_extremes(self, count: int) -> Array:
+        """Derivatives of `extremes`, shape (count, size)."""
+
 
 class Port(Protocol):
     """A compiled two-port: a committed state and a trial. Arrays are contiguous float64 in SI units."""

@@ -49,7 +49,7 @@ class Model:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle layout and effects alone: the model is loaded from the cache, or built, where it is unpickled."""
-        return build_model, (self.layout, self.effects)
+        return build_model, (self.layout, self.effects, self.spec.gradients)
 
     def __repr__(self) -> str:
         return f"Model({self.spec.key})"
@@ -269,13 +269,17 @@ class Model:
         return into_plane(state) if self.planar else state
 
 
-def build_model(layout: Layout, effects: Effects | None = None, *, progress: Progress | None = None) -> Model:
+def build_model(
+    layout: Layout, effects: Effects | None = None, gradients: bool = False, *, progress: Progress | None = None
+) -> Model:
     """The compiled model of a layout: derived, emitted and compiled once, then imported from the cache.
 
     Parameters
     ----------
     layout, effects
         They determine the equations; `effects=None` means `Effects()`.
+    gradients
+        Whether runs of the model can compute derivatives with respect to parameters (docs/gradients.md).
     progress
         Called with the name of the current step of the build and the completed share, 0 to 1; None: no calls.
 
@@ -284,10 +288,10 @@ def build_model(layout: Layout, effects: Effects | None = None, *, progress: Pro
     CompileError
         If there is no C compiler or it refuses the emitted sources.
     InputError
-        If the cache cannot be written.
+        If the cache cannot be written, or the effects have no gradients.
 
     """
-    spec = ModelSpec(layout, Effects() if effects is None else effects)
+    spec = ModelSpec(layout, Effects() if effects is None else effects, gradients)
     if (model := _models.get(spec)) is not None:  # read without the lock, which another thread may hold during a build
         return model
     with _models_lock:

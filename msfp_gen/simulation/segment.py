@@ -96,7 +96,7 @@ def start_run(
     the monitors that stop the run; the others only write notes.
     """
     solver, stop = scene.solver, scene.stop
-    load_knots, wrench = _wrench(scene)
+    load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
     q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else _transferred_state(scene, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
@@ -140,7 +140,7 @@ def start_run(
     return run, frame.azimuth
 
 
-def _wrench(scene: Scene) -> tuple[Array, Array]:
+def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
     """Knots and polynomials of force and moment on the top plate: those of the top and of the load history."""
     knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
     if scene.load is not None:
@@ -177,7 +177,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
         for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
     )
     if model.planar:
-        q, v, f = _state_in_plane(q, v, f, azimuth)
+        q, v, f = state_in_plane(q, v, f, azimuth)
     if model.effects.uplift:
         load = 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
         q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, load)])
@@ -185,7 +185,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
     return q, v, f
 
 
-def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
+def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
     """An initial state in the frame of a planar model; raises InputError where it leaves the plane."""
     q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
     f = np.ascontiguousarray(rotated_pairs(f, azimuth))

@@ -249,6 +249,18 @@ typedef struct {
     double *monitor_heat; /* [2][nb] as in msfp_scene */
 } msfp_run_state;
 
+/* Derivatives of everything that a run is given, [parameter] first: of gravity, of the values that bearing_new takes, of
+ * q, v [nb][nq], f [nb][2]; of the coefficients of motion and load, those with the index motion[i], load[i] of
+ * `motions`, `loads` [index][pieces][6][degree + 1], -1: zero. All arrays are given. steps [step_count]: ends of all
+ * steps [s], in place of the step control, for checks. Histories and steps must outlive the run. */
+typedef struct {
+    int count;
+    const double *gravity, *bodies, *surfaces, *top, *q, *v, *f, *motion, *load;
+    const double *motions, *loads;
+    const double *steps;
+    int step_count;
+} msfp_gradient_inputs;
+
 /* Receives rows [count][api->row_size] in the order of time; they are valid during the call. A value other than 0 ends
  * this call of run_advance early: the run itself may be continued. */
 typedef int (*msfp_row_callback)(void *user, const double *rows, size_t count);
@@ -378,6 +390,15 @@ typedef struct msfp_api {
     size_t (*port_snapshot_size)(const msfp_port *port);
     void (*port_snapshot_write)(const msfp_port *port, void *snapshot);
     int (*port_snapshot_read)(msfp_port *port, const void *snapshot, size_t size);
+
+    /* ---- derivatives of a run with respect to parameters (docs/gradients.md); NULL in models without them ---- */
+    /* Begin them, before the first step of a run that keeps its rows. Returns a status. */
+    int (*gradients_start)(msfp_run *run, const msfp_gradient_inputs *inputs);
+    /* Of the rows, [row][parameter][row_size]; of time, displacement and top force of events, [event][parameter][7]. */
+    const double *(*gradient_rows)(const msfp_run *run, size_t *count);
+    const double *(*gradient_events)(const msfp_run *run, size_t *count);
+    /* Of the extremes with respect to one parameter, [extremes_size]. */
+    void (*gradient_extremes)(const msfp_run *run, int parameter, double *out);
 } msfp_api;
 
 #ifdef __cplusplus

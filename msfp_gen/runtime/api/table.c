@@ -93,6 +93,12 @@ static const msfp_api table = {
     .port_snapshot_size = msfp_port_snapshot_size,
     .port_snapshot_write = msfp_port_snapshot_write,
     .port_snapshot_read = msfp_api_port_snapshot_read,
+#if MSFP_GRADIENTS
+    .gradients_start = msfp_gradients_start,
+    .gradient_rows = msfp_gradient_rows,
+    .gradient_events = msfp_gradient_events,
+    .gradient_extremes = msfp_gradient_extremes,
+#endif
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);
