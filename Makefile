@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
 SITE   := $(VENV)/.site
 
-.PHONY: demo test slow lint types package wheels bounds clang fuzz figures docs clean
+.PHONY: demo test slow lint types package wheels bounds clang fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -44,6 +44,10 @@ clang: $(STAMP)
 fuzz: $(STAMP)
 	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
 	$(BIN)/python benchmarks/fuzz.py --combined --scenes 2000 --seed 91 --check 0
+
+# A hundred small changes of the code, and whether the tests see them: hours. See benchmarks/mutants.py.
+mutants: $(STAMP)
+	$(BIN)/python benchmarks/mutants.py --count 100 --output build/mutants.json
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py

@@ -72,7 +72,7 @@ def ida(
 @app.command(
     epilog="Examples:\n\n\b\n"
     "  msfp-gen study fragility out --demand peak_displacement --thresholds 0.15,0.22 --plot fragility.png\n"
-    "  msfp-gen study fragility out --demand peak_sliding_1 --thresholds 0.13 --bootstrap 1000 --where bounds=upper"
+    "  msfp-gen study fragility out --demand peak_sliding_1 --thresholds 0.13 --bootstrap 1000 --by bounds"
 )
 def fragility(
     folder: Folder,
@@ -94,6 +94,9 @@ def fragility(
         typer.Option(metavar="NUMBER", help="Bands from so many bootstrap samples of whole clusters; 0: likelihood."),
     ] = 0,
     cluster: Annotated[str, typer.Option(metavar="COLUMN", help="What the bootstrap draws as a whole.")] = "record",
+    by: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="Curves for each value of a column, such as bounds.")
+    ] = None,
     where: Where = None,
     plot: Plot = None,
     output: Output = None,
@@ -108,7 +111,7 @@ def fragility(
     _check(plot, output)
     rows = chosen_rows(read_study(folder), where or ())
     found = analyse(
-        rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster
+        rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster, by=by
     )  # fmt: skip
     _show(as_json, found.as_dict(), fragility_table(found))
     _write(output, fragility_frame(found))

@@ -139,12 +139,14 @@ def load_extension(path: Path, module: str) -> ModuleType:
     return extension
 
 
-def runtime_sources() -> dict[str, str]:
-    """Hand-written C files that are compiled with every model: file name, without its folder -> text.
+def runtime_sources(gradients: bool = False) -> dict[str, str]:
+    """Hand-written C files that are compiled with a model: file name, without its folder -> text.
 
-    Names are unique across the folders, so that generated sources lie in one folder.
+    gradients: with those that only models with gradients have. Names are unique across the folders, so that generated
+    sources lie in one folder.
     """
     files = sorted((cache.PACKAGE / "runtime").rglob("*.[ch]"))
+    files = [path for path in files if gradients or path.parent.name != "gradients"]
     return {path.name: path.read_text(encoding="utf-8") for path in files}
 
 
@@ -172,7 +174,11 @@ def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest
     wrapper = next(name for name in generated.files if name.endswith(".pyx"))
     translated = f"{Path(wrapper).stem}.c"
     known = find_translation(generated.files[wrapper])
-    sources = {**runtime_sources(), **generated.files, **({translated: known} if known is not None else {})}
+    sources = {
+        **runtime_sources(entry.spec.gradients),
+        **generated.files,
+        **({translated: known} if known is not None else {}),
+    }
     begin = perf_counter()
     extension = compile_extension(
         sources,

@@ -45,7 +45,7 @@ def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
     q: shape (..., 3) [rad]; `name` is used in messages. Raises InputError for tilts outside the plane.
     """
     across, along, sign = (0, 1, 1.0) if abs(azimuth) < 1e-9 else (1, 0, -1.0)
-    if azimuth and abs(azimuth - np.pi / 2) > 1e-9 and np.any(q):
+    if min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9 and np.any(q):
         raise InputError(
             f"{name}: a planar model accepts a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'"
         )

@@ -30,14 +30,18 @@ def to_dataset(result: RunData) -> xr.Dataset:
     import xarray as xr
 
     history = result.history
-    coordinates = {
+    variables = dict([*row_variables(history), *energy_variables(history), *_events(result)])
+    return xr.Dataset(variables, coordinates_of(history), attrs=_attributes(result))
+
+
+def coordinates_of(history: History) -> dict[str, Any]:
+    """The coordinates of the dataset: time, bodies, surfaces, and the labels of dimensions of fixed length."""
+    return {
         "time": ("time", history.time, {"units": "s", "long_name": "time t"}),
         "body": ("body", np.arange(2, history.surfaces + 2), {"long_name": "moving body k, base is 1"}),
         "surface": ("surface", np.arange(1, history.surfaces + 1), {"long_name": "sliding surface, bottom first"}),
         **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
     }
-    variables = dict([*row_variables(history), *energy_variables(history), *_events(result)])
-    return xr.Dataset(variables, coordinates, attrs=_attributes(result))
 
 
 def write_netcdf(result: RunData, path: str | Path) -> Path:
@@ -86,14 +90,18 @@ def digest_of_dataset(
 def row_variables(history: History) -> Variables:
     """Every quantity of the rows but their time."""
     for field, values in history.arrays().items():
-        if field == "time":
-            continue
-        rows = quantities()[field]
-        dims, names = ("time", *rows.dims), rows.names or (field,)
-        split = len(names) > 1  # one variable for each component
-        for column, name in enumerate(names):
-            about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
-            yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+        if field != "time":
+            yield from named_columns(field, values)
+
+
+def named_columns(field: str, values: Any) -> Variables:
+    """The variables of one field of `History`: several where each of its components has a name."""
+    rows = quantities()[field]
+    dims, names = ("time", *rows.dims), rows.names or (field,)
+    split = len(names) > 1  # one variable for each component
+    for column, name in enumerate(names):
+        about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
+        yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
 
 
 def energy_variables(history: History) -> Variables:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +32,11 @@ def history_of(model: Model, rows: Array, azimuth: float, sprung: bool = False, 
     vertical spring. first: the first row of the segment, shape (row size,), from which displacement and stored energies
     count; None: that of `rows`.
     """
+    return History(**unpacked(model, rows, azimuth, sprung, first))
+
+
+def unpacked(model: Model, rows: Array, azimuth: float, sprung: bool, first: Array | None = None) -> dict[str, Any]:
+    """The fields of `History` from rows of a segment, or from derivatives of rows: they are linear in the rows."""
     f = model.unpack(rows)
     start = model.unpack(rows[0] if first is None else first)
     turn = azimuth
@@ -57,31 +62,31 @@ def history_of(model: Model, rows: Array, azimuth: float, sprung: bool = False, 
     }
     # One term after the other: the digits of a sum by NumPy depend on the number of rows.
     energy["numerical"] = energy["input"] - reduce(np.add, [v for k, v in energy.items() if k != "input"])
-    return History(
-        time=f["time"],
-        tilt_angles=out_of_plane(f["q"][..., :3], turn, "angles"),
-        tilt_rates=out_of_plane(f["v"][..., :3], turn, "angles"),
-        tilt_accelerations=out_of_plane(f["a"][..., :3], turn, "angles"),
-        friction_state=out_of_plane(f["f"], turn, "pair"),
-        normal_force=f["normal"],
-        contact_angles=out_of_plane(f["angles"], turn, "pair_angles"),
-        sliding=f["sliding"],
-        gap=f["gap"],
-        rim_force=f["rim"],
-        separation=out_of_plane(separation, turn, "vector"),
-        lift=lift,
-        interface_force=out_of_plane(f["force"], turn, "vector"),
-        slip_velocity=out_of_plane(f["slip"], turn, "pair"),
-        base_displacement=base,
-        top_displacement=top,
-        displacement=across - across_start,
-        top_force=out_of_plane(f["top_force"], turn, "vector"),
-        top_moment=out_of_plane(f["top_moment"], turn, "axial"),
-        energy=energy,
-        friction_coefficient=f.get("mu"),
-        temperature=f.get("temperature"),
-        top_settlement=f["top_settlement"] if sprung else None,
-    )
+    return {
+        "time": f["time"],
+        "tilt_angles": out_of_plane(f["q"][..., :3], turn, "angles"),
+        "tilt_rates": out_of_plane(f["v"][..., :3], turn, "angles"),
+        "tilt_accelerations": out_of_plane(f["a"][..., :3], turn, "angles"),
+        "friction_state": out_of_plane(f["f"], turn, "pair"),
+        "normal_force": f["normal"],
+        "contact_angles": out_of_plane(f["angles"], turn, "pair_angles"),
+        "sliding": f["sliding"],
+        "gap": f["gap"],
+        "rim_force": f["rim"],
+        "separation": out_of_plane(separation, turn, "vector"),
+        "lift": lift,
+        "interface_force": out_of_plane(f["force"], turn, "vector"),
+        "slip_velocity": out_of_plane(f["slip"], turn, "pair"),
+        "base_displacement": base,
+        "top_displacement": top,
+        "displacement": across - across_start,
+        "top_force": out_of_plane(f["top_force"], turn, "vector"),
+        "top_moment": out_of_plane(f["top_moment"], turn, "axial"),
+        "energy": energy,
+        "friction_coefficient": f.get("mu"),
+        "temperature": f.get("temperature"),
+        "top_settlement": f["top_settlement"] if sprung else None,
+    }
 
 
 def events_of(model: Model, run: Run, azimuth: float) -> tuple[Event, ...]:

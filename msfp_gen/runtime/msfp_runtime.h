@@ -355,6 +355,9 @@ struct msfp_run {
     size_t event_count, event_capacity;
     msfp_row_callback callback; /* NULL: rows are kept */
     void *user;                 /* its first argument */
+#if MSFP_GRADIENTS
+    struct msfp_gradients *gradients; /* NULL: none are computed */
+#endif
 };
 #define MSFP_SNAPSHOT_BEGIN offsetof(msfp_run, next_jump)
 #define MSFP_SNAPSHOT_END offsetof(msfp_run, rows)
@@ -384,6 +387,16 @@ void msfp_drop_rows(msfp_run *run);
 int msfp_write_now(msfp_run *run);
 /* Release rows and events. */
 void msfp_run_free(msfp_run *run);
+
+/* ---- derivatives of a run with respect to parameters; docs/gradients.md ---- */
+/* Begin the derivatives of a run after msfp_run_start. Returns run->status. */
+int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs);
+/* Derivatives of the rows, [row][parameter][MSFP_ROW_SIZE]; count: of the rows. */
+const double *msfp_gradient_rows(const msfp_run *run, size_t *count);
+/* Derivatives of time, displacement and top force of the events, [event][parameter][7]; count: of the events. */
+const double *msfp_gradient_events(const msfp_run *run, size_t *count);
+/* Derivatives of the extremes with respect to one parameter, in the order of msfp_extremes. */
+void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out);
 
 #ifdef __cplusplus
 }

@@ -47,10 +47,13 @@ def require_memory(scenes: Sequence[Scene]) -> None:
     )
 
 
-def require_room(scene: Scene, stream: Path | None) -> None:
-    """Raise InputError where the rows of a scene at even times do not fit into memory, or on the disk of `stream`."""
+def require_room(scene: Scene, stream: Path | None, copies: int = 1) -> None:
+    """Raise InputError where the rows of a scene at even times do not fit into memory, or on the disk of `stream`.
+
+    copies: numbers kept of each quantity, its derivatives included.
+    """
     if stream is None:
-        require_memory([scene])
+        require_memory([scene] * copies)
     elif scene.output_step is not None:
         _require_disk(scene, scene.output_step, stream.parent)
 

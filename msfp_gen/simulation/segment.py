@@ -21,7 +21,6 @@ from msfp_gen.model.plane import (
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
-from msfp_gen.results.geometry.shape import rim_forces
 from msfp_gen.scene.effect_selection import (
     UPLIFT_MONITOR_SHARE,
     EffectSelection,
@@ -35,6 +34,7 @@ from msfp_gen.scene.friction_parameters import checked_range
 from msfp_gen.scene.friction_selection import heating_factors, thermal_softening
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import load_values
+from msfp_gen.simulation.restart_state import RestartState
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
@@ -45,38 +45,6 @@ if TYPE_CHECKING:
     from msfp_gen.specification.layout import Effects
 
 NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
-
-
-@dataclass(frozen=True, eq=False)
-class RestartState:
-    """The state in which a segment ended, from which the next one starts with another model.
-
-    time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
-    separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
-    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
-    base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
-    heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
-    """
-
-    time: float
-    azimuth: float
-    planar: bool
-    q: Array
-    v: Array
-    f: Array
-    foot: Array
-    force: Array
-    rim_force: Array
-    base_angles: Array
-    origin: Array
-    monitor_heat: Array
-    heat: Array | None = None
-
-    @classmethod
-    def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
-        """The current state of `run`; a row of it is recorded."""
-        run.record_now()
-        return cls(azimuth=azimuth, planar=model.planar, **model.extension.read_state(run.snapshot(rows=1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +96,7 @@ def start_run(
     the monitors that stop the run; the others only write notes.
     """
     solver, stop = scene.solver, scene.stop
-    load_knots, wrench = _wrench(scene)
+    load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
     q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else _transferred_state(scene, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
@@ -172,7 +140,7 @@ def start_run(
     return run, frame.azimuth
 
 
-def _wrench(scene: Scene) -> tuple[Array, Array]:
+def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
     """Knots and polynomials of force and moment on the top plate: those of the top and of the load history."""
     knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
     if scene.load is not None:
@@ -209,7 +177,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
         for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
     )
     if model.planar:
-        q, v, f = _state_in_plane(q, v, f, azimuth)
+        q, v, f = state_in_plane(q, v, f, azimuth)
     if model.effects.uplift:
         load = 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
         q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, load)])
@@ -217,7 +185,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
     return q, v, f
 
 
-def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
+def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
     """An initial state in the frame of a planar model; raises InputError where it leaves the plane."""
     q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
     f = np.ascontiguousarray(rotated_pairs(f, azimuth))
@@ -232,8 +200,7 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
     Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
     from the interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
-    angles = np.vstack([at.base_angles, at.q[:, :3]])
-    q, v, f, force = at.q, at.v, at.f, at.force - rim_forces(scene.bearing, angles[None], at.rim_force[None])[0]
+    q, v, f, force = at.q, at.v, at.f, at.contact_force(scene.bearing)
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:

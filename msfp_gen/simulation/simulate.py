@@ -10,8 +10,7 @@ import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
-from operator import or_
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,14 +20,12 @@ from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.errors import RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined
 from msfp_gen.results.note import Note
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
 from msfp_gen.results.thinning import thinned_history
 from msfp_gen.scene.top import is_sprung
-from msfp_gen.simulation import failures
 from msfp_gen.simulation.checkpoint import (
     EVERY,
     Checkpoint,
@@ -38,10 +35,14 @@ from msfp_gen.simulation.checkpoint import (
     segment_file,
 )
 from msfp_gen.simulation.effect_switching import check, next_effects, stopping_monitors
+from msfp_gen.simulation.gradient_inputs import start_gradients
+from msfp_gen.simulation.gradients import gradient_notes, gradient_parameters, run_gradients, switching_error
 from msfp_gen.simulation.memory import outgrown, require_room
 from msfp_gen.simulation.notes import history_notes, landing_notes, notes_of
+from msfp_gen.simulation.outcome import extremes_of, message_of
+from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
-from msfp_gen.simulation.segment import RestartState, Segment, start_run
+from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.simulation.streamed_rows import StreamedRows
 from msfp_gen.version import __version__
@@ -49,6 +50,7 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
+    from msfp_gen.scene.parameters import Parameter
     from msfp_gen.scene.scene import Scene
     from msfp_gen.specification.layout import Effects
 
@@ -67,6 +69,7 @@ def simulate(
     resume: bool = False,
     strict: bool = False,
     stream: str | Path | None = None,
+    gradients: Sequence[str] = (),
 ) -> Result:
     """Integrate a scene.
 
@@ -89,6 +92,8 @@ def simulate(
     stream
         File (.nc) to which all rows are written, with the rest of the result, whether the run succeeds or not. They lie
         on disk while it runs, so that its memory does not grow with their number.
+    gradients
+        Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
 
     Returns
     -------
@@ -100,7 +105,8 @@ def simulate(
     ------
     InputError
         The method does not support the effects; the rows do not fit into memory, or on the disk; the checkpoint is
-        damaged, or of another scene or build; `stream` is no name of a result.
+        damaged, or of another scene or build; `stream` is no name of a result; a parameter does not exist, or the run
+        has no gradients.
     RunError
         The run failed: the message gives time, surface and cause, `.result` has the rows until then.
     OSError
@@ -110,8 +116,9 @@ def simulate(
     if checkpoint is not None and not resume:
         require_no_checkpoint(checkpoint)
     file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
-    require_room(scene, file)
-    sequence = replace(RunSequence.of(scene, strict), stream=file)
+    parameters = gradient_parameters(scene, gradients, checkpoint, stream)
+    require_room(scene, file, copies=1 + len(parameters))
+    sequence = replace(RunSequence.of(scene, strict), stream=file, parameters=parameters)
     while sequence.effects is not None:
         segments = sequence.segments
         saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
@@ -130,6 +137,7 @@ class RunSequence:
 
     given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
     None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
+    parameters: of the derivatives.
     """
 
     given: Scene
@@ -139,6 +147,7 @@ class RunSequence:
     segments: list[Segment]
     notes: list[Note]
     stream: Path | None = None
+    parameters: tuple[Parameter, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
@@ -152,7 +161,11 @@ class RunSequence:
         last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
-        return start_run(scene, model, selection, end, at, stopping_monitors(scene, model.effects, self.strict))
+        stops = stopping_monitors(scene, model.effects, self.strict)
+        run, azimuth = start_run(scene, model, selection, end, at, stops)
+        if self.parameters:
+            start_gradients(run, scene, model, self.parameters)
+        return run, azimuth
 
     def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
         """Run the next segment to its end, add its notes, and determine the effects of the segment after it."""
@@ -163,6 +176,8 @@ class RunSequence:
         known_kinds = {note.kind for note in self.notes if not note.action}
         notes = notes_of(segment, following)
         self.notes += [note for note in notes if note.action or note.kind not in known_kinds]
+        if self.parameters and following is not None:
+            raise switching_error(segment, notes)
         self.effects = following
 
     def result(self, with_initial_row: bool = False) -> Result:
@@ -179,7 +194,7 @@ class RunSequence:
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
-            raise RunError(_message(self.scene, last), status=last.status)
+            raise RunError(message_of(self.scene, last), status=last.status)
         histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
         return _result(self, joined(histories, self.given.output_step))
 
@@ -204,7 +219,7 @@ def _segment(sequence: RunSequence, progress: Progress | None, options: Checkpoi
     assert effects is not None
     check(scene, effects)
     start = time.perf_counter()
-    model = build_model(scene.bearing.layout, effects)
+    model = build_model(scene.bearing.layout, effects, gradients=bool(sequence.parameters))
     path, every, resume = options
     checkpoint = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
     stored = None if sequence.stream is None else RowFile.beside(path, sequence.stream.parent, model, resume)
@@ -213,7 +228,8 @@ def _segment(sequence: RunSequence, progress: Progress | None, options: Checkpoi
         checkpoint.restore(run, stored)
     ready = time.perf_counter()
     earlier = sum(segment.run.row_count for segment in sequence.segments)
-    status = _advance(run, scene, earlier, progress, checkpoint, stored) or run.status[0]
+    copies = 1 + len(sequence.parameters)
+    status = _advance(run, scene, earlier, copies, progress, checkpoint, stored) or run.status[0]
     wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
     return Segment(model, run, azimuth, status, wall, ready - start, stored)
 
@@ -222,20 +238,22 @@ def _advance(
     run: Run,
     scene: Scene,
     earlier: int,
+    copies: int,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
     stored: RowFile | None,
 ) -> str | None:
     """Take all steps; "interrupted" after Ctrl-C, "memory" where no more rows fit, else None.
 
-    earlier: number of rows of the segments before. stored: takes the rows of a run that streams them.
+    earlier: number of rows of the segments before. copies: numbers kept of each quantity. stored: takes the rows of a
+    run that streams them.
     """
     status, surfaces = None, scene.bearing.layout.surfaces
     try:
         while run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD):
             if stored is not None:
                 stored.take(run)
-            elif outgrown(earlier + run.row_count, surfaces):
+            elif outgrown(copies * (earlier + run.row_count), surfaces):
                 status = "memory"
                 break
             if checkpoint is not None:
@@ -248,24 +266,6 @@ def _advance(
     if checkpoint is not None and run.status[0] in ("ok", "stopped"):
         checkpoint.save(run, stored)
     return status
-
-
-def _message(scene: Scene, segment: Segment) -> str:
-    """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
-    stopped = segment.status == "guard"
-    cause = "; ".join(note.text for note in notes_of(segment, None)) if stopped else None
-    return failures.message(scene, segment.model, segment.run, segment.status, cause)
-
-
-def _extremes(segments: Sequence[Segment]) -> Extremes | None:
-    """Extremes of all segments in the frame of the user; None where none of them could start.
-
-    Of segments that took no step only the last counts, where no other did: see `Joint`.
-    """
-    started = [s for s in segments if s.run.row_count]
-    counted = [s for s in started if s.run.counts["steps"]] or started[-1:]
-    found = [Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in counted]
-    return reduce(or_, found) if found else None
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
@@ -289,10 +289,12 @@ def _result(sequence: RunSequence, history: History) -> Result:
         events=events,
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
-        message="" if last.status in ("ok", "stopped") else _message(scene, last),
+        message="" if last.status in ("ok", "stopped") else message_of(scene, last),
         provenance=provenance,
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
-        + landing_notes(events),
-        recorded_extremes=_extremes(segments),
+        + landing_notes(events)
+        + gradient_notes(sequence),
+        recorded_extremes=extremes_of(segments),
+        gradients=run_gradients(sequence, len(history.time)),
     )

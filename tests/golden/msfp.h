@@ -112,9 +112,10 @@ enum msfp_call_error {
     MSFP_CALL_ERRORS
 };
 
-/* Opaque handles, of the model whose table made them: a bearing with its top; a run. */
+/* Opaque handles, of the model whose table made them: a bearing with its top; a run; a bearing between two ends. */
 typedef struct msfp_bearing msfp_bearing;
 typedef struct msfp_run msfp_run;
+typedef struct msfp_port msfp_port;
 
 /* One entry of a list of numbers: its name, unit and meaning, where it begins and its shape (rank 0: one number). */
 typedef struct {
@@ -248,6 +249,18 @@ typedef struct {
     double *monitor_heat; /* [2][nb] as in msfp_scene */
 } msfp_run_state;
 
+/* Derivatives of everything that a run is given, [parameter] first: of gravity, of the values that bearing_new takes, of
+ * q, v [nb][nq], f [nb][2]; of the coefficients of motion and load, those with the index motion[i], load[i] of
+ * `motions`, `loads` [index][pieces][6][degree + 1], -1: zero. All arrays are given. steps [step_count]: ends of all
+ * steps [s], in place of the step control, for checks. Histories and steps must outlive the run. */
+typedef struct {
+    int count;
+    const double *gravity, *bodies, *surfaces, *top, *q, *v, *f, *motion, *load;
+    const double *motions, *loads;
+    const double *steps;
+    int step_count;
+} msfp_gradient_inputs;
+
 /* Receives rows [count][api->row_size] in the order of time; they are valid during the call. A value other than 0 ends
  * this call of run_advance early: the run itself may be continued. */
 typedef int (*msfp_row_callback)(void *user, const double *rows, size_t count);
@@ -347,6 +360,45 @@ typedef struct msfp_api {
     int (*snapshot_read)(msfp_run *run, const void *snapshot, size_t size);
     /* A run of no scene in the state of a snapshot, to read its state from; it takes no steps. */
     int (*snapshot_open)(const void *snapshot, size_t size, msfp_run **run);
+
+    /* ---- the two-port: a bearing between two ends that another program moves ---- */
+    /* End 0 holds the base, end 1 the far side of the interface: springs and dampers of the top on the top plate. Motion
+     * of the ends [2][3][6]: u_1..3 since the start [m] and rotation vector [rad], rates, accelerations. A wrench is force
+     * [N] and moment [N m] that an end exerts on the bearing, about the present position of that end. Spatial models with
+     * locked spin and rotation of the top have it.
+     * scene: bearing, state q, v, f, start_time and the solver; the rest is not read. axial_load: compression at rest [N].
+     * Returns a status; *port is NULL only after MSFP_E_ARGUMENT or MSFP_E_MEMORY. */
+    int (*port_new)(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
+    void (*port_free)(msfp_port *port);
+    /* Go from the committed state to `time` [s], at which the ends are at `ends`; on the way each number of a motion is the
+     * polynomial of degree five through both. It depends on nothing else. MSFP_E_ARGUMENT: `time` is not after that of the
+     * committed state, nor that time with its ends. The committed state remains whatever the status. */
+    int (*port_trial)(msfp_port *port, double time, const double *ends);
+    /* Of the last trial if it succeeded, else of the committed state: wrenches [2][6]; the row [row_size]. */
+    int (*port_wrench)(const msfp_port *port, double *wrench);
+    /* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends, its steps held.
+     * direction [3]: how displacements, rates and accelerations change together, (1, 0, 0) gives the tangent.
+     * MSFP_E_ARGUMENT: no trial over some time has succeeded, or the direction is zero. */
+    int (*port_derivative)(msfp_port *port, const double *direction, double *derivative);
+    int (*port_row)(const msfp_port *port, double *row);
+    void (*port_progress)(const msfp_port *port, msfp_progress *trial); /* how the last trial ended */
+    void (*port_counts)(const msfp_port *port, int64_t *counts);        /* [MSFP_COUNTS] of the last trial */
+    double (*port_time)(const msfp_port *port);                         /* of the committed state [s] */
+    void (*port_commit)(msfp_port *port);                               /* accept the last trial, if it succeeded */
+    void (*port_revert)(msfp_port *port);                               /* forget it */
+    /* The committed state as bytes without pointers, for a port of the same values and build. */
+    size_t (*port_snapshot_size)(const msfp_port *port);
+    void (*port_snapshot_write)(const msfp_port *port, void *snapshot);
+    int (*port_snapshot_read)(msfp_port *port, const void *snapshot, size_t size);
+
+    /* ---- derivatives of a run with respect to parameters (docs/gradients.md); NULL in models without them ---- */
+    /* Begin them, before the first step of a run that keeps its rows. Returns a status. */
+    int (*gradients_start)(msfp_run *run, const msfp_gradient_inputs *inputs);
+    /* Of the rows, [row][parameter][row_size]; of time, displacement and top force of events, [event][parameter][7]. */
+    const double *(*gradient_rows)(const msfp_run *run, size_t *count);
+    const double *(*gradient_events)(const msfp_run *run, size_t *count);
+    /* Of the extremes with respect to one parameter, [extremes_size]. */
+    void (*gradient_extremes)(const msfp_run *run, int parameter, double *out);
 } msfp_api;
 
 #ifdef __cplusplus

@@ -24,7 +24,8 @@ from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
-from msfp_gen.simulation.segment import RestartState, start_run
+from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.segment import start_run
 
 BEARING = presets.bearing("fenz-tfp")
 MASS, GRAVITY = 11e3, BEARING.gravity

@@ -5,7 +5,7 @@
  */
 #ifndef MSFP_API_H
 #define MSFP_API_H
-#include "run.h"
+#include "port.h"
 
 struct msfp_bearing {
     msfp_parameters parameters;
@@ -45,6 +45,9 @@ void msfp_api_run_free(msfp_run *run);
 int msfp_api_run_advance(msfp_run *run, long steps);
 void msfp_api_run_on_rows(msfp_run *run, msfp_row_callback callback, void *user);
 
+/* What the scene says of solver, rows and monitors. */
+msfp_options msfp_scene_options(const msfp_scene *scene);
+
 /* ---- progress.c: what a run states ---- */
 
 void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress);
@@ -57,5 +60,17 @@ const msfp_event *msfp_api_run_events(const msfp_run *run, size_t *count);
 const double *msfp_api_run_rows(const msfp_run *run, size_t *count);
 int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
 int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
+
+/* ---- two_port.c ---- */
+
+int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
+int msfp_api_port_trial(msfp_port *port, double time, const double *ends);
+int msfp_api_port_wrench(const msfp_port *port, double *wrench);
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
+int msfp_api_port_row(const msfp_port *port, double *row);
+void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
+void msfp_api_port_counts(const msfp_port *port, int64_t *counts);
+double msfp_api_port_time(const msfp_port *port);
+int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
 
 #endif

@@ -42,7 +42,7 @@ static void copy_monitors(msfp_options *o, const msfp_scene *s)
     memcpy(o->law_temperature, s->law_temperature, sizeof o->law_temperature);
 }
 
-static msfp_options options_of(const msfp_scene *s)
+msfp_options msfp_scene_options(const msfp_scene *s)
 {
     msfp_options o;
     memset(&o, 0, sizeof o);
@@ -84,7 +84,7 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
     if (!made)
         return MSFP_E_MEMORY;
     const msfp_history motion = history_of(&scene->motion), load = history_of(&scene->load);
-    const msfp_options options = options_of(scene);
+    const msfp_options options = msfp_scene_options(scene);
     const double *q = scene->q ? scene->q : zero, *v = scene->v ? scene->v : zero, *f = scene->f ? scene->f : zero;
 #if MSFP_TOP_ROTATION
     const msfp_history support = history_of(&scene->support);

@@ -79,6 +79,26 @@ static const msfp_api table = {
     .snapshot_write = msfp_snapshot_write,
     .snapshot_read = msfp_api_snapshot_read,
     .snapshot_open = msfp_api_snapshot_open,
+    .port_new = msfp_api_port_new,
+    .port_free = msfp_port_free,
+    .port_trial = msfp_api_port_trial,
+    .port_wrench = msfp_api_port_wrench,
+    .port_derivative = msfp_api_port_derivative,
+    .port_row = msfp_api_port_row,
+    .port_progress = msfp_api_port_progress,
+    .port_counts = msfp_api_port_counts,
+    .port_time = msfp_api_port_time,
+    .port_commit = msfp_port_commit,
+    .port_revert = msfp_port_revert,
+    .port_snapshot_size = msfp_port_snapshot_size,
+    .port_snapshot_write = msfp_port_snapshot_write,
+    .port_snapshot_read = msfp_api_port_snapshot_read,
+#if MSFP_GRADIENTS
+    .gradients_start = msfp_gradients_start,
+    .gradient_rows = msfp_gradient_rows,
+    .gradient_events = msfp_gradient_events,
+    .gradient_extremes = msfp_gradient_extremes,
+#endif
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

@@ -132,6 +132,8 @@ void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work 
 int msfp_top_is_sprung(const msfp_parameters *p);
 /* The mass that rests on it [kg]; 0 for that of a rig. */
 double msfp_sprung_mass(const msfp_parameters *p);
+/* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
+void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage);
 /* Compression of that spring and its rate [m], [m/s]; 0 without one. */
 void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2]);
 #if MSFP_TOP_ROTATION

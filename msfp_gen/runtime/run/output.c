@@ -105,7 +105,8 @@ void msfp_drop_rows(msfp_run *run)
 
 int msfp_write_now(msfp_run *run)
 {
-    if (run->row_count && run->rows[run->row_count - 1].time >= run->now.t)
+    const double t = run->now.t; /* closer times count as equal, as where an output time is the end of a segment */
+    if (run->row_count && run->rows[run->row_count - 1].time >= t - msfp_smallest_step(t))
         return MSFP_OK;
     return msfp_write_row(run, &run->now);
 }

@@ -96,6 +96,7 @@ static int valid_integers(const msfp_run *run)
     valid = valid && in_range(run->determinant, -1, 1) && in_range(run->work_sign, -1, 1);
     valid = valid && in_range(run->have_unknowns, 0, 1) && in_range(run->restart, 0, 1);
     valid = valid && in_range(run->retry_after_newton, 0, 1) && run->stability_limit_steps >= 0;
+    valid = valid && run->rows_before < SIZE_MAX / 2 && run->rows_taken <= run->rows_before + run->row_count;
     for (int i = 0; i < MSFP_DOF; ++i)
         valid = valid && in_range(run->pivots[i], 0, MSFP_DOF - 1);
     for (int i = 0; i < MSFP_COUNTS; ++i)

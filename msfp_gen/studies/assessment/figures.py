@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.figures.style import COLOURS, FAINT, INK, PALE, THIN, Scale, engineering, headline, page
+from msfp_gen.figures.style import COLOURS, FAINT, INK, PALE, THIN, Scale, engineering, headline, page, plain
 from msfp_gen.studies.assessment.rows import labelled
 
 if TYPE_CHECKING:
@@ -66,15 +66,14 @@ def plot_fragility(found: Fragility, path: str | Path | None = None, title: str 
         headline(figure, title or "fragility")
         axes = figure.subplots()
         for state, colour in zip(found.states, COLOURS * len(found.states), strict=False):
-            text = (
-                f"{state.threshold * scale.factor:.4g} {scale.unit}: θ = {state.median:.3g}, β = {state.dispersion:.2g}"
-            )
+            name = f"{state.case} {state.threshold * scale.factor:.4g} {scale.unit}".strip()
+            text = f"{plain(name)}: θ = {state.median:.3g}, β = {state.dispersion:.2g}"
             axes.plot(x, state.probability(x), color=colour, label=text)
             axes.fill_between(x, *state.band(x), color=colour, alpha=SHADE, linewidth=0)
             if state.runs_at.max() > 1:  # levels with several runs have a share
                 axes.plot(state.intensity, state.exceeded_at / state.runs_at, "o", color=colour, markersize=3.5)
         axes.set(
-            xlabel=labelled(found.measure, ""),
+            xlabel=labelled(found.measure, found.measure_unit),
             ylabel=f"probability that {labelled(found.demand, '')} exceeds",
             ylim=(0, 1),
         )

@@ -7,7 +7,7 @@ structural analysis", Earthquake Spectra 31 (2015), 579-599: stripes, IDA runs a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,7 @@ class DamageState:
         fit: the underlying fit, for curves and bands.
         samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2); None without it.
         level: of confidence.
+        case: value of the column `by`; "" without it.
     """
 
     threshold: float
@@ -59,6 +60,7 @@ class DamageState:
     fit: Fit
     samples: Array | None
     level: float
+    case: str = ""
 
     def probability(self, intensity: Array) -> Array:
         """Probability of exceedance, ndarray of the shape of `intensity`."""
@@ -88,7 +90,7 @@ class Fragility:
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
         names = [
-            "threshold", "median", "dispersion", "median_interval", "dispersion_interval", "runs", "exceeded",
+            "case", "threshold", "median", "dispersion", "median_interval", "dispersion_interval", "runs", "exceeded",
             "left_out", "level",
         ]  # fmt: skip
         states = [{name: asdict(state)[name] for name in names} for state in self.states]
@@ -112,6 +114,7 @@ def fragility(
     bootstrap: int = 0,
     cluster: str = "record",
     seed: int = 0,
+    by: str | None = None,
 ) -> Fragility:
     """Fragility curves by maximum likelihood, one for each threshold of the demand.
 
@@ -136,6 +139,8 @@ def fragility(
         Column whose values are drawn as a whole by the bootstrap: the runs of one record depend on each other.
     seed
         Of the bootstrap.
+    by
+        Column for each of whose values the curves are fitted apart, such as `bounds`.
 
     Raises
     ------
@@ -149,15 +154,26 @@ def fragility(
         raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
     if early not in EARLY:
         raise InputError(f"early = {early!r}: give one of {', '.join(map(repr, EARLY))}")
-    x, y, ended = intensities(rows, measure), demands(rows, demand), complete(rows)
-    groups = _groups(rows, cluster, bootstrap)
-    states = []
-    for threshold in sorted(thresholds):
-        exceeded, known = _exceedance(y, ended, threshold, early, demand)
-        drawn = None if groups is None else (groups[known], bootstrap, seed)
-        where = f"threshold {threshold:g} of {demand}"
-        states.append(_state(x[known], exceeded[known], threshold, int((~known).sum()), level, drawn, where))
+    states: list[DamageState] = []
+    for case, chosen in _cases(rows, by):
+        x, y, ended = intensities(chosen, measure), demands(chosen, demand), complete(chosen)
+        groups = _groups(chosen, cluster, bootstrap)
+        for threshold in sorted(thresholds):
+            exceeded, known = _exceedance(y, ended, threshold, early, demand)
+            drawn = None if groups is None else (groups[known], bootstrap, seed)
+            where = f"threshold {threshold:g} of {demand}" + (f", {by} = {case}" if by else "")
+            state = _state(x[known], exceeded[known], threshold, int((~known).sum()), level, drawn, where)
+            states.append(replace(state, case=case))
     return Fragility(measure, demand, unit_of(rows, measure), unit_of(rows, demand), tuple(states))
+
+
+def _cases(rows: Any, by: str | None) -> list[tuple[str, Any]]:
+    """Each value of a column, in the order in which they occur, and its rows; all rows without a column."""
+    if by is None:
+        return [("", rows)]
+    if by not in rows.columns:
+        raise unknown_column(by, list(rows.columns))
+    return [(str(value), rows[rows[by] == value]) for value in rows[by].unique()]
 
 
 def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
@@ -244,14 +260,19 @@ def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, 
 
 
 def fragility_frame(found: Fragility) -> Any:
-    """Points of the curves with their bands, as a DataFrame: threshold, intensity, probability, low, high."""
+    """Points of the curves with their bands, as a DataFrame: case, threshold, intensity, probability, low, high."""
     import pandas as pd
 
     frames = []
     for state in found.states:
         x = np.geomspace(state.intensity.min(), state.intensity.max(), POINTS)
         low, high = state.band(x)
-        columns = {"threshold": state.threshold, found.measure: x, "probability": state.probability(x)}
+        columns = {
+            "case": state.case,
+            "threshold": state.threshold,
+            found.measure: x,
+            "probability": state.probability(x),
+        }
         frames.append(pd.DataFrame({**columns, "low": low, "high": high}))
     return pd.concat(frames, ignore_index=True)
 
@@ -262,7 +283,7 @@ def fragility_table(found: Fragility) -> Table:
     columns = (f"{found.demand}{unit}", "median", "interval", "dispersion", "interval", "runs", "exceeded", "left out")
     rows = [
         (
-            f"{state.threshold:g}",
+            f"{state.case} {state.threshold:g}".strip(),
             f"{state.median:.4g}",
             "{:.4g} to {:.4g}".format(*state.median_interval),
             f"{state.dispersion:.3g}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -54,7 +54,9 @@ class Engine:
             except (MsfpError, MemoryError):
                 raise
             except Exception as error:
-                if not isinstance(error, BrokenExecutor) and not type(error).__module__.startswith("distributed"):
+                if not isinstance(error, BrokenExecutor | CancelledError) and not type(error).__module__.startswith(
+                    "distributed"
+                ):
                     raise
                 raise RunError(
                     f"workers died ({self.word}: {type(error).__name__}); check their memory, and run the same command "

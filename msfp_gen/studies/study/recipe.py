@@ -1,4 +1,7 @@
-"""What a worker needs to make the scene of a run: the base scene as a table, and what the axes change in it."""
+"""What a worker needs to make the scene of a run: the base scene as a table, and what the axes change in it.
+
+Only this module knows what the base of a study is; parts, engines and evaluations know rows.
+"""
 
 from __future__ import annotations
 

@@ -836,7 +836,7 @@ static inline void msfp_angular_balance_tangent(const double *restrict par, cons
 /* energy of a body in the frame moving with the base.
  * 19 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_body_energy(const double *restrict par /* body_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, double *restrict out)
+static inline void msfp_body_energy(const double *restrict par /* body_parameters */, const double *restrict b /* body */, const double *restrict base /* base_motion */, double *restrict out)
 {
     const double par_m = par[2];
     const double par_jt = par[3];
@@ -845,16 +845,16 @@ static inline void msfp_body_energy(const double *restrict par /* body_parameter
     const double b_vcx = b[16];
     const double b_vcz = b[17];
     const double b_rcz = b[19];
-    const double o_Ux = o[0];
-    const double o_Uz = o[1];
-    const double o_Bx = o[2];
-    const double o_Bz = o[3];
-    const double o_Oz = o[5];
-    const double vx_1 = b_vcx - o_Ux;
-    const double vz_2 = b_vcz - o_Uz;
+    const double base_Ux = base[0];
+    const double base_Uz = base[1];
+    const double base_Bx = base[2];
+    const double base_Bz = base[3];
+    const double base_Oz = base[5];
+    const double vx_1 = b_vcx - base_Ux;
+    const double vz_2 = b_vcz - base_Uz;
     const double out_3 = (1.0/2.0)*(b_wpy*b_wpy)*par_jt + (1.0/2.0)*par_m*((vx_1*vx_1) + (vz_2*vz_2));
-    const double out_4 = par_g*par_m*(b_rcz - o_Oz);
-    const double out_5 = -par_m*(o_Bx*vx_1 + o_Bz*vz_2);
+    const double out_4 = par_g*par_m*(b_rcz - base_Oz);
+    const double out_5 = -par_m*(base_Bx*vx_1 + base_Bz*vz_2);
     out[0] = out_3; /* kinetic */
     out[1] = out_4; /* potential */
     out[2] = out_5; /* power */
@@ -1063,7 +1063,7 @@ static inline void msfp_foot(const double *restrict par /* top_parameters */, co
 /* energy of the supported mass in the frame moving with the base.
  * 28 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, const double *restrict f /* foot */, double *restrict out)
+static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict base /* base_motion */, const double *restrict f /* foot */, double *restrict out)
 {
     const double par_m = par[4];
     const double par_jt = par[5];
@@ -1074,11 +1074,11 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double b_wy = b[4];
     const double b_wpy = b[5];
     const double b_Vx = b[10];
-    const double o_Ux = o[0];
-    const double o_Uz = o[1];
-    const double o_Bx = o[2];
-    const double o_Bz = o[3];
-    const double o_Oz = o[5];
+    const double base_Ux = base[0];
+    const double base_Uz = base[1];
+    const double base_Bx = base[2];
+    const double base_Bz = base[3];
+    const double base_Oz = base[5];
     const double f_y = f[0];
     const double f_y1 = f[1];
     const double dtx_1 = b_t3z*b_wy;
@@ -1086,11 +1086,11 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double rate_3 = b_Vx + dtx_1*par_h;
     const double rate_4 = dtz_2*par_h + f_y1;
     const double rz_6 = b_t3z*par_h + f_y;
-    const double vx_11 = -o_Ux + rate_3;
-    const double vz_12 = -o_Uz + rate_4;
+    const double vx_11 = -base_Ux + rate_3;
+    const double vz_12 = -base_Uz + rate_4;
     const double out_13 = (1.0/2.0)*(b_wpy*b_wpy)*par_jt + (1.0/2.0)*par_m*((vx_11*vx_11) + (vz_12*vz_12));
-    const double out_14 = par_g*par_m*(-o_Oz + rz_6);
-    const double out_15 = -par_m*(o_Bx*vx_11 + o_Bz*vz_12);
+    const double out_14 = par_g*par_m*(-base_Oz + rz_6);
+    const double out_15 = -par_m*(base_Bx*vx_11 + base_Bz*vz_12);
     out[0] = out_13; /* kinetic */
     out[1] = out_14; /* potential */
     out[2] = out_15; /* power */

@@ -1937,7 +1937,7 @@ static inline void msfp_angular_balance_tangent(const double *restrict par, cons
 /* energy of a body in the frame moving with the base.
  * 38 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_body_energy(const double *restrict par /* body_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, double *restrict out)
+static inline void msfp_body_energy(const double *restrict par /* body_parameters */, const double *restrict b /* body */, const double *restrict base /* base_motion */, double *restrict out)
 {
     const double par_m = par[2];
     const double par_jt = par[3];
@@ -1953,20 +1953,20 @@ static inline void msfp_body_energy(const double *restrict par /* body_parameter
     const double b_vcy = b[34];
     const double b_vcz = b[35];
     const double b_rcz = b[38];
-    const double o_Ux = o[0];
-    const double o_Uy = o[1];
-    const double o_Uz = o[2];
-    const double o_Bx = o[3];
-    const double o_By = o[4];
-    const double o_Bz = o[5];
-    const double o_Oz = o[8];
-    const double vx_1 = b_vcx - o_Ux;
-    const double vy_2 = b_vcy - o_Uy;
-    const double vz_3 = b_vcz - o_Uz;
+    const double base_Ux = base[0];
+    const double base_Uy = base[1];
+    const double base_Uz = base[2];
+    const double base_Bx = base[3];
+    const double base_By = base[4];
+    const double base_Bz = base[5];
+    const double base_Oz = base[8];
+    const double vx_1 = b_vcx - base_Ux;
+    const double vy_2 = b_vcy - base_Uy;
+    const double vz_3 = b_vcz - base_Uz;
     const double s_4 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
     const double out_5 = (1.0/2.0)*par_jt*((b_wpx*b_wpx) + (b_wpy*b_wpy) + (b_wpz*b_wpz)) + (1.0/2.0)*par_m*((vx_1*vx_1) + (vy_2*vy_2) + (vz_3*vz_3)) + (1.0/2.0)*(s_4*s_4)*(par_ja - par_jt);
-    const double out_6 = par_g*par_m*(b_rcz - o_Oz);
-    const double out_7 = -par_m*(o_Bx*vx_1 + o_By*vy_2 + o_Bz*vz_3);
+    const double out_6 = par_g*par_m*(b_rcz - base_Oz);
+    const double out_7 = -par_m*(base_Bx*vx_1 + base_By*vy_2 + base_Bz*vz_3);
     out[0] = out_5; /* kinetic */
     out[1] = out_6; /* potential */
     out[2] = out_7; /* power */
@@ -2303,7 +2303,7 @@ static inline void msfp_foot(const double *restrict par /* top_parameters */, co
 /* energy of the supported mass in the frame moving with the base.
  * 55 operations; out: energy. */
 MSFP_INLINED
-static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict o /* base_motion */, const double *restrict f /* foot */, double *restrict out)
+static inline void msfp_top_energy(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict base /* base_motion */, const double *restrict f /* foot */, double *restrict out)
 {
     const double par_m = par[4];
     const double par_jt = par[5];
@@ -2321,13 +2321,13 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double b_wpz = b[14];
     const double b_Vx = b[24];
     const double b_Vy = b[25];
-    const double o_Ux = o[0];
-    const double o_Uy = o[1];
-    const double o_Uz = o[2];
-    const double o_Bx = o[3];
-    const double o_By = o[4];
-    const double o_Bz = o[5];
-    const double o_Oz = o[8];
+    const double base_Ux = base[0];
+    const double base_Uy = base[1];
+    const double base_Uz = base[2];
+    const double base_Bx = base[3];
+    const double base_By = base[4];
+    const double base_Bz = base[5];
+    const double base_Oz = base[8];
     const double f_y = f[0];
     const double f_y1 = f[1];
     const double dtx_1 = -b_t3y*b_wz + b_t3z*b_wy;
@@ -2337,13 +2337,13 @@ static inline void msfp_top_energy(const double *restrict par /* top_parameters 
     const double rate_5 = b_Vy + dty_2*par_h;
     const double rate_6 = dtz_3*par_h + f_y1;
     const double rz_9 = b_t3z*par_h + f_y;
-    const double vx_16 = -o_Ux + rate_4;
-    const double vy_17 = -o_Uy + rate_5;
-    const double vz_18 = -o_Uz + rate_6;
+    const double vx_16 = -base_Ux + rate_4;
+    const double vy_17 = -base_Uy + rate_5;
+    const double vz_18 = -base_Uz + rate_6;
     const double s_19 = b_t3x*b_wpx + b_t3y*b_wpy + b_t3z*b_wpz;
     const double out_20 = (1.0/2.0)*par_jt*((b_wpx*b_wpx) + (b_wpy*b_wpy) + (b_wpz*b_wpz)) + (1.0/2.0)*par_m*((vx_16*vx_16) + (vy_17*vy_17) + (vz_18*vz_18)) + (1.0/2.0)*(s_19*s_19)*(par_ja - par_jt);
-    const double out_21 = par_g*par_m*(-o_Oz + rz_9);
-    const double out_22 = -par_m*(o_Bx*vx_16 + o_By*vy_17 + o_Bz*vz_18);
+    const double out_21 = par_g*par_m*(-base_Oz + rz_9);
+    const double out_22 = -par_m*(base_Bx*vx_16 + base_By*vy_17 + base_Bz*vz_18);
     out[0] = out_20; /* kinetic */
     out[1] = out_21; /* potential */
     out[2] = out_22; /* power */

@@ -39,6 +39,7 @@
 #define MSFP_SIGNS { 1, 1, -1, -1 }
 /* Which of the coordinates are unknown: psi, theta, phi (0, 1, 2), then the separation (3, 4, 5). */
 #define MSFP_FREE { 0, 1 }
+#define MSFP_GRADIENTS 0 /* derivatives of a run with respect to parameters */
 
 /* dimensions */
 enum {

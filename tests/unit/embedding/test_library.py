@@ -275,7 +275,12 @@ def test_the_headers_serve_cpp(prefix: Path, tmp_path: Path) -> None:
 
 # ---- the Fortran module has what the header has --------------------------------------------------------------------
 
-KINDS = {"int": "integer(c_int)", "double": "real(c_double)", "msfp_piecewise": "type(msfp_piecewise)"}
+KINDS = {
+    "int": "integer(c_int)",
+    "size_t": "integer(c_size_t)",
+    "double": "real(c_double)",
+    "msfp_piecewise": "type(msfp_piecewise)",
+}
 
 
 def structs_of_c(text: str) -> dict[str, list[tuple[str, str]]]:
@@ -313,7 +318,7 @@ def test_the_fortran_module_has_the_types_of_the_header(prefix: Path) -> None:
     header = (prefix / "include/msfp.h").read_text(encoding="utf-8")
     module = (prefix / "share/msfp/msfp.f90").read_text(encoding="utf-8")
     c, fortran = structs_of_c(header), structs_of_fortran(module)
-    assert set(c) == set(fortran) and len(c) == 11
+    assert set(c) == set(fortran) and len(c) == 12
     for name, members in c.items():
         assert fortran[name] == members, name
     constants = dict(re.findall(r"parameter :: (MSFP_\w+) = (\d+)", module))

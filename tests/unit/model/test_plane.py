@@ -9,8 +9,8 @@ import pytest
 from reference import kinematics
 from support import scene_of
 
-from msfp_gen import Auto, Load, Motion, Scene, simulate
-from msfp_gen.model.plane import tilts_out_of_plane
+from msfp_gen import Auto, InputError, Load, Motion, Scene, simulate
+from msfp_gen.model.plane import tilts_into_plane, tilts_out_of_plane
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 0.7, -1.1, np.pi / 2])
@@ -32,6 +32,17 @@ def test_a_stack_that_leaves_its_plane_keeps_axes_rates_and_directions(azimuth: 
             pair = spatial.t[k][:2] @ turn @ flat.t[k][0]
             expected = np.cos(azimuth - twist[k - 1]), np.sin(azimuth - twist[k - 1])
             np.testing.assert_allclose(pair, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("azimuth", [-4e-16, np.pi / 2 + 2e-16])
+def test_an_azimuth_that_is_rounding_is_no_oblique_plane(azimuth: float) -> None:
+    """A motion that was turned into E1 has one; with a displaced start it was refused."""
+    q = np.zeros((4, 3))
+    q[:, 1 if azimuth < 1 else 0] = 0.01
+    tilt = tilts_into_plane(q, azimuth, "q")
+    assert np.abs(tilt[:, 1]).tolist() == [0.01] * 4 and not tilt[:, [0, 2]].any()
+    with pytest.raises(InputError, match="plane only"):
+        tilts_into_plane(q, 0.1, "q")
 
 
 def test_a_run_that_leaves_an_oblique_plane_does_not_shake() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -104,6 +105,13 @@ def test_the_first_row_is_of_the_model_that_goes_on() -> None:
     out_of_balance = light.model.unpack(light.run.rows)["angles"][0]
     assert np.abs(out_of_balance - alone.history.contact_angles[0]).max() > 1e-3
     np.testing.assert_array_equal(result.extremes.most_normal, alone.extremes.most_normal)
+
+
+def test_the_times_of_a_run_are_no_longer_than_it_took() -> None:
+    begin = time.perf_counter()
+    result = simulate(replace(load_scene("fenz-test2"), duration=5.0))
+    took = time.perf_counter() - begin
+    assert 0.0 < result.counters.wall_time < took and 0.0 <= float(result.provenance["build_seconds"]) < took
 
 
 def rows_of(history: History, rows: slice) -> History:

@@ -153,9 +153,20 @@ def test_several_damage_states_are_sorted_and_written_with_their_bands() -> None
     assert [state.threshold for state in found.states] == [0.8, 1.2]
     assert found.states[0].median < found.states[1].median
     frame = fragility_frame(found)
-    assert set(frame.columns) == {"threshold", "scale", "probability", "low", "high"}
+    assert set(frame.columns) == {"case", "threshold", "scale", "probability", "low", "high"}
     assert (frame.low < frame.probability).all() and (frame.probability < frame.high).all()
     json.dumps(found.as_dict(), allow_nan=False)
+
+
+def test_cases_are_fitted_apart() -> None:
+    weak, strong = lognormal_rows(0.8, 0.4, 60, seed=5), lognormal_rows(1.4, 0.3, 60, seed=6)
+    rows = pd.concat([weak.assign(record="weak"), strong.assign(record="strong")], ignore_index=True)
+    found = fragility(rows, "scale", "demand", [1.0], by="record").states
+    alone = [fragility(each, "scale", "demand", [1.0]).states[0] for each in (weak, strong)]
+    assert [state.case for state in found] == ["weak", "strong"]
+    assert [state.median for state in found] == [state.median for state in alone]
+    with pytest.raises(InputError, match="bounds: no column"):
+        fragility(rows, "scale", "demand", [1.0], by="bounds")
 
 
 X = np.tile(LEVELS, 4)

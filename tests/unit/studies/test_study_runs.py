@@ -6,7 +6,7 @@ import math
 import os
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +193,23 @@ def test_any_executor_serves(tmp_path: Path) -> None:
     assert threads
     with pytest.raises(InputError, match="executor and threads: give one engine"):
         msfp_gen.study(cheap_study(), tmp_path / "b", executor=executor, threads=True)
+
+
+@pytest.mark.parametrize("error", [BrokenExecutor("a process died"), None], ids=["broken", "cancelled"])
+def test_workers_that_die_are_one_line(error: Exception | None, tmp_path: Path) -> None:
+    class Dying(ThreadPoolExecutor):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            future: Future[Any] = Future()
+            if error is None:
+                future.cancel()
+                future.set_running_or_notify_cancel()
+            else:
+                future.set_exception(error)
+            return future
+
+    with pytest.raises(RunError, match=r"workers died .Dying: .*; check their memory, and run the same command again"):
+        msfp_gen.study(cheap_study(), tmp_path, executor=Dying(1))
+    assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 0, 12, 0)
 
 
 def test_few_calls_wait_at_a_time(tmp_path: Path) -> None:
