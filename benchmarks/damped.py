@@ -1,7 +1,9 @@
 """Work and precision with and without contact damping, side by side: a table and a figure of docs/accuracy.md.
 
 Both implicit methods run every scene of that page as given and with a contact damping of 0.1 ms, the default of a
-surface, and SciPy's Radau, which shares no formula with them, confirms the references: `python benchmarks/damped.py [FOLDER]`. FOLDER: where figures/accuracy-damping.png is written; default: docs.
+surface, and SciPy's Radau, which shares no formula with them, confirms the references. The cost is in Newton iterations,
+which do not depend on the machine: `python benchmarks/damped.py [FOLDER]`. FOLDER: where figures/accuracy-damping.png is
+written; default: docs.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from accuracy import CASES, TOLERANCES, Case, markdown_table, percent, say, seconds
+from accuracy import CASES, TOLERANCES, Case, markdown_table, percent, say
 from drawing import COLOURS, FAINT, drawn
 
 from msfp_gen import Scene
@@ -47,14 +49,14 @@ def row(case: Case, damping: float, study: Study) -> tuple[str, ...]:
     assert floor is not None
     default = next(point for point in study.of("implicit") if point.trial.rtol == DEFAULT)
     within = [point for point in study.of("implicit") if _error(point) <= TARGET]
-    fastest = min(within, key=lambda point: point.trial.seconds, default=None)
-    cost = "-" if fastest is None else f"{seconds(fastest.trial.seconds)} at {fastest.trial.rtol:g}"
+    fastest = min(within, key=lambda point: point.trial.newton, default=None)
+    cost = "-" if fastest is None else f"{fastest.trial.newton} at {fastest.trial.rtol:g}"
     return (
         case.scene,
         f"{1e3 * damping:g}",
         percent(floor.worst_rms),
         confirmed(study),
-        f"{percent(_error(default))}, {seconds(default.trial.seconds)}",
+        f"{percent(_error(default))}, {default.trial.newton}",
         cost,
     )
 
@@ -64,7 +66,7 @@ def _error(point: Point) -> float:
 
 
 def draw(pairs: list[tuple[Case, Study, Study]], path: Path) -> None:
-    """Error over time of both methods, without damping in grey and with it in colour; a panel for each scene."""
+    """Error over cost of both methods, without damping in grey and with it in colour; a panel for each scene."""
     columns = (len(pairs) + 1) // 2
     with drawn(path, 13.0, 6.5) as figure:
         panels = figure.subplots(2, columns, sharey=True, squeeze=False)
@@ -72,10 +74,10 @@ def draw(pairs: list[tuple[Case, Study, Study]], path: Path) -> None:
             for study, name, shade in ((undamped, "undamped", FAINT), (damped, "T = 0.1 ms", None)):
                 for colour, (method, marker) in zip(COLOURS, MARKERS.items(), strict=False):
                     points = [p for p in study.of(method) if p.errors is not None]
-                    x, y = zip(*((1e3 * p.trial.seconds, 100 * _error(p)) for p in points), strict=True)
+                    x, y = zip(*((p.trial.newton, 100 * _error(p)) for p in points), strict=True)
                     panel.loglog(x, y, f"{marker}-", color=shade or colour, label=f"{method}, {name}", markersize=4)
             panel.set_title(case.scene)
-            panel.set_xlabel("time of a run [ms]")
+            panel.set_xlabel("Newton iterations of a run")
         for panel in panels[:, 0]:
             panel.set_ylabel("larger RMS error [%]")
         panels.flat[0].legend(fontsize="small")
@@ -86,7 +88,14 @@ def main(words: list[str]) -> None:
     folder = Path(words[0]) if words else Path(__file__).resolve().parent.parent / "docs"
     pairs = [(case, studied(case, 0.0), studied(case, DAMPING)) for case in CASES]
     lines = [row(case, d, s) for case, *both in pairs for d, s in zip((0.0, DAMPING), both, strict=True)]
-    head = ("scene", "T [ms]", "implicit and esdirk4", "Radau", "error and time at 1e-3", "within 0.1 %")
+    head = (
+        "scene",
+        "T [ms]",
+        "implicit and esdirk4",
+        "Radau",
+        "error and iterations at 1e-3",
+        "iterations within 0.1 %",
+    )
     print(markdown_table(head, lines))
     draw(pairs, folder / "figures" / "accuracy-damping.png")
 
