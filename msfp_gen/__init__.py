@@ -12,6 +12,7 @@ from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import characterise
+    from msfp_gen.coupling.two_port import TwoPort
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
     from msfp_gen.model.model import build_model
     from msfp_gen.motions.motion import Motion
@@ -50,6 +51,7 @@ _MODULES = {
     "Stop": "scene.parts",
     "Surface": "scene.bearing",
     "Top": "scene.top",
+    "TwoPort": "coupling.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "scene.file.loader",
@@ -80,6 +82,7 @@ __all__ = [
     "Stop",
     "Surface",
     "Top",
+    "TwoPort",
     "__version__",
     "bound",
     "build_model",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 GUIDE = ("README.md", "Makefile", "example.c")
 STAMP = "written by msfp-gen"  # in the first line of each: a file without it belongs to the user
 # Headers of the runtime that only its own sources include.
-PRIVATE = ("equations.h", "steppers.h", "run.h")
+PRIVATE = ("equations.h", "steppers.h", "run.h", "port.h")
 PUBLIC = ("msfp_model.h", "msfp_kernels.h", "msfp_runtime.h")
 PYTHON_ONLY = ("msfp_module.c", "example.c")  # C files that are no part of the library
 HIDDEN = "-fvisibility=hidden"  # for the Python module; a library for C shows its functions

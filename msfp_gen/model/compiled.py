@@ -1,4 +1,4 @@
-"""Types of the classes `Stack` and `Run` of a compiled module (`templates/msfp_module.pyx.jinja`)."""
+"""Types of the classes `Stack`, `Run` and `Port` of a compiled module (`templates/msfp_module.pyx.jinja`)."""
 
 from __future__ import annotations
 
@@ -105,3 +105,45 @@ class Run(Protocol):
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
+
+
+class Port(Protocol):
+    """A compiled two-port: a committed state and a trial. Arrays are contiguous float64 in SI units."""
+
+    @property
+    def time(self) -> float:
+        """Time of the committed state [s]."""
+
+    @property
+    def status(self) -> tuple[str, int, float, float]:
+        """Name, surface (from 1, 0: none), value and time reached [s], of the last trial."""
+
+    @property
+    def wrench(self) -> Array:
+        """Wrenches of the ends on the bearing, shape (2, 6), of the last trial or else of the committed state."""
+
+    @property
+    def row(self) -> Array:
+        """The row of that state."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters of the last trial."""
+
+    def trial(self, time: float, ends: Array) -> tuple[str, int, float, float]:
+        """Go from the committed state to `time`, with the ends at `ends`, shape (2, 3, 6); returns `status`."""
+
+    def derivative(self, order: int) -> tuple[str, Array]:
+        """Status, and derivatives of the wrenches with respect to values, rates or accelerations of the ends."""
+
+    def commit(self) -> None:
+        """Accept the last trial."""
+
+    def revert(self) -> None:
+        """Return to the committed state."""
+
+    def snapshot(self) -> bytes:
+        """The committed state."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Return to the state of a snapshot. Raises ValueError."""

@@ -10,8 +10,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
 from dataclasses import replace as dataclass_replace
+from importlib import import_module
 from math import asin, pi
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_ty
 from msfp_gen.errors import InputError
 from msfp_gen.scene.pivot_friction import friction_from_pivot
 from msfp_gen.specification.layout import Layout
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.top import NodeTop
 
 _LENGTH = Quantity("m", above=0.0)
 _OFFSET = Quantity("m", least=0.0)
@@ -225,6 +229,11 @@ class Bearing:
         radii, friction = zip(*((surface.radius, surface.friction) for surface in changed.surfaces), strict=True)
         heights = (changed.base_height, *(body.height for body in changed.bodies))
         return changed.replace(friction=friction_from_pivot(changed.layout, radii, heights, friction))
+
+    def two_port(self, interface: NodeTop, axial_load: float | None = None, **parts: Any) -> Any:
+        """The bearing between two moving ends: `TwoPort(self, interface, axial_load, **parts)`, with its errors."""
+        # What this shortcut makes lies above this package, so it is found by its public name when it is called.
+        return import_module("msfp_gen").TwoPort(self, interface, axial_load, **parts)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """All values as float64 arrays.

@@ -15,7 +15,7 @@ from msfp_gen.scene.friction_parameters import check_bearing
 from msfp_gen.scene.parts import InitialState, SceneParts, Stop
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.top import Top
+from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification.friction_laws import HEAT_TIMES
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
@@ -38,6 +38,8 @@ class Scene(SceneParts):
         for name, kind in _PART_TYPES.items():
             require_type(getattr(self, name), kind, f"scene.{name}")
         check_fields(self, "scene")
+        if isinstance(self.top, NodeTop):
+            raise InputError("top = Top.node(...): another program moves it; give it to TwoPort, or give Top.rig(...)")
         self._check_times()
         self._check_sizes()
         word, law = self.law

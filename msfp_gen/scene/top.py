@@ -1,4 +1,4 @@
-"""The structure on the top plate: a rig, a prescribed load or a supported mass."""
+"""The structure on the top plate: a rig, a prescribed load, a supported mass, or a node of another program."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _VERTICAL_DAMPING = Quantity("N s/m", least=0.0)
 
 @dataclass(frozen=True)
 class Top:
-    """Base class of the three kinds of top, which `Top.rig`, `Top.prescribed` and `Top.mass` make.
+    """Base class of the kinds of top, which `Top.rig`, `Top.prescribed`, `Top.mass` and `Top.node` make.
 
-    kind: "rig", "prescribed" or "mass", as in scene files.
+    kind: "rig", "prescribed" or "mass", as in scene files; "node" of a `TwoPort`.
     """
 
     kind: ClassVar[str] = ""
@@ -64,6 +64,19 @@ class Top:
         """A rigid supported mass; see `MassTop`."""
         restraint = (rotational_stiffness, rotational_damping)
         return MassTop(mass, inertia, height, *restraint, vertical_stiffness, vertical_damping)
+
+    @staticmethod
+    def node(
+        stiffness: float,
+        vertical_stiffness: float,
+        rotational_stiffness: float,
+        damping: float = 0.0,
+        vertical_damping: float = 0.0,
+        rotational_damping: float = 0.0,
+    ) -> NodeTop:
+        """The interface to a node that another program moves; see `NodeTop`."""
+        stiffnesses = (stiffness, vertical_stiffness, rotational_stiffness)
+        return NodeTop(*stiffnesses, damping, vertical_damping, rotational_damping)
 
 
 @dataclass(frozen=True)
@@ -124,6 +137,24 @@ class MassTop(Top):
                 f"top.vertical_damping = {self.vertical_damping!r}: a damper alone carries no weight; give "
                 "top.vertical_stiffness as well"
             )
+
+
+@dataclass(frozen=True)
+class NodeTop(Top):
+    """The interface of a `TwoPort`: springs and dampers between the top plate and a node that another program moves.
+
+    stiffness, damping: along E1 and E2 [N/m], [N s/m]; vertical_stiffness, vertical_damping: along E3, of steel, liner
+    and column head; rotational_stiffness, rotational_damping: against tilt relative to the node [N m/rad],
+    [N m s/rad]. The springs keep their directions while the node rotates. Raises InputError.
+    """
+
+    kind: ClassVar[str] = "node"
+    stiffness: Annotated[float, Quantity("N/m", above=0.0)]
+    vertical_stiffness: Annotated[float, Quantity("N/m", above=0.0)]
+    rotational_stiffness: Annotated[float, Quantity("N m/rad", above=0.0)]
+    damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
+    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
+    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
 
 
 def is_sprung(top: Top) -> bool:

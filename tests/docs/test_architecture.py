@@ -18,8 +18,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "results", "analysis", "figures", "result", "simulation", "studies", "report", "", "cli",
-    "__main__",
+    "scene", "model", "coupling", "results", "analysis", "figures", "result", "simulation", "studies", "report", "",
+    "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.
@@ -189,7 +189,7 @@ def test_every_package_is_on_the_map():
 
 
 # The folders of the runtime, lowest first, and the headers that each may include beside its own.
-LAYERS = ("equations", "steppers", "run")
+LAYERS = ("equations", "steppers", "run", "port")
 RUNTIME = ROOT / "msfp_gen" / "runtime"
 GENERATED = {"msfp_model.h", "msfp_kernels.h"}
 SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
@@ -197,7 +197,7 @@ SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_runtime_includes_one_way(path):
-    """run -> steppers -> equations -> generated headers; the public header includes nothing of ours."""
+    """port -> run -> steppers -> equations -> generated headers; the public header includes nothing of ours."""
     included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
     if path.parent == RUNTIME:
         assert not included
@@ -215,7 +215,7 @@ def test_names_of_runtime_files_are_unique():
 
 def test_headers_of_the_runtime_define_only_prefixed_macros():
     headers = [*RUNTIME.rglob("*.h"), *(ROOT / "templates").glob("*.h.jinja")]
-    assert len(headers) == 7
+    assert len(headers) == 8
     for path in headers:
         macros = re.findall(r"^\s*#\s*define\s+(\w+)", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
         assert macros and not [m for m in macros if not m.lower().startswith("msfp_")], path.name

@@ -1,0 +1,54 @@
+"""`Response`: what a trial of a two-port gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+from msfp_gen.common.arrays import Array
+
+
+class Differentiable(Protocol):
+    """What computes the derivatives of its latest trial."""
+
+    def derivative(self, number: int, order: int) -> Array:
+        """Derivatives of the wrenches of trial `number` with respect to values, rates or accelerations of the ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Wrenches of a two-port at the end of a trial; rows are the lower and the upper end.
+
+    time: of the end of the trial [s]. wrench: force along E1, E2, E3 and moment about the present position of the end,
+    which each end exerts on the bearing: ndarray, shape (2, 6), [N], [N m]. sliding: sliding displacements (3.20),
+    normal_force, shape (n-1,) [m], [N]. dissipated: energy dissipated in the bearing since the start [J].
+    """
+
+    time: float
+    wrench: Array
+    sliding: Array
+    normal_force: Array
+    dissipated: float
+    _port: Differentiable
+    _number: int
+
+    @cached_property
+    def tangent(self) -> Array:
+        """Derivatives of the 12 numbers of `wrench` with respect to displacements and rotation vectors of both ends.
+
+        ndarray, shape (12, 12), [N/m], [N/rad], [N m/m], [N m/rad], at given rates and accelerations of the ends; it
+        is consistent with the steps of the trial. Like `damping` and `inertia` it is computed when it is first read, as
+        long as the trial is the latest one, before `commit` and `revert`. Raises InputError afterwards, RunError.
+        """
+        return self._port.derivative(self._number, 0)
+
+    @cached_property
+    def damping(self) -> Array:
+        """Derivatives of `wrench` with respect to the rates of both ends, shape (12, 12), as `tangent`."""
+        return self._port.derivative(self._number, 1)
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Derivatives of `wrench` with respect to the accelerations of both ends, shape (12, 12), as `tangent`."""
+        return self._port.derivative(self._number, 2)

@@ -1,0 +1,255 @@
+"""`TwoPort`: a bearing both ends of which move as another program says (docs/embedding.md)."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import require_type
+from msfp_gen.coupling.response import Response
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.model.marshalling import bodies_and_surfaces, separations_at_rest, top_values, vector
+from msfp_gen.model.model import Model, build_model
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Rotation
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import NodeTop, RigTop
+from msfp_gen.specification.contract import STATUSES, WORKS, names
+from msfp_gen.specification.layout import Effects
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Port
+
+MAGIC = b"msfp-gen two-port 1\n"
+LARGEST_ROTATION = 1.5  # of an end [rad]: a run ends at this tilt, next to the singularity of the Euler angles
+SHORTEST = 1e-8  # time of a trial [s], or its share of the time: a shorter one holds no step
+REST = (np.array([0.0, 1.0]), np.zeros((1, 6, 6)))  # knots and coefficients of a base at rest
+_FAILURES = {status.name: status for status in STATUSES}
+_DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
+
+
+class TwoPort:
+    """A bearing between two moving ends: motions in, wrenches out.
+
+    The lower end holds the base. The upper end holds the far side of the interface, the springs and dampers of
+    `Top.node` on the top plate; it is at r_nn at the start. `trial` integrates the bearing from the committed state,
+    with steps of its own; `commit` accepts the trial. The wrenches are a function of committed state and trial alone,
+    bit by bit. One two-port is for one thread at a time.
+
+    Parameters
+    ----------
+    bearing
+        The bearing; it starts centred and at rest, at time 0.
+    interface
+        `Top.node(...)`: stiffness and damping between top plate and upper end.
+    axial_load
+        Compression of the bearing while both ends are where they start [N]: the weight that it carries in the
+        structure at rest. None: no load, which only a model with uplift permits.
+    effects
+        `Effects` of the model, spatial with locked spin; `top_rotation` is added. None: the default ones, with the
+        friction law whose parameters the surfaces have.
+    solver
+        Tolerances and steps; a method of implicit kind. `first_step` is that after the start, `max_steps` the limit of
+        one trial.
+
+    Raises
+    ------
+    InputError
+        Parts of the wrong type, or inconsistent ones.
+    CompileError
+        If the model cannot be built.
+    RunError
+        If the bearing at rest has no state of equilibrium.
+
+    """
+
+    def __init__(
+        self,
+        bearing: Bearing,
+        interface: NodeTop,
+        axial_load: float | None = None,
+        effects: Effects | None = None,
+        solver: Solver | None = None,
+    ) -> None:
+        require_type(bearing, Bearing, "bearing")
+        require_type(interface, NodeTop, "interface")
+        self.bearing, self.interface = bearing, interface
+        scene = _scene_at_rest(bearing, interface, axial_load, effects, Solver() if solver is None else solver)
+        self.axial_load = 0.0 if axial_load is None else axial_load
+        self.model: Model = build_model(bearing.layout, scene.modelled)
+        self._port: Port = _compiled(scene, self.model, self.axial_load)
+        self._identity = _identity(scene, self.model, self.axial_load)
+        self._ends = np.zeros((2, 3, 6))
+        self._trial: tuple[float, Array] | None = None
+        self._number = 0  # of the latest trial
+        self._check(self._port.status, 0.0)
+
+    @property
+    def time(self) -> float:
+        """Time of the committed state [s]."""
+        return self._port.time
+
+    def trial(self, time: float, lower: ArrayLike, upper: ArrayLike) -> Response:
+        """Integrate from the committed state to `time`, and state the wrenches there.
+
+        time [s]: later than the committed time, or that time with the committed motion of the ends. lower, upper:
+        motion of the ends at that time, each of shape (3, 6): displacements along E1, E2, E3 since the start [m] and
+        rotation vector [rad]; their rates; their accelerations. Between the two times each of the six numbers (of the
+        rotation: the angles psi, theta, phi (2.1)) follows the polynomial of degree five through both ends. Raises
+        InputError; RunError where the bearing cannot follow: its committed state remains.
+        """
+        given = {"lower": lower, "upper": upper}
+        ends = np.stack([vector(motion, name, (3, 6), "m, rad") for name, motion in given.items()])
+        for name, end in zip(given, ends, strict=True):
+            if (turn := float(np.linalg.norm(end[0, 3:]))) > LARGEST_ROTATION:
+                raise InputError(f"{name}[0, 3:]: a rotation of {turn:.4g}; give at most {LARGEST_ROTATION} [rad]")
+        self._check_time(time, ends)
+        self._trial = None
+        self._number += 1
+        self._check(self._port.trial(time, ends), time)
+        self._trial = (float(time), ends)
+        return self._response(float(time))
+
+    def commit(self) -> None:
+        """Accept the latest trial as the state from which the next ones start. Raises InputError: there is none."""
+        if self._trial is None:
+            raise InputError("commit: no trial has succeeded since the last commit or revert; call trial first")
+        self._port.commit()
+        self._ends = self._trial[1]
+        self.revert()
+
+    def revert(self) -> None:
+        """Return to the committed state."""
+        self._port.revert()
+        self._trial = None
+        self._number += 1
+
+    def snapshot(self) -> bytes:
+        """The committed state as bytes, from which a two-port of the same values goes on bit by bit."""
+        state = self._port.snapshot()
+        return MAGIC + self._identity + hashlib.sha256(state).digest() + state
+
+    def restore(self, snapshot: bytes) -> None:
+        """Return to the committed state of a snapshot, of this or of another process.
+
+        Raises InputError: the snapshot is damaged, or of a two-port with other values or of another build.
+        """
+        if not isinstance(snapshot, bytes) or not snapshot.startswith(MAGIC):
+            raise InputError("snapshot: these are no bytes of TwoPort.snapshot(); give such bytes")
+        rest = snapshot[len(MAGIC) :]
+        identity, digest, state = rest[:32], rest[32:64], rest[64:]
+        if identity != self._identity:
+            raise InputError(
+                "snapshot: it is of a two-port with other values or another build; make this one with the same "
+                "bearing, interface, axial_load, effects and solver"
+            )
+        if hashlib.sha256(state).digest() != digest:
+            raise InputError("snapshot: the bytes are damaged; give them as TwoPort.snapshot() returned them")
+        self._port.restore(state)
+        self._ends = np.frombuffer(state, count=36).reshape(2, 3, 6).copy()
+        self.revert()
+
+    def derivative(self, number: int, order: int) -> Array:
+        """Derivatives of the wrenches of trial `number` for its `Response`: order 0 tangent, 1 damping, 2 inertia."""
+        word = ("tangent", "damping", "inertia")[order]
+        if number != self._number or self._trial is None:
+            raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
+        if self._trial[0] == self.time:
+            raise InputError(f"{word}: no time has passed since the committed state; make a trial at a later time")
+        status, found = self._port.derivative(order)
+        if status != "ok":
+            where = f"two-port, {word} at t = {self._trial[0]:.6g} s"
+            raise RunError(f"{where}: {_FAILURES[status].failure}", status=status)
+        return found
+
+    def _check_time(self, time: float, ends: Array) -> None:
+        if not isinstance(time, int | float | np.floating) or not np.isfinite(time):
+            raise InputError(f"time = {time!r}: give a finite number [s]")
+        start = self.time
+        if time == start and not np.array_equal(ends, self._ends):
+            raise InputError(
+                f"time = {time:.12g}: it is that of the committed state, whose ends are elsewhere; give a later one [s]"
+            )
+        if time != start and time - start < SHORTEST * max(1.0, abs(start)):
+            raise InputError(f"time = {time:.12g}: the committed state is at {start:.12g}; give a later time [s]")
+
+    def _check(self, status: tuple[str, int, float, float], end: float) -> None:
+        name, surface, value, reached = status
+        if name == "ok":
+            return
+        failure = _FAILURES[name]
+        where = f", surface {surface}" if surface else ""
+        where += f", {failure.quantity} = {value:.4g}" if surface and failure.quantity else ""
+        reason = f"stopped at t = {reached:.6g} s of {end:.6g} s{where}: {failure.failure}"
+        raise RunError(f"two-port: {reason}", status=name)
+
+    def _response(self, time: float) -> Response:
+        row = self.model.unpack(self._port.row)
+        works = dict(zip(names(WORKS), row["work"], strict=True))
+        dissipated = sum(float(works[name]) for name in _DISSIPATED)
+        return Response(time, self._port.wrench, row["sliding"], row["normal"], dissipated, self, self._number)
+
+
+def _scene_at_rest(
+    bearing: Bearing, interface: NodeTop, axial_load: float | None, effects: Effects | None, solver: Solver
+) -> Scene:
+    """A scene of the bearing at rest between its ends, which makes all checks of a scene."""
+    if effects is None:
+        effects = Effects(friction=select_friction(bearing, None))
+    require_type(effects, Effects, "effects")
+    require_type(solver, Solver, "solver")
+    if effects.dimension != "spatial":
+        raise InputError("effects.dimension = 'planar': the ends of a two-port move in space; give 'spatial'")
+    if effects.spin != "locked":
+        raise InputError(f"effects.spin = {effects.spin!r}: the interface transmits no torsion; give 'locked'")
+    if solver.method == "dopri5":
+        raise InputError("solver.method = 'dopri5': the steps of a two-port are implicit; give 'implicit' or 'esdirk4'")
+    if axial_load is None and not effects.uplift:
+        raise InputError(
+            "axial_load = None: without load the surfaces transmit nothing; give the weight on the bearing at rest "
+            "[N], or effects with uplift"
+        )
+    restraint = {field.name: getattr(interface, field.name) for field in fields(interface)}
+    top = RigTop(axial_load=0.0 if axial_load is None else axial_load, **restraint)
+    rotation = Rotation.of(REST[0], REST[1][:, :2])
+    effects = replace(effects, top_rotation=True)
+    return Scene(bearing, Motion(*REST), top, effects=effects, solver=solver, top_rotation=rotation)
+
+
+def _compiled(scene: Scene, model: Model, axial_load: float) -> Port:
+    count = scene.bearing.layout.surfaces
+    q = np.zeros((count, 3))
+    if model.effects.uplift:
+        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top)])
+    solver = scene.solver
+    port: Port = model.extension.Port(
+        model.stack(scene.bearing, scene.top),
+        axial_load,
+        q,
+        np.zeros_like(q),
+        np.zeros((count, 2)),
+        method=solver.method,
+        rtol=solver.rtol,
+        atol_angle=solver.angle_tolerance,
+        max_step=solver.max_step or 0.0,
+        first_step=solver.first_step or 0.0,
+        max_steps=float(solver.max_steps),
+    )
+    return port
+
+
+def _identity(scene: Scene, model: Model, axial_load: float) -> bytes:
+    """Digest of everything that determines the wrenches beside the motion of the ends."""
+    arrays = (*bodies_and_surfaces(scene.bearing, model.effects), top_values(scene.top), np.array([axial_load]))
+    digest = hashlib.sha256(f"{model.info.key} {scene.bearing.gravity!r} {scene.solver!r}".encode())
+    for array in arrays:
+        digest.update(array.tobytes())
+    return digest.digest()

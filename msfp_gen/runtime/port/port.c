@@ -1,0 +1,253 @@
+/* port.c: trials of a two-port, their wrenches, and its snapshots. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "port.h"
+
+enum { NB = MSFP_NB };
+
+static void attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
+{
+    memset(history, 0, sizeof *history);
+    history->pieces = 1;
+    history->knots = knots;
+    history->coefficients = &polynomials->coefficients[0][0];
+}
+
+/* The histories of a run are the polynomials of the port. */
+static void attach_all(msfp_port *port, msfp_run *run)
+{
+    attach(&run->motion, port->knots, &port->motion);
+    attach(&run->load, port->knots, &port->load);
+#if MSFP_TOP_ROTATION
+    attach(&run->support, port->knots, &port->support);
+#endif
+}
+
+/* The state of `to` becomes that of `from`; rows and events stay apart. */
+static void copy_state(msfp_run *to, const msfp_run *from)
+{
+    memcpy((char *)to + MSFP_SNAPSHOT_BEGIN, (const char *)from + MSFP_SNAPSHOT_BEGIN,
+           MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN);
+}
+
+static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
+                 const double *v, const double *f)
+{
+    msfp_history motion, load;
+    attach(&motion, port->knots, &port->motion);
+    attach(&load, port->knots, &port->load);
+#if MSFP_TOP_ROTATION
+    msfp_history support;
+    attach(&support, port->knots, &port->support);
+    return msfp_run_start(&port->committed, p, &motion, &load, &support, NULL, 0, options, q, v, f);
+#else
+    return msfp_run_start(&port->committed, p, &motion, &load, NULL, 0, options, q, v, f);
+#endif
+}
+
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
+                         const double *v, const double *f)
+{
+    msfp_port *port = calloc(1, sizeof *port);
+    if (!port)
+        return NULL;
+    port->axial_load = axial_load;
+    port->knots[0] = options->start_time;
+    port->knots[1] = options->start_time + 1.0;
+    msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
+    const int status = start(port, p, options, q, v, f);
+    port->run = port->committed;
+    port->run.rows = NULL;
+    port->run.events = NULL;
+    port->run.row_count = port->run.row_capacity = port->run.event_count = port->run.event_capacity = 0;
+    attach_all(port, &port->run);
+    port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
+    port->committed.options.duration = INFINITY;
+    if (status == MSFP_OK)
+        memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
+    return port;
+}
+
+void msfp_port_free(msfp_port *port)
+{
+    if (!port)
+        return;
+    msfp_run_free(&port->committed);
+    msfp_run_free(&port->run);
+    free(port->times);
+    free(port);
+}
+
+/* Fix the horizontal springs where end B is at the end of a trial: the load that its motion adds stays small beside the
+ * axial load. The energy of the springs is counted from there. */
+static void move_anchor(const msfp_port *port, msfp_run *run, const msfp_ends *to)
+{
+    double plate[3], anchor[3] = { 0.0 }, before[3], stored = 0.0;
+    msfp_body_C_get(run->work.body[NB], plate);
+    for (int i = 0; i < 2; ++i) {
+        before[i] = port->plate[i] + port->from.of[1][0][i];
+        anchor[i] = port->plate[i] + to->of[1][0][i];
+        stored += (plate[i] - anchor[i]) * (plate[i] - anchor[i]) - (plate[i] - before[i]) * (plate[i] - before[i]);
+    }
+    msfp_top_parameters_x0_put(run->parameters.top, anchor);
+    run->now.energy += 0.5 * run->parameters.top[MSFP_TOP_PARAMETERS_K] * stored;
+}
+
+void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to)
+{
+    const double h = t - port->committed.now.t;
+    copy_state(run, &port->committed);
+    memset(run->counts, 0, sizeof run->counts);
+    run->row_count = run->event_count = 0;
+    run->options.duration = t;
+    port->knots[0] = run->now.t;
+    port->knots[1] = t;
+    msfp_base_path(&port->from, to, h, &port->motion);
+    msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
+#if MSFP_TOP_ROTATION
+    msfp_support_path(&port->from, to, h, &port->support);
+#endif
+    attach_all(port, run); /* nothing of an earlier trial is left in the searches */
+    move_anchor(port, run, to);
+}
+
+/* Record the end of the step just taken. */
+static int record_time(msfp_port *port)
+{
+    if (port->time_count == port->time_capacity) {
+        const size_t capacity = port->time_capacity ? 2 * port->time_capacity : 64;
+        double *times = realloc(port->times, capacity * sizeof *times);
+        if (!times)
+            return MSFP_E_MEMORY;
+        port->times = times;
+        port->time_capacity = capacity;
+    }
+    port->times[port->time_count++] = port->run.now.t;
+    return MSFP_OK;
+}
+
+int msfp_port_trial(msfp_port *port, double t, const double *to)
+{
+    msfp_run *run = &port->run;
+    memcpy(&port->to, to, sizeof port->to);
+    port->tried = 0;
+    port->time_count = 0;
+    if (t == port->committed.now.t) {
+        copy_state(run, &port->committed);
+        return MSFP_OK;
+    }
+    msfp_port_prepare(port, run, t, &port->to);
+    for (int more = 1; more;) {
+        const long before = run->counts[MSFP_COUNT_STEPS];
+        more = msfp_run_advance(run, 1);
+        if (run->counts[MSFP_COUNT_STEPS] > before && run->status == MSFP_OK)
+            run->status = record_time(port);
+    }
+    port->tried = run->status == MSFP_OK;
+    return run->status;
+}
+
+static const msfp_run *current(const msfp_port *port) { return port->tried ? &port->run : &port->committed; }
+
+const msfp_row *msfp_port_row(const msfp_port *port)
+{
+    const msfp_run *run = current(port);
+    return &run->rows[run->row_count - 1];
+}
+
+static void add_moment(const double arm[3], const double force[3], double *moment)
+{
+    moment[0] += arm[1] * force[2] - arm[2] * force[1];
+    moment[1] += arm[2] * force[0] - arm[0] * force[2];
+    moment[2] += arm[0] * force[1] - arm[1] * force[0];
+}
+
+/* Moment about the centre of the lowest sphere, and those that lock the spin of the bodies (docs/model.md, choice 3):
+ * end A exerts them, so that both ends and the weights balance all inertia. */
+static void moment_from_below(const msfp_work *w, double moment[3])
+{
+#if MSFP_UPLIFT
+    const double *below = w->below[0];
+#else
+    const double *below = w->moment[0];
+#endif
+    double axis[3];
+    msfp_moment_M_get(below, moment);
+    for (int k = 1; k <= NB; ++k) {
+        msfp_body_t3_get(w->body[k], axis);
+        for (int i = 0; i < 3; ++i)
+            moment[i] += w->lock[k - 1] * axis[i];
+    }
+}
+
+void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench)
+{
+    const msfp_work *w = &run->work;
+    double centre[3], *a = wrench, *b = wrench + 6, arm[3];
+    msfp_body_C_get(w->body[0], centre);
+    msfp_force_F_get(w->force[0], a);
+    moment_from_below(w, a + 3);
+    for (int i = 0; i < 3; ++i)
+        arm[i] = centre[i] - at->of[0][0][i];
+    add_moment(arm, a, a + 3);
+    /* The top plate exerts F and M on the interface, which hands them on to end B. */
+    msfp_body_C_get(w->body[NB], centre);
+    msfp_force_F_get(w->force[NB], b);
+    msfp_moment_M_get(w->moment[NB], b + 3);
+    for (int i = 0; i < 6; ++i)
+        b[i] = -b[i];
+    for (int i = 0; i < 3; ++i)
+        arm[i] = centre[i] - (port->plate[i] + at->of[1][0][i]);
+    add_moment(arm, b, b + 3);
+}
+
+void msfp_port_wrench(const msfp_port *port, double *wrench)
+{
+    msfp_port_wrench_of(port, current(port), port->tried ? &port->to : &port->from, wrench);
+}
+
+void msfp_port_commit(msfp_port *port)
+{
+    if (!port->tried)
+        return;
+    port->committed.rows[0] = *msfp_port_row(port);
+    copy_state(&port->committed, &port->run);
+    port->from = port->to;
+    port->tried = 0;
+}
+
+void msfp_port_revert(msfp_port *port)
+{
+    port->tried = 0;
+    port->time_count = 0;
+}
+
+size_t msfp_port_snapshot_size(const msfp_port *port)
+{
+    return sizeof port->from + msfp_snapshot_size(&port->committed, 1);
+}
+
+void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
+{
+    memcpy(snapshot, &port->from, sizeof port->from);
+    msfp_snapshot_write(&port->committed, 1, (char *)snapshot + sizeof port->from);
+}
+
+int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
+{
+    msfp_ends from;
+    if (size < sizeof from)
+        return MSFP_E_FINITE;
+    memcpy(&from, snapshot, sizeof from);
+    const double *values = &from.of[0][0][0];
+    for (size_t i = 0; i < sizeof from / sizeof *values; ++i)
+        if (!(fabs(values[i]) < INFINITY))
+            return MSFP_E_FINITE;
+    const int status = msfp_snapshot_read(&port->committed, (const char *)snapshot + sizeof from, size - sizeof from);
+    if (status)
+        return status;
+    port->from = from;
+    msfp_port_revert(port);
+    return MSFP_OK;
+}

@@ -1,0 +1,91 @@
+/* port.h: a bearing whose two ends move as another program says (docs/embedding.md, the two-port).
+ *
+ * End A holds the base, end B the far side of the interface: springs and dampers on the top plate. The motion of an end
+ * is [order][u_1..3 [m], rotation vector [rad]]: values, first and second derivatives. A wrench is force [N] and moment
+ * [N m] that an end exerts on the bearing, about the present position of that end. End 0 is A, end 1 is B.
+ *
+ * A trial goes from the committed state to a given motion of the ends at a later time, with the step control of a run
+ * in between. It depends on nothing else, so that trials may be repeated in any order.
+ */
+#ifndef MSFP_PORT_H
+#define MSFP_PORT_H
+#include "run.h"
+
+enum { MSFP_ENDS = 2, MSFP_ORDERS = 3, MSFP_END_FREEDOMS = 6, MSFP_PORT_FREEDOMS = MSFP_ENDS * MSFP_END_FREEDOMS };
+
+/* Motion of both ends at one time. */
+typedef struct {
+    double of[MSFP_ENDS][MSFP_ORDERS][MSFP_END_FREEDOMS];
+} msfp_ends;
+
+/* Piecewise polynomials of one piece. */
+typedef struct {
+    double coefficients[6][MSFP_DEGREE + 1];
+} msfp_polynomials;
+
+typedef struct {
+    msfp_run committed; /* state at the end of the last committed step, with its row */
+    msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
+    msfp_ends from, to; /* motion of the ends in those states */
+    double knots[2];    /* of the trial [s] */
+    msfp_polynomials motion, load;
+#if MSFP_TOP_ROTATION
+    msfp_polynomials support;
+#endif
+    double axial_load; /* that the interface carries at rest [N] */
+    double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
+    double *times;     /* [time_count]: ends of the steps of the trial [s] */
+    size_t time_count, time_capacity;
+    int tried; /* a trial has succeeded since the last commit, revert or failure */
+} msfp_port;
+
+/* ---- port.c ---- */
+
+/* A bearing at rest under the axial load [N], both ends at u = 0. The tops's springs of `p` are the interface. q, v, f:
+ * state as in msfp_run_start. The port is released by msfp_port_free, also after a failure; NULL: no memory. */
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
+                         const double *v, const double *f);
+void msfp_port_free(msfp_port *port);
+/* Go from the committed state to the time `t` [s], not before it, at which the ends are at `to` [end][order][6]. At the
+ * committed time `to` is the committed motion. Returns MSFP_OK, or a status: see port->run. */
+int msfp_port_trial(msfp_port *port, double t, const double *to);
+/* Wrenches [end][6] of the last trial, or of the committed state where there is none. */
+void msfp_port_wrench(const msfp_port *port, double *wrench);
+/* The row of that state. */
+const msfp_row *msfp_port_row(const msfp_port *port);
+/* Accept the last trial. */
+void msfp_port_commit(msfp_port *port);
+/* Return to the committed state. */
+void msfp_port_revert(msfp_port *port);
+/* A snapshot of the committed state: bytes without pointers, for a port of the same values and build. */
+size_t msfp_port_snapshot_size(const msfp_port *port);
+void msfp_port_snapshot_write(const msfp_port *port, void *snapshot);
+/* Returns MSFP_OK, MSFP_E_MEMORY or MSFP_E_FINITE, after which nothing has changed. */
+int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
+/* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
+void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
+/* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
+void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
+
+/* ---- ends.c: what a motion of the ends is to the equations ---- */
+
+/* Angles psi, theta, phi (2.1) of a rotation vector, with derivatives: both [order][3]. */
+void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_ORDERS][3]);
+/* Motion of the base over a step of length h [s]. */
+void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *motion);
+/* Force on the top plate over a step: what the motion of end B adds to springs that are fixed horizontally where end B
+ * is at the end of the step, and vertically at rest; and the axial load [N]. */
+void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const msfp_ends *to, double h,
+                         double axial_load, msfp_polynomials *load);
+#if MSFP_TOP_ROTATION
+/* Rotation psi, theta of end B over a step. */
+void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support);
+#endif
+
+/* ---- derivatives.c ---- */
+
+/* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends at its end, of order 0
+ * (tangent), 1 or 2; the steps of the trial are held. Returns MSFP_OK or a status. */
+int msfp_port_derivative(msfp_port *port, int order, double *derivative);
+
+#endif
