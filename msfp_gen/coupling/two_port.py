@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, RigTop
 from msfp_gen.specification.contract import STATUSES, WORKS, names
-from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Port
@@ -92,6 +92,28 @@ class TwoPort:
         self._number = 0  # of the latest trial
         self._check(self._port.status, 0.0)
 
+    @classmethod
+    def of_scene(cls, scene: Scene) -> Self:
+        """The two-port of a scene with a rig: its springs and dampers, with their far ends moving, and its axial load.
+
+        The motion and the duration of the scene are not used. `Auto` effects are those of a motion that nobody knows:
+        spatial, inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with
+        horizontal, vertical and rotational stiffness, or the scene has parts that a two-port has not.
+        """
+        for name in ("load", "top_rotation", "initial_state", "stop"):
+            if getattr(scene, name) is not None:
+                raise InputError(f"{name}: the ends of a two-port give motion and load; leave it out of the scene")
+        top = scene.top
+        if not isinstance(top, RigTop):
+            raise InputError(
+                f"top.kind = {top.kind!r}: the interface of a two-port is that of a rig; give kind = 'rig'"
+            )
+        interface = NodeTop(**{field.name: getattr(top, field.name) for field in fields(NodeTop)})
+        effects = scene.effects
+        if isinstance(effects, Auto):
+            effects = effects.resolve(friction=scene.law[0])
+        return cls(scene.bearing, interface, top.axial_load, effects, scene.solver)
+
     @property
     def time(self) -> float:
         """Time of the committed state [s]."""
@@ -157,14 +179,13 @@ class TwoPort:
         self._ends = np.frombuffer(state, count=36).reshape(2, 3, 6).copy()
         self.revert()
 
-    def derivative(self, number: int, order: int) -> Array:
-        """Derivatives of the wrenches of trial `number` for its `Response`: order 0 tangent, 1 damping, 2 inertia."""
-        word = ("tangent", "damping", "inertia")[order]
+    def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
+        """Derivatives of the wrenches of trial `number`, for its `Response`; word: what they are called there."""
         if number != self._number or self._trial is None:
             raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
         if self._trial[0] == self.time:
             raise InputError(f"{word}: no time has passed since the committed state; make a trial at a later time")
-        status, found = self._port.derivative(order)
+        status, found = self._port.derivative(np.array(direction))
         if status != "ok":
             where = f"two-port, {word} at t = {self._trial[0]:.6g} s"
             raise RunError(f"{where}: {_FAILURES[status].failure}", status=status)

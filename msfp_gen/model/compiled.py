@@ -133,8 +133,8 @@ class Port(Protocol):
     def trial(self, time: float, ends: Array) -> tuple[str, int, float, float]:
         """Go from the committed state to `time`, with the ends at `ends`, shape (2, 3, 6); returns `status`."""
 
-    def derivative(self, order: int) -> tuple[str, Array]:
-        """Status, and derivatives of the wrenches with respect to values, rates or accelerations of the ends."""
+    def derivative(self, direction: Array) -> tuple[str, Array]:
+        """Status, and derivatives of the wrenches along displacements, rates and accelerations of the ends."""
 
     def commit(self) -> None:
         """Accept the last trial."""

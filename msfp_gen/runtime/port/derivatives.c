@@ -2,19 +2,23 @@
  *
  * With held steps the wrenches are smooth functions of the motion of the ends, up to the switches of friction and rims.
  * The stages are solved to a tighter tolerance than in the trial, so that the differences hold no noise of Newton's
- * method.
+ * method. Where that fails, as at a rim that is being met, a larger perturbation makes up for the tolerance of the
+ * trial.
  */
 #include <math.h>
 #include <string.h>
 #include "port.h"
 
 enum { NB = MSFP_NB, FREEDOMS = MSFP_PORT_FREEDOMS };
-static const double tolerance = 1e-7; /* rtol of the repeated trials */
-static const double share = 2e-3;     /* of the smallest yield displacement: perturbation of an end */
 
-/* Perturbation of a freedom of an end [m] or [rad]: the slip that it causes is no more than `share` of the yield
- * displacement. */
-static double perturbation(const msfp_parameters *p, int freedom)
+/* rtol of the repeated trials [-], and the slip that a perturbation causes, over the smallest yield displacement. */
+typedef struct {
+    double rtol, share;
+} precision;
+static const precision precisions[] = { { 1e-7, 2e-3 }, { 1.0, 2e-2 } }; /* rtol is no larger than in the trial */
+
+/* Perturbation of a freedom of an end [m] or [rad] that causes no larger slip than `share` of a yield displacement. */
+static double perturbation(const msfp_parameters *p, int freedom, double share)
 {
     double yield = p->surface[0][MSFP_SURFACE_PARAMETERS_DY], radius = p->surface[0][MSFP_SURFACE_PARAMETERS_R];
     for (int j = 1; j < NB; ++j) {
@@ -25,11 +29,11 @@ static double perturbation(const msfp_parameters *p, int freedom)
 }
 
 /* Wrenches at the end of the trial with the ends at `to`, by the steps of the trial. */
-static int repeat(msfp_port *port, msfp_run *run, const msfp_ends *to, double *wrench)
+static int repeat(msfp_port *port, msfp_run *run, const msfp_ends *to, double rtol, double *wrench)
 {
     double error;
     msfp_port_prepare(port, run, port->times[port->time_count - 1], to);
-    run->options.rtol = fmin(run->options.rtol, tolerance);
+    run->options.rtol = fmin(port->run.options.rtol, rtol);
     for (size_t i = 0; i < port->time_count; ++i) {
         const int status = msfp_step_implicit(run, port->times[i] - run->now.t, &error);
         if (status)
@@ -42,28 +46,41 @@ static int repeat(msfp_port *port, msfp_run *run, const msfp_ends *to, double *w
     return MSFP_OK;
 }
 
-int msfp_port_derivative(msfp_port *port, int order, double *derivative)
+/* Derivatives [FREEDOMS] along one freedom of an end. */
+static int differentiate(msfp_port *port, msfp_run *run, const double direction[MSFP_ORDERS], int column, precision by,
+                         double *derivatives)
 {
-    /* A derivative of the motion moves the path inside the step less than the motion itself does. */
-    static const double enlarged[MSFP_ORDERS] = { 1.0, 5.0, 50.0 };
+    const int end = column / MSFP_END_FREEDOMS, freedom = column % MSFP_END_FREEDOMS;
     const double h = port->run.now.t - port->committed.now.t;
-    msfp_run run = port->run; /* with rows and events that no step of this file writes */
+    /* Rates and accelerations move the path inside the step less than displacements do. */
+    const double path = fabs(direction[0]) + 0.2 * h * fabs(direction[1]) + 0.02 * h * h * fabs(direction[2]);
+    const double step = perturbation(&run->parameters, freedom, by.share) / path;
     double wrench[2][FREEDOMS];
-    for (int end = 0; end < MSFP_ENDS; ++end)
-        for (int freedom = 0; freedom < MSFP_END_FREEDOMS; ++freedom) {
-            const double step = enlarged[order] * perturbation(&run.parameters, freedom) / pow(h, order);
-            double width = 0.0;
-            for (int side = 0; side < 2; ++side) {
-                msfp_ends to = port->to;
-                double *moved = &to.of[end][order][freedom];
-                *moved += side ? step : -step;
-                width += side ? *moved : -*moved;
-                const int status = repeat(port, &run, &to, wrench[side]);
-                if (status)
-                    return status;
-            }
-            for (int i = 0; i < FREEDOMS; ++i)
-                derivative[i * FREEDOMS + end * MSFP_END_FREEDOMS + freedom] = (wrench[1][i] - wrench[0][i]) / width;
-        }
+    for (int side = 0; side < 2; ++side) {
+        msfp_ends to = port->to;
+        for (int order = 0; order < MSFP_ORDERS; ++order)
+            to.of[end][order][freedom] += (side ? step : -step) * direction[order];
+        const int status = repeat(port, run, &to, by.rtol, wrench[side]);
+        if (status)
+            return status;
+    }
+    for (int i = 0; i < FREEDOMS; ++i)
+        derivatives[i] = (wrench[1][i] - wrench[0][i]) / (2.0 * step);
+    return MSFP_OK;
+}
+
+int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative)
+{
+    msfp_run run = port->run; /* with rows and events that no step of this file writes */
+    double column[FREEDOMS];
+    for (int j = 0; j < FREEDOMS; ++j) {
+        int status = MSFP_E_NEWTON;
+        for (size_t i = 0; status && i < sizeof precisions / sizeof *precisions; ++i)
+            status = differentiate(port, &run, direction, j, precisions[i], column);
+        if (status)
+            return status;
+        for (int i = 0; i < FREEDOMS; ++i)
+            derivative[i * FREEDOMS + j] = column[i];
+    }
     return MSFP_OK;
 }

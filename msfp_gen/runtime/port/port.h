@@ -84,8 +84,9 @@ void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msf
 
 /* ---- derivatives.c ---- */
 
-/* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends at its end, of order 0
- * (tangent), 1 or 2; the steps of the trial are held. Returns MSFP_OK or a status. */
-int msfp_port_derivative(msfp_port *port, int order, double *derivative);
+/* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends at its end, its steps
+ * held. direction: how displacements, rates and accelerations change together; (1, 0, 0) gives the tangent. Returns
+ * MSFP_OK or a status. */
+int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative);
 
 #endif

@@ -76,6 +76,18 @@ def test_derivatives_equal_differences_of_trials(order: int, name: str, accuracy
     assert np.abs(scaled[0] - scaled[1]).max() < accuracy * np.abs(scaled[1]).max()
 
 
+def test_the_effective_stiffness_is_the_sum_of_the_derivatives():
+    two_port = port(1e-9)
+    advance(two_port, 0, 12, 0.05)
+    response = two_port.trial(0.61, *swing(0.61))
+    factors = 2 / STEP, 4 / STEP**2
+    expected = response.tangent + factors[0] * response.damping + factors[1] * response.inertia
+    found = response.effective_stiffness(*factors)
+    assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
+    with pytest.raises(InputError, match="rate = nan"):
+        response.effective_stiffness(np.nan, 1.0)
+
+
 def test_a_newton_iteration_with_the_tangent_converges_quadratically():
     """A node under a force is found in few iterations, with steps and displacements as in Newmark's method."""
     two_port = port()
@@ -90,10 +102,9 @@ def test_a_newton_iteration_with_the_tangent_converges_quadratically():
         response = two_port.trial(time, lower, node)
         residual = push - mass * node[0, 0] / (beta * STEP**2) - response.wrench[1, 0]
         errors.append(abs(residual))
-        c = (1.0, gamma / (beta * STEP), 1 / (beta * STEP**2))
-        slope = sum(f * d[6, 6] for f, d in zip(c, (response.tangent, response.damping, response.inertia), strict=True))
-        change = residual / (slope + mass / (beta * STEP**2))
-        node[:, 0] += change * np.array(c)
+        factors = gamma / (beta * STEP), 1 / (beta * STEP**2)
+        change = residual / (response.effective_stiffness(*factors)[6, 6] + mass * factors[1])
+        node[:, 0] += change * np.array([1.0, *factors])
     assert abs(node[0, 0] - start[0, 0]) > 1e-4
     assert errors[3] < 1e-6 * errors[0]
 
