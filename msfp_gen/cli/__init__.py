@@ -18,6 +18,7 @@ from msfp_gen.cli import (
     records,
     reporting,
     running,
+    serving,
 )
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import signals_as_interrupts
@@ -37,7 +38,8 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    running, batching, exporting, drawing, assessment_commands, benching, reporting, records, building, cache_command,
+    running, batching, exporting, drawing, assessment_commands, benching, reporting, records, building, serving,
+    cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)
 
