@@ -4,8 +4,9 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
+SITE   := $(VENV)/.site
 
-.PHONY: demo test slow lint types package bounds clang fuzz figures docs clean
+.PHONY: demo test slow lint types package wheels bounds clang fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -27,6 +28,10 @@ types: $(STAMP)
 package: $(STAMP)
 	tests/packaging.sh
 
+# The wheel with compiled models for Linux on x86-64, in dist/prebuilt: two minutes; downloads ziglang (100 MB).
+wheels: $(STAMP)
+	tests/wheels.sh
+
 # The lowest versions of the dependencies that pyproject.toml allows.
 bounds: $(STAMP)
 	tests/lower_bounds.sh
@@ -38,14 +43,19 @@ clang: $(STAMP)
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)
 	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
+	$(BIN)/python benchmarks/fuzz.py --combined --scenes 2000 --seed 91 --check 0
+
+# A hundred small changes of the code, and whether the tests see them: hours. See benchmarks/mutants.py.
+mutants: $(STAMP)
+	$(BIN)/python benchmarks/mutants.py --count 100 --output build/mutants.json
 
 figures: $(STAMP)
 	$(BIN)/python benchmarks/report_figures.py
 	$(BIN)/python docs/make_figures.py
 
-# The API reference, from the docstrings; a warning is an error.
-docs: $(STAMP)
-	$(BIN)/python -W error -m pdoc --math -o build/docs msfp_gen
+# The documentation site in build/docs, examples run; a warning is an error.
+docs: $(SITE)
+	$(BIN)/python docs/site/make_site.py
 
 # With what running needs; the tools of the tests and checks come on top.
 $(RUNS): pyproject.toml
@@ -56,6 +66,10 @@ $(RUNS): pyproject.toml
 
 $(STAMP): $(RUNS)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[test]"
+	touch $@
+
+$(SITE): $(RUNS)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[docs]"
 	touch $@
 
 clean:

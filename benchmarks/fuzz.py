@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from fuzz_combined import COMBINED
 from fuzz_scenes import SHORT, SPECS
 from rich.progress import track
 
@@ -135,6 +136,8 @@ def table(rows: list[Row], checks: list[Row]) -> Row:
         "checked": len(compared),
         "no_verdict": len(checks) - len(compared),
         "largest_deviation": max((c["deviation"] for c in compared), default=None),
+        "verdicts": dict(Counter(r["verdict"] for r in rows if "verdict" in r).most_common()),
+        "largest_unbalanced": max((r["unbalanced"] for r in rows if "unbalanced" in r), default=None),
         "counts": dict(counts),
         "scenes_with": dict(used),
     }
@@ -162,10 +165,17 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, help="JSON file for the table")
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--short", dest="which", action="store_const", const="short", help="only a few of the models")
+    group.add_argument(
+        "--combined",
+        dest="which",
+        action="store_const",
+        const="combined",
+        help="combinations of public constructors, each run checked row by row and with half its longest step",
+    )
     group.add_argument("--sensible", dest="which", action="store_const", const="sensible", help="only sensible scenes")
     given = parser.parse_args(words)
     which = given.which or "all"
-    build_all(SHORT if which == "short" else SPECS)
+    build_all({"short": SHORT, "combined": COMBINED}.get(which, SPECS))
     begin, worker = time.perf_counter(), Worker(given.seed, given.limit, which)
     rows: list[Row] = []
     checks: list[Row] = []

@@ -89,10 +89,10 @@ class Draw:
         return items[int(self.rng.integers(len(items)))]
 
 
-def a_bearing(draw: Draw, layout: Layers, law: str) -> Bearing:
-    """A bearing whose radii decrease inwards; in the wide range in any order."""
+def a_bearing(draw: Draw, layout: Layers, law: str, ratios: tuple[float, float] = (0.35, 0.8)) -> Bearing:
+    """A bearing whose radii decrease inwards, each in a ratio to the next; in the wide range in any order."""
     n, up, down = layout
-    outer, ratio = draw.decades((0.3, 3.0), (0.05, 100.0)), draw.flat(0.35, 0.8)
+    outer, ratio = draw.decades((0.3, 3.0), (0.05, 100.0)), draw.flat(*ratios)
     nested = [outer * ratio**i for i in range(up)] + [outer * ratio**i for i in range(down)][::-1]
     if draw.chance(WIDE):
         draw.rng.shuffle(nested)

@@ -80,7 +80,7 @@ class Second:
         n, top = self.bearing.layout.n, self.top
         t3, w, dw = turn.t[n][2], turn.w[n], turn.dw[n]
         total, dtotal = turn.w_total[n], turn.dw_total[n]
-        r, v, a = (x[f"{n}{n}"] for x in at)
+        r, v, a = (x[kinematics.joint(self.bearing, n)] for x in at)
         if isinstance(top, PrescribedTop):
             return stack.Load(np.array(top.force), np.array(top.moment))
         spring = -top.rotational_stiffness * (np.array([-t3[1], t3[0], 0 * t3[0]]) + phi * t3)

@@ -13,6 +13,8 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
+from fuzz_balance import verified
+from fuzz_combined import case as combined_case
 from fuzz_scenes import case, load_of, sensible
 from fuzz_second import Second
 
@@ -56,7 +58,9 @@ def wrong(result: Result) -> list[str]:
         found.append(f"disc {disc / rtol:.3g} rtol")
     if history.rim_force.min() < 0 or history.rim_force[history.gap > 0].any():
         found.append("rim")
-    if history.normal_force.min() < 0 or (history.normal_force.min() == 0 and not result.scene.effects.uplift):
+    if history.normal_force.min() < 0 or (
+        history.normal_force.min() == 0 and "uplift" not in result.provenance["model"]
+    ):
         found.append("normal")
     rest = (result.scene.output_step or 0.0) * (1 + 1e-9)
     if result.status == "ok" and abs(history.time[-1] - result.scene.end) > rest + 1e-9:
@@ -64,8 +68,8 @@ def wrong(result: Result) -> list[str]:
     return found
 
 
-def run(scene: Scene) -> dict[str, Any]:
-    """Run one scene: its status, message, counters and violations."""
+def run(scene: Scene, verify: bool = False) -> dict[str, Any]:
+    """Run one scene: its status, message, counters and violations. verify: check its rows and steps as well."""
     begin = time.perf_counter()
     result, message = None, ""
     try:
@@ -86,6 +90,9 @@ def run(scene: Scene) -> dict[str, Any]:
         out["not_finite"] = not_finite(result)
         if result.succeeded:
             out["wrong"] = wrong(result)
+        if verify:
+            found = verified(scene, result)
+            out |= found | {"wrong": out.get("wrong", []) + found["wrong"]}
     return out
 
 
@@ -146,6 +153,11 @@ def main() -> None:
         task, number = line.split()[0], int(line.split()[1])
         if task == "check":
             print(json.dumps(check(seed, number, short)), flush=True)
+            continue
+        if which == "combined":
+            scene = combined_case(seed, number).scene
+            row = {"number": number, "spec": scene.spec.key, "checkable": False, **run(scene, verify=True)}
+            print(json.dumps(row), flush=True)
             continue
         scene = case(seed, number, short).scene
         if which == "sensible" and not sensible(scene):

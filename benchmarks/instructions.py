@@ -1,7 +1,7 @@
 """Count the instructions of kernels and runs: `python benchmarks/instructions.py`, some minutes, with valgrind installed.
 
 callgrind counts, so the numbers do not depend on the load of the machine. It does not support AVX-512, so the models are
-compiled for AVX2 (level 3 of x86-64). For a run it counts the loop in C (`msfp_run_advance`), for a kernel one call. Rows of docs/performance.md.
+compiled for AVX2 (level 3 of x86-64). For a run it counts the loop in C (`msfp_run_advance` of the model), for a kernel one call. Rows of docs/performance.md.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def main() -> None:
         program = RUN.format(name=name, effects=effects, rtol=rtol)
         os.environ["MSFP_GEN_CFLAGS"] = AVX2  # of the processes that follow
         subprocess.run([sys.executable, "-c", program], check=True)  # builds the model
-        count = instructions([sys.executable, "-c", program], "msfp_run_advance")
+        count = instructions([sys.executable, "-c", program], "msfp_5_2_2_run_advance")
         print(f"| {text} | {count / 1e6:.1f} million |", flush=True)
     tfp = replace(load_scene("fenz-test2"), effects=kernels.FULL)
     few, many = of_kernels(tfp), of_kernels(kernels.deep(Layout(11, 5, 5)))

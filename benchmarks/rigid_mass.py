@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from msfp_gen import RunError, Scene, load_scene, presets, simulate
+from msfp_gen import Auto, Bearing, RunError, Scene, load_scene, presets, simulate
 from msfp_gen.scene.top import MassTop
 
 WEIGHT = 112e3
@@ -20,6 +20,8 @@ BEARING_STIFFNESS = 8e9 / 13e6  # vertical stiffness of a bearing per newton of 
 COLUMNS = 12.0  # vertical frequency of the supported weight on its columns [Hz]
 DAMPING = 0.05  # ratio to critical
 TOLERANCES = (1e-3, 1e-4, 1e-5)
+FINE_TOLERANCES = (*TOLERANCES, 1e-6)
+SLIDER_SHARE = 1e-3  # mass of a slider over the mass that it carries, in bearings as built
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,39 @@ def dampings(scene_name: str, bearing_name: str) -> None:
         print(f"| {100 * ratio:g} %{', uplift' * effects.uplift} | {cells} |", flush=True)
 
 
+def with_slider_masses(bearing: Bearing, share: float = SLIDER_SHARE) -> Bearing:
+    """The bearing with sliders of this share of the supported mass, in place of model scale; their shapes are kept."""
+    sliders = [share * WEIGHT / bearing.gravity / body.mass for body in bearing.bodies[:-1]]
+    bodies = [
+        replace(body, mass=factor * body.mass, inertia=tuple(factor * value for value in body.inertia))
+        for body, factor in zip(bearing.bodies, [*sliders, 1.0], strict=True)
+    ]
+    return replace(bearing, bodies=bodies)
+
+
+def full_scale(scene_name: str, bearing_name: str) -> None:
+    """Lines of the table of real slider masses, effects chosen by `Auto`: displacement [mm], shear and N over W."""
+    scene = load_scene(scene_name)
+    assert isinstance(scene.top, MassTop)
+    bearing = with_slider_masses(presets.bearing(bearing_name))
+    for support in supports(scene.top.mass)[:2]:
+        cells = []
+        for rtol in FINE_TOLERANCES:
+            solver = replace(scene.solver, rtol=rtol)
+            top = support.of(scene.top)
+            run_scene = replace(scene, bearing=bearing, top=top, effects=Auto(), solver=solver, output_step=0.01)
+            try:
+                result, end = simulate(run_scene), ""
+            except RunError as error:
+                result, end = error.result, f", `{error.status}` at {error.result.history.time[-1]:.1f} s"
+            peaks = result.extremes
+            displacement, shear = 1e3 * peaks.displacement[3], peaks.top_force[3] / WEIGHT
+            normal = result.history.normal_force.max() / WEIGHT
+            opened = ", opens" if result.history.lift.max() > 0 else ""
+            cells.append(f"{displacement:.1f} / {shear:.3f} / {normal:.2f}{opened}{end}")
+        print(f"| {scene_name} | {bearing_name} | {support.name} | " + " | ".join(cells) + " |", flush=True)
+
+
 def main() -> None:
     """Print the tables."""
     tolerances = " | ".join(f"rtol {rtol:g}" for rtol in TOLERANCES)
@@ -94,6 +129,11 @@ def main() -> None:
         rows(scene, BEARINGS)
     print(f"\n| damping | {tolerances} |\n|---|---|---|---|")
     dampings("ridgecrest-ccc", "becker-tfp")
+    columns = " | ".join(f"rtol {rtol:g}" for rtol in FINE_TOLERANCES)
+    print(f"\n| scene | bearing | support of the mass | {columns} |\n|---|---|---|---|---|---|---|")
+    for scene in ("ridgecrest-clc", "ridgecrest-ccc"):
+        for bearing in BEARINGS:
+            full_scale(scene, bearing)
 
 
 if __name__ == "__main__":

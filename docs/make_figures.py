@@ -1,4 +1,4 @@
-"""Draw the figures of docs/figures.md and docs/tutorial.md: `python docs/make_figures.py [FOLDER]`."""
+"""Draw the figures of docs/figures.md, docs/tutorial.md and docs/studies.md: `python docs/make_figures.py [FOLDER]`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import run_tutorial
 
-from msfp_gen import figures, load_scene, simulate
+from msfp_gen import figures, load_scene, simulate, study
 from msfp_gen.figures import style
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
 from msfp_gen.result import Result
 from msfp_gen.results.geometry.section import sections
 from msfp_gen.results.resample import at_times
+from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
 
 FOLDER = Path(__file__).resolve().parent / "figures"
 RECORD = "ridgecrest-2019-ci-clc"
@@ -122,6 +123,19 @@ def draw_cost(folder: Path) -> None:
     figures.plot_work_precision(table, folder / "gallery-work-precision.png", errors=named, title="fenz-test2")
 
 
+def draw_study(folder: Path) -> None:
+    """IDA and fragility of the study of docs/studies.md."""
+    with TemporaryDirectory() as place:
+        study(FOLDER.parents[1] / "examples" / "fragility" / "study.toml", place)
+        rows = read_study(place)
+    nominal = rows[rows.bounds == "nominal"]
+    plot_ida(
+        ida(nominal, "intensity", "peak_displacement"), folder / "study-ida.png", "Triple pendulum, nominal friction"
+    )
+    found = fragility(rows, "intensity", "peak_displacement", [0.22], by="bounds")
+    plot_fragility(found, folder / "study-fragility.png", "Displacement capacity of a triple pendulum")
+
+
 def main(folder: Path = FOLDER) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     draw_runs(folder)
@@ -129,6 +143,7 @@ def main(folder: Path = FOLDER) -> None:
     draw_tutorial(folder)
     draw_record(folder)
     draw_cost(folder)
+    draw_study(folder)
     print(f"figures in {folder}")
 
 

@@ -41,15 +41,19 @@ def generate(spec: ModelSpec) -> Generated:
     """
     from .derive import derive
     from .emit import emit
+    from .gradients import directional_programs
     from .lower import lower
 
     times = [time.perf_counter()]
     equations = derive(spec)
     times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
+    wanted = directional_programs(equations.programs) if spec.gradients else ()
+    directional = tuple(lower(program) for program in wanted)
     times.append(time.perf_counter())
-    files = emit(equations, kernels)
+    files = emit(equations, kernels, directional)
     times.append(time.perf_counter())
     stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), times, times[1:], strict=False)}
+    kernels += directional
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
     return Generated(files, statements, sum(k.operations + k.tangent_operations for k in kernels), stages)

@@ -33,6 +33,8 @@ class Blocks:
     report_contact: Block
     rim: Block
     rim_coordinates: Block
+    rim_wrench: Block
+    offset: Block
     gap: Block
     top_wrench: Block
     foot_stage: Block
@@ -203,6 +205,21 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
     }
 
 
+def _rim_coordinates(new: Maker, uplift: bool) -> Block:
+    """What the gap of a rim depends on: the tilts of the body above, and with uplift the separation."""
+    builder = (
+        new("rim_coordinates")
+        .scalar("psi", "rad", "psi of the body above", 0)
+        .scalar("theta", "rad", "theta of the body above")
+        .scalar("psi1", "rad/s", "its rate", 0)
+        .scalar("theta1", "rad/s", "its rate")
+    )
+    if uplift:
+        builder.vector("d", "m", "separation delta, basis of the body below", POLAR)
+        builder.vector("d1", "m/s", "rate of these components", POLAR)
+    return builder.build()
+
+
 def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
     """Gap, rim and unilateral contact of a surface."""
     return {
@@ -213,11 +230,14 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("dg", "m/s", "d gap/dt (2.102)")
         .scalar("fc", "N", "signed magnitude k g + c dg/dt (3.23)")
         .build(),
-        "rim_coordinates": new("rim_coordinates")
-        .scalar("psi", "rad", "psi of the body above", 0)
-        .scalar("theta", "rad", "theta of the body above")
-        .scalar("psi1", "rad/s", "its rate", 0)
-        .scalar("theta1", "rad/s", "its rate")
+        "rim_coordinates": _rim_coordinates(new, uplift),
+        "rim_wrench": new("rim_wrench")
+        .vector("F", "N", "F_c on the body above, along E1, E2, E3", POLAR)
+        .vector("T", "N m", "F_c x delta: moment on the slider about its sphere centre, beside that of the rim", AXIAL)
+        .build(),
+        "offset": new("offset")
+        .vector("d", "m", "separation delta, basis of the body below", POLAR)
+        .vector("d1", "m/s", "rate of these components", POLAR)
         .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
         "unilateral": new("unilateral")

@@ -202,7 +202,7 @@ def body_energy(b: Blocks, massless: bool) -> Program:
     p = Program("body_energy", "energy of a body in the frame moving with the base")
     par: Symbols = p.read(b.body_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
-    base: Symbols = p.read(b.base_motion, "o", active=False)
+    base: Symbols = p.read(b.base_motion, "base", active=False)
     terms = energy_terms(p, par, body, body["rc"], body["vc"], base)
     if massless:
         terms.update(kinetic=sp.Integer(0), power=sp.Integer(0))

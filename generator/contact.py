@@ -17,11 +17,13 @@ from .blocks import Blocks
 from .functions import ArcTan2, Modulus
 from .hysteresis import Shear, friction_rates
 from .program import Program, Vector
-from .vectors import add, dot, scale
+from .vectors import add, cross, dot, scale
 
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
 """w_0 [rad/s] of the drilling moment (docs/model.md)."""
+ALIGNED = sp.Float("1e-9")
+"""Sine of a tilt, and distance [m], below which the direction of a rim force is not resolved."""
 
 
 def norm(x: sp.Expr, y: sp.Expr) -> sp.Expr:
@@ -183,7 +185,8 @@ def rim(b: Blocks) -> Program:
     """Rim contact (3.20)-(3.25): gap, force and its moment about the sphere centre.
 
     The force acts on the slider: the body above a concave-up surface, the body below a concave-down one. The runtime
-    applies it only while it is compressive (docs/model.md, choice 4).
+    applies it only while it is compressive (docs/model.md, choice 4). With uplift the gap follows the separation too,
+    so that the energy of the rim is a function of the position (docs/uplift.md).
     """
     p = Program("rim", "rim contact (3.20)-(3.25); applied only while the force is compressive")
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
@@ -192,37 +195,43 @@ def rim(b: Blocks) -> Program:
     sin_theta, cos_theta = p.let(sp.sin(x["theta"])), p.let(sp.cos(x["theta"]))
     above: Vector = (sin_theta, p.let(-sin_psi * cos_theta), p.let(cos_psi * cos_theta))  # t_3 of the body above
     below: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(1))
-    sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
     cosine = above[2]
-    gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
     for angle in ("psi", "theta"):
         if x[angle].is_Symbol:
             p.rates[x[angle]] = x[f"{angle}1"]
-    gap_rate = p.rate(gap)  # (2.102)
-    size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
     up = p.let((1 + par["sign"]) / 2)
     down = p.let((1 - par["sign"]) / 2)
-    # (3.24): the axis of the other body, projected on the face of the slider and normalised.
+    # (3.24): the axis of the other body, projected on the face of the slider and normalised below.
     toward = add(scale(p.let(up - down * cosine), below), scale(p.let(down - up * cosine), above))
-    force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
-    slider = p.let_vector(add(scale(up, above), scale(down, below)), "slider")
-    arm = p.let(
-        -par["sign"] * (par["R"] - par["pr"])
-    )  # (3.25); the component r f_b is parallel to the force and has no moment
-    moment = p.let_vector(
-        scale(
-            arm,
-            (
-                slider[1] * force[2] - slider[2] * force[1],
-                slider[2] * force[0] - slider[0] * force[2],
-                slider[0] * force[1] - slider[1] * force[0],
-            ),
-        ),
-        "M",
-    )
+    slider = add(scale(up, above), scale(down, below))
+    dish = add(scale(down, above), scale(up, below))
+    lever = p.let(par["R"] - par["pr"])  # (3.25); the component r f_b is parallel to the force and has no moment
+    separation: Vector | None = x.get("d")
+    if separation is None:
+        sine = p.let(norm(above[0], above[1]))  # |t_3 x t_3'|, for arccos of (3.20)
+        gap = p.let(par["sc"] - par["R"] * ArcTan2(sine, cosine), "gap")  # (3.20), (3.21)
+    else:
+        p.declare_rates(separation, x["d1"])
+        sine = p.let(sp.sqrt(above[0] ** 2 + above[1] ** 2 + ALIGNED**2))
+        angle_ratio = p.let(ArcTan2(sine, cosine) / sine)
+        slider, dish = p.let_vector(slider, "slider"), p.let_vector(dish, "dish")
+        across = add(separation, scale(-p.let(dot(separation, slider)), slider))
+        aside = p.let_vector(add(scale(par["R"] * angle_ratio, toward), scale(par["R"] / lever, across)), "aside")
+        distance = p.let(sp.sqrt(dot(aside, aside) + ALIGNED**2))
+        gap = p.let(par["sc"] - distance, "gap")
+    gap_rate = p.rate(gap)  # (2.102)
+    size = p.let(par["kc"] * gap + par["cc"] * gap_rate, "fc")  # (3.23)
+    if separation is None:
+        force = p.let_vector(scale(p.let(size / sine), toward), "f")  # (3.22)
+        moment = scale(p.let(-par["sign"] * lever), cross(p.let_vector(slider, "slider"), force))
+    else:
+        force = p.let_vector(scale(p.let(size / distance), aside), "f")
+        # The virtual work of the force over a rotation of the dish, which changes the angle and the projection.
+        slope = p.let((angle_ratio * cosine - 1) / sine**2 * dot(force, dish))  # d(angle/sine)/d(cosine)
+        moment = scale(p.let(-par["sign"] * lever), cross(dish, add(scale(slope, slider), scale(angle_ratio, force))))
     p.write(
         b.rim,
-        {"f": force, "M": moment, "g": gap, "dg": gap_rate, "fc": size},
+        {"f": force, "M": p.let_vector(moment, "M"), "g": gap, "dg": gap_rate, "fc": size},
         tangents=("f", "M"),
         columns="MSFP_RIM_LOCAL",
     )

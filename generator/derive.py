@@ -78,6 +78,7 @@ def derive(spec: ModelSpec) -> Equations:
         programs.append(contact.rim(blocks))
     if effects.uplift:
         programs += [seat.seat_inside(blocks), seat.seat_edge(blocks)]
+        programs += [seat.offset(blocks), seat.rim_to_world(blocks)]
         return Equations(spec, blocks, tuple(programs))
     column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
     programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))

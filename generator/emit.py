@@ -15,10 +15,16 @@ from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
 from .derive import Equations
+from .gradients import COLUMNS, UNKNOWN_COLUMNS
 from .heat import HEAT_KERNEL
+from .interface import interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c
 from .program import Block, Use
+
+# Each is made from the template of its name.
+GRADIENT_FILES = ("msfp_gradient_kernels.h",)  # of models with gradients
+FILES = ("msfp.h", "msfp_symbols.h", "msfp_model.h", "msfp_kernels.h", "msfp_fields.h", "msfp_module.pyx")
 
 
 @dataclass(frozen=True)
@@ -239,8 +245,8 @@ def description(spec: ModelSpec) -> str:
     )
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...]) -> dict[str, str]:
-    """Render all generated files: {file name: text}."""
+def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:
+    """Render all generated files: {file name: text}. directional: kernels of a model with gradients."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = resources.files("msfp_gen.templates")
@@ -263,6 +269,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...]) -> dict[str, str]:
         "effects": spec.effects,
         "blocks": blocks,
         "functions": [function(k) for k in kernels],
+        "directional": [function(k) for k in directional],
+        "gradient_columns": (COLUMNS, UNKNOWN_COLUMNS),
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
         "description": json.dumps(description(spec)),
@@ -279,12 +287,14 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...]) -> dict[str, str]:
         "words": word_enums(),
         "row": rows.row(spec.effects),
         "extremes": rows.extremes(spec.effects),
-        "columns": {
-            "body": contract.names(contract.BODY),
-            "top": contract.names(contract.TOP),
-        },
+        "columns": {"body": contract.names(contract.BODY), "top": contract.names(contract.TOP)},
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
+        **interface_context(spec, shape_of(spec)),
     }
-    names = ("msfp_model.h", "msfp_kernels.h", "msfp_python.h", "msfp_module.pyx")
-    return {name: environment.get_template(f"{name}.jinja").render(context, file=name) for name in names}
+    names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
+    names |= {name: name for name in GRADIENT_FILES if spec.gradients}
+    return {
+        file: environment.get_template(f"{template}.jinja").render(context, file=file)
+        for file, template in names.items()
+    }

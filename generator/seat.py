@@ -16,7 +16,7 @@ import sympy as sp
 
 from .blocks import Blocks
 from .program import Program, Vector
-from .vectors import add, cross, dot, scale
+from .vectors import add, combine, cross, dot, project, scale
 
 Symbols = dict[str, Any]
 
@@ -70,3 +70,28 @@ def seat_edge(b: Blocks) -> Program:
     depth = p.let(par["ca"] * along + par["sa"] * size, "depth")
     normal = p.let_vector(add(scale(par["ca"], axis), scale(p.let(par["sa"] / size), across)), "n")
     return _write_force(p, b, par, depth, normal, s)
+
+
+def offset(b: Blocks) -> Program:
+    """Separation of a surface and its rate in the basis of the body below, on which the gap of its rim depends."""
+    p = Program("offset", "separation of the sphere centres in the basis of the body below")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3", "w"))
+    x: Symbols = p.read(b.coordinates, "x", active=("d", "d1"))
+    basis = (body["t1"], body["t2"], body["t3"])
+    for axis in basis:
+        p.declare_rates(axis, p.let_vector(cross(body["w"], axis), "dt"))  # (2.36)
+    p.declare_rates(x["d"], x["d1"])
+    along = p.let_vector(project(basis, x["d"]), "d")
+    p.write(b.offset, {"d": along, "d1": p.rate_vector(along)})
+    return p
+
+
+def rim_to_world(b: Blocks) -> Program:
+    """Rim force along E, and the moment on the slider that its work over a separation requires (docs/uplift.md)."""
+    p = Program("rim_to_world", "rim force: from the basis of the body below to E, and its moment by the separation")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    x: Symbols = p.read(b.coordinates, "x", active=("d",))
+    rim: Symbols = p.read(b.vector, "rim")
+    force = p.let_vector(combine((body["t1"], body["t2"], body["t3"]), rim["F"]), "F")
+    p.write(b.rim_wrench, {"F": force, "T": cross(force, x["d"])})
+    return p

@@ -117,7 +117,7 @@ def top_energy(b: Blocks) -> Program:
     p = Program("top_energy", "energy of the supported mass in the frame moving with the base")
     par: Symbols = p.read(b.top_parameters, "par", active=False)
     body: Symbols = p.read(b.body, "b", active=False)
-    base: Symbols = p.read(b.base_motion, "o", active=False)
+    base: Symbols = p.read(b.base_motion, "base", active=False)
     foot: Symbols = p.read(b.foot, "f", active=False)
     heights = {"C": foot["y"], "V": foot["y1"], "A": foot["y2"]}
     r, v, _ = mass_point(p, par, {**body, **{name: (*body[name][:2], z) for name, z in heights.items()}})

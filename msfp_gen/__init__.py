@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.simulation.simulate import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
     from msfp_gen.studies.bounding import bound
+    from msfp_gen.studies.study.run import study
 
 # Public name -> the module that defines it; `presets` is a module itself.
 _MODULES = {
@@ -60,6 +61,7 @@ _MODULES = {
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",
     "simulate_batch": "simulation.batch",
+    "study": "studies.study.run",
 }
 
 __all__ = [
@@ -92,6 +94,7 @@ __all__ = [
     "presets",
     "simulate",
     "simulate_batch",
+    "study",
 ]
 
 

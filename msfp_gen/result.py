@@ -53,6 +53,26 @@ class Result(RunData):
 
         return summarise(self)
 
+    @cached_property
+    def gradient(self) -> xr.Dataset:
+        """Derivatives of the dataset with respect to parameters, first dimension `parameter`; docs/gradients.md.
+
+        Raises InputError where the run computed none.
+        """
+        from msfp_gen.results.gradient_dataset import to_gradient_dataset
+
+        return to_gradient_dataset(self)
+
+    @cached_property
+    def gradient_summary(self) -> dict[str, dict[str, Any]]:
+        """Derivatives of the scalars of the summary, by the path of the parameter; docs/gradients.md.
+
+        Raises InputError where the run computed none.
+        """
+        from msfp_gen.analysis.gradient_summary import summarise_gradients
+
+        return summarise_gradients(self)
+
     def characterise(self) -> Characterisation:
         """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/characterise.md).
 

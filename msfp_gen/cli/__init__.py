@@ -14,11 +14,13 @@ from msfp_gen.cli import (
     building,
     cache_command,
     drawing,
+    exploring,
     exporting,
     records,
     reporting,
     running,
     serving,
+    studying,
 )
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import signals_as_interrupts
@@ -38,8 +40,8 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    running, batching, exporting, drawing, assessment_commands, benching, reporting, records, building, serving,
-    cache_command,
+    running, batching, studying, exporting, drawing, assessment_commands, benching, reporting, exploring, records,
+    building, serving, cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)
 

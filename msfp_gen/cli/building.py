@@ -27,12 +27,12 @@ def generate(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Write sources, module, README and a C example there."),
+        typer.Option("-o", "--output", metavar="DIR", help="Write the module, its sources and a README there."),
     ] = None,
     *,
     effects: Effects,
 ) -> None:
-    """Derive and compile the equations of a stack layout."""
+    """Derive and compile the equations of a stack layout (a library for C and Fortran: export)."""
     spec = ModelSpec(Layout(n, m, p), effects)
     from msfp_gen.embedding import check_guide, write_guide
     from msfp_gen.jit.build import generate_to, prepare
@@ -44,8 +44,7 @@ def generate(
         info = prepare(spec, progress) if output is None else generate_to(spec, output, progress)
     show([build_table(info)])
     if output is not None:
-        write_guide(spec, info.folder, info.module)
-        note(f"start with {info.folder / 'README.md'}; `make run` there builds and runs a C example")
+        note(f"start with {write_guide(spec, info.folder, info.module)}; for C and Fortran: msfp-gen export")
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")

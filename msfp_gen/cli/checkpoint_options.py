@@ -71,7 +71,9 @@ class CheckpointOptions:
 
     def remove_files(self) -> None:
         """Remove the checkpoint, after all output is written."""
-        for file in self._files:
+        from msfp_gen.simulation.checkpoint import kept_rows
+
+        for file in [*self._files, *([] if self.path is None else kept_rows(self.path))]:
             file.unlink(missing_ok=True)
 
     @property

@@ -158,8 +158,11 @@ class Progress:
 
 
 @contextmanager
-def building() -> Iterator[Callable[[str, float], None]]:
-    """Progress of a build: the current task and per cent done; without a terminal one line per task."""
+def building(kept: bool = True) -> Iterator[Callable[[str, float], None]]:
+    """Progress of a build: the current task and per cent done; without a terminal one line per task.
+
+    kept: whether the cache keeps what is built.
+    """
     task, line, begin = "", Progress(""), monotonic()
 
     def report(doing: str, share: float) -> None:
@@ -174,4 +177,4 @@ def building() -> Iterator[Callable[[str, float], None]]:
     with line as update:
         yield report
     if task == "compiling":
-        note(f"built in {monotonic() - begin:.1f} s; later runs load it from the cache")
+        note(f"built in {monotonic() - begin:.1f} s{'; later runs load it from the cache' if kept else ''}")

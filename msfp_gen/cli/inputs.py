@@ -34,10 +34,10 @@ def build(scene: Scene) -> None:
 def run_scene(scene: Scene, **options: Any) -> tuple[Result | None, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
     from msfp_gen.result import Result
-    from msfp_gen.simulation.memory import require_memory
+    from msfp_gen.simulation.memory import require_room
     from msfp_gen.simulation.simulate import simulate
 
-    require_memory([scene])
+    require_room(scene, options.get("stream"))
     build(scene)
     with Progress(scene.name or "run") as progress:
         try:

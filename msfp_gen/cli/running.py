@@ -13,8 +13,8 @@ from msfp_gen.cli.checkpoint_options import NO_CHECKPOINT, CheckpointFile, Check
 from msfp_gen.cli.console import Output, SceneName, choices_of, note, number, say, show
 from msfp_gen.cli.error_options import Budget, ErrorTarget, Explain, TargetError
 from msfp_gen.cli.inputs import run_scene
-from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
-from msfp_gen.errors import RunError
+from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ app = typer.Typer()
     epilog="Example:\n\n\b\n  msfp-gen run fenz-test2 -o test2.nc --plot test2.png\n  msfp-gen run scene.toml --json\n"
     "  msfp-gen run scene.toml --error 0.5%   # estimate the error of the run, and the cost of a smaller one\n"
     "  msfp-gen run scene.toml -o out.mat   # or .nc, .csv, .parquet\n"
+    "  msfp-gen run scene.toml -o out.nc --stream   # rows stay on disk\n"
     "  msfp-gen run scene.toml -o out.nc --checkpoint run.ck\n  msfp-gen run scene.toml -o out.nc --resume run.ck"
 )
 def run(
@@ -54,6 +55,9 @@ def run(
     strict: Annotated[
         bool, typer.Option("--strict", help="Stop where an effect that the model leaves out becomes significant.")
     ] = False,
+    stream: Annotated[
+        bool, typer.Option("--stream", help="Keep the rows on disk, not in memory, and write all of them to --output.")
+    ] = False,
     error: TargetError = None,
     explain: Explain = False,
     budget: Budget = None,
@@ -64,17 +68,20 @@ def run(
     """Simulate a scene."""
     checkpoints = CheckpointOptions.of(checkpoint, every, resume)
     others = {"--rtol": rtol, "--method": method, "--checkpoint": checkpoint, "--resume": resume}
+    others["--stream"] = stream or None
     target = ErrorTarget.of(error, explain, budget, others)
     if output is not None:
         from msfp_gen.results.export import check_result_path
 
         check_result_path(output, "--output")
+    if stream and (output is None or output.suffix.lower() not in DATASET_SUFFIXES):
+        raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     from msfp_gen.scene.file.loader import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json, checkpoints, target, strict):
+    for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
         note(f"wrote {path}")
 
 
@@ -110,19 +117,23 @@ def _run(
     checkpoints: CheckpointOptions = NO_CHECKPOINT,
     target: ErrorTarget | None = None,
     strict: bool = False,
+    stream: bool = False,
 ) -> list[Path]:
-    """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised."""
+    """Simulate, print and save; returns the paths. A failed run is printed and saved before its error is raised.
+
+    stream: the run writes the output itself.
+    """
     found = None if target is None else target.simulate(scene)
-    result, failure = (
-        run_scene(scene, strict=strict, **checkpoints.arguments) if found is None else (found.result, None)
-    )
+    options = {"strict": strict} | checkpoints.arguments | ({"stream": output} if stream else {})
+    with checkpoints.hint_on_write_error():
+        result, failure = run_scene(scene, **options) if found is None else (found.result, None)
     saved: list[Path] = []
     if result is not None:
         _report(result, as_json, {} if found is None else {"accuracy": found.as_dict()})
         if found is not None and not as_json:
             show(found.tables)
         with checkpoints.hint_on_write_error():
-            saved = _save(result, output, plot)
+            saved = _save(result, output, plot, written=stream)
     if failure is not None:
         files = f"; what was computed until then is in {' and '.join(map(str, saved))}" if saved else ""
         message = f"{failure}{files}{checkpoints.hint(failure)}"
@@ -143,9 +154,9 @@ def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -
         note(line)
 
 
-def _save(result: Result, output: Path | None, plot: Path | None) -> list[Path]:
-    """Write the result and the figure to the given paths; returns them."""
-    if output is not None:
+def _save(result: Result, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:
+    """Write the result and the figure to the given paths; returns them. written: the result is there already."""
+    if output is not None and not written:
         result.save(output)
     if plot is not None:
         from msfp_gen.figures import plot_result

@@ -36,12 +36,14 @@ def check_folder(folder: Path, name: str = "output") -> None:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, tidy: bool = True) -> Iterator[Path]:
     """A temporary path beside `path`: renamed to `path` if the block succeeds, deleted if it raises.
 
-    A process that is killed while writing leaves its temporary file behind; a later write to `path` deletes it.
+    A process that is killed while writing leaves its temporary file behind; a later write to `path` deletes it. tidy:
+    whether to look for such files, which takes time in a folder of many thousands.
     """
-    clear_leftovers(path)
+    if tidy:
+        clear_leftovers(path)
     temporary = path.with_name(f".{path.stem}-{token_hex(4)}{path.suffix}")
     try:
         yield temporary
@@ -55,12 +57,12 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_bytes(path: Path, parts: Iterable[bytes | memoryview]) -> None:
+def write_bytes(path: Path, parts: Iterable[bytes | memoryview], *, tidy: bool = True) -> None:
     """Write a file completely or not at all: the bytes are flushed to disk before the file is renamed to `path`.
 
-    Raises OSError if the disk is full or the folder is not writable.
+    tidy: as of `replacing`. Raises OSError if the disk is full or the folder is not writable.
     """
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    with replacing(path, tidy=tidy) as temporary, temporary.open("wb") as file:
         file.writelines(parts)
         file.flush()
         os.fsync(file.fileno())
@@ -71,8 +73,17 @@ def clear_leftovers(path: Path, age: float = 3600.0) -> None:
 
     Younger ones may belong to a process that is still writing.
     """
+    _clear(path.parent, escape(path.stem), path.suffix, age)
+
+
+def clear_all_leftovers(folder: Path, suffix: str, age: float = 3600.0) -> None:
+    """Delete the temporary files, as of `clear_leftovers`, of all files in `folder` that end in `suffix`."""
+    _clear(folder, "*", suffix, age)
+
+
+def _clear(folder: Path, stem: str, suffix: str, age: float) -> None:
     limit = time.time() - age
-    for temporary in path.parent.glob(f".{escape(path.stem)}-{'[0-9a-f]' * 8}{escape(path.suffix)}"):
+    for temporary in folder.glob(f".{stem}-{'[0-9a-f]' * 8}{escape(suffix)}"):
         with suppress(OSError):
             if temporary.stat().st_mtime <= limit:
                 temporary.unlink()

@@ -1,5 +1,6 @@
-"""What explains a folder of generated sources: README.md, Makefile and an example in C (docs/embedding.md)."""
+"""Models for other programs: the C library of `export`, and the README of a generated folder (docs/embedding.md)."""
 
-from msfp_gen.embedding.guide import GUIDE, check_guide, write_guide
+from msfp_gen.embedding.guide import README, check_guide, write_guide
+from msfp_gen.embedding.library import Library, export_library
 
-__all__ = ["GUIDE", "check_guide", "write_guide"]
+__all__ = ["README", "Library", "check_guide", "export_library", "write_guide"]

@@ -1,4 +1,4 @@
-"""Build of a compiled model: taken from the cache if it is there, else derived, lowered, emitted, compiled and stored.
+"""Build of a compiled model: taken from the wheel or the cache, else derived, lowered, emitted, compiled and stored.
 
 | stage | module | input -> output |
 |---|---|---|
@@ -23,6 +23,7 @@ from types import ModuleType
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import cache
 from msfp_gen.jit.compiler import LOG_NAME, compile_extension
+from msfp_gen.jit.prebuilt import find_prebuilt, prebuilt_key
 from msfp_gen.jit.translation import find_translation, keep_translation
 from msfp_gen.specification.layout import ModelSpec
 
@@ -39,7 +40,7 @@ class BuildInfo:
         folder: folder of the extension, its sources, manifest and `build.log`.
         module: name of the extension module.
         spec: name of the model, `ModelSpec.key`.
-        cached: whether the cache held the model before the call.
+        cached: whether the model was there before the call, in the cache or in the wheel.
         stages: stage -> its time when the model was built, now or earlier [s].
         seconds: duration of this call [s].
         statements, operations: numbers of statements and of arithmetic operations of the emitted kernels.
@@ -59,7 +60,7 @@ class BuildInfo:
 
 
 def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = False) -> BuildInfo:
-    """Build the model unless the cache holds it; the extension is not imported.
+    """Build the model unless the wheel or the cache holds it; the extension is not imported.
 
     Args:
         spec: layout and effects.
@@ -71,6 +72,9 @@ def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = 
         InputError: the cache folder cannot be written to.
     """
     begin = perf_counter()
+    if not portable and (prebuilt := find_prebuilt(spec)) is not None:
+        folder, ready = prebuilt
+        return _info(spec, ready, folder, prebuilt_key(ready), True, perf_counter() - begin)
     entry = cache.Entry.of(spec, portable)
     manifest, built = entry.find(), False
     if manifest is None:
@@ -81,18 +85,7 @@ def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = 
             if manifest is None:
                 manifest, built = _build(entry, part, notify), True
                 entry.publish(part)
-    return BuildInfo(
-        path=entry.folder / manifest.extension,
-        folder=entry.folder,
-        module=entry.module,
-        spec=spec.key,
-        cached=not built,
-        stages=manifest.stages,
-        seconds=perf_counter() - begin,
-        statements=manifest.statements,
-        operations=manifest.operations,
-        key=entry.identity,
-    )
+    return _info(spec, manifest, entry.folder, entry.identity, not built, perf_counter() - begin)
 
 
 def load(spec: ModelSpec, progress: Progress | None = None) -> tuple[ModuleType, BuildInfo]:
@@ -146,13 +139,30 @@ def load_extension(path: Path, module: str) -> ModuleType:
     return extension
 
 
-def runtime_sources() -> dict[str, str]:
-    """Hand-written C files that are compiled with every model: file name, without its folder -> text.
+def runtime_sources(gradients: bool = False) -> dict[str, str]:
+    """Hand-written C files that are compiled with a model: file name, without its folder -> text.
 
-    Names are unique across the folders, so that generated sources lie in one folder.
+    gradients: with those that only models with gradients have. Names are unique across the folders, so that generated
+    sources lie in one folder.
     """
     files = sorted((cache.PACKAGE / "runtime").rglob("*.[ch]"))
+    files = [path for path in files if gradients or path.parent.name != "gradients"]
     return {path.name: path.read_text(encoding="utf-8") for path in files}
+
+
+def _info(spec: ModelSpec, manifest: cache.Manifest, folder: Path, key: str, cached: bool, seconds: float) -> BuildInfo:
+    return BuildInfo(
+        path=folder / manifest.extension,
+        folder=folder,
+        module=manifest.module,
+        spec=spec.key,
+        cached=cached,
+        stages=manifest.stages,
+        seconds=seconds,
+        statements=manifest.statements,
+        operations=manifest.operations,
+        key=key,
+    )
 
 
 def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest:
@@ -164,7 +174,11 @@ def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest
     wrapper = next(name for name in generated.files if name.endswith(".pyx"))
     translated = f"{Path(wrapper).stem}.c"
     known = find_translation(generated.files[wrapper])
-    sources = {**runtime_sources(), **generated.files, **({translated: known} if known is not None else {})}
+    sources = {
+        **runtime_sources(entry.spec.gradients),
+        **generated.files,
+        **({translated: known} if known is not None else {}),
+    }
     begin = perf_counter()
     extension = compile_extension(
         sources,

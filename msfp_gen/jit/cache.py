@@ -135,7 +135,7 @@ class Entry:
         inputs: dict[str, Any] = {
             "manifest": 3,
             "spec": spec.key,
-            "sources": _digest_sources(),
+            "sources": digest_sources(),
             "tools": {"msfp-gen": __version__, **{tool: tool_version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
@@ -235,7 +235,7 @@ def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _digest_sources() -> str:
+def digest_sources() -> str:
     """The sha256 of names and contents of all files of `SOURCES`. Raises InputError if a folder has none."""
     total = hashlib.sha256()
     for folder, pattern in SOURCES:

@@ -7,6 +7,7 @@ output are written to `build.log` beside the sources.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import shlex
@@ -27,6 +28,9 @@ from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 LOG_NAME = "build.log"
 EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
 PLATFORM_COMPILERS = ("cc", "gcc", "clang")
+# The compiler of the package ziglang compiles for the processor at hand and with traps for undefined behaviour, unless
+# it is told not to.
+ZIG_OPTIONS = ("cc", "-mcpu=baseline", "-fno-sanitize=undefined")
 
 # Warnings appear in the log only: a newer compiler of a user may warn where those of the tests (-Werror) do not.
 # MSFP_GEN_CFLAGS adds flags for the C code of models, such as -march=native.
@@ -79,7 +83,9 @@ class Step(NamedTuple):
 
 
 def find_compiler() -> Compiler:
-    """The compiler that `CC` names, else the one that built Python, else cc, gcc or clang on the path.
+    """The compiler that `CC` names, else the one that built Python, else cc, gcc or clang on the path, else ziglang.
+
+    ziglang is a package with a C compiler, the extra "compiler" of msfp-gen.
 
     Raises
     ------
@@ -92,16 +98,27 @@ def find_compiler() -> Compiler:
     words(CFLAGS)
     chosen = shlex.join(words(COMPILER))
     candidates = [chosen] if chosen else [sysconfig.get_config_var("CC") or "", *PLATFORM_COMPILERS]
-    for candidate in filter(None, candidates):
-        command = shlex.split(candidate)
+    commands = [shlex.split(candidate) for candidate in filter(None, candidates)]
+    if not chosen and (zig := zig_program()) is not None:
+        commands.append([str(zig), *ZIG_OPTIONS])
+    for command in commands:
         path = shutil.which(command[0])
         if path is not None and (version := _version(command)):
             return Compiler(tuple(command), path, version)
     tried = f"CC={chosen}" if chosen else ", ".join(dict.fromkeys(filter(None, candidates)))
     raise CompileError(
         f"no C compiler found (looked for {tried}): install one (apt install gcc, xcode-select --install, "
-        "conda install c-compiler) or name it with CC=..."
+        "conda install c-compiler, or pip install 'msfp-gen[compiler]') or name it with CC=..."
     )
+
+
+def zig_program() -> Path | None:
+    """The program of the package ziglang; None where it is not installed."""
+    found = importlib.util.find_spec("ziglang")
+    for folder in (found.submodule_search_locations or ()) if found is not None else ():
+        if (program := Path(folder) / "zig").is_file():
+            return program
+    return None
 
 
 def check_headers() -> Path:
@@ -158,12 +175,12 @@ def compile_extension(
     c_flags = (*FLAGS["c"], *processor, *FLAGS["user"])
     chains = [
         _wrapper_steps(wrapper, module, compiler, include, translated=f"{wrapper}.c" in sources),
-        *([_compile_step(name, compiler, c_flags)] for name in units),
+        *([compile_step(name, compiler, c_flags)] for name in units),
     ]
-    for done in _run_parallel(chains, log.run):
+    for done in run_parallel(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
-    objects = [_object_file(name) for name in [*units, f"{wrapper}.c"]]
+    objects = [object_file(name) for name in [*units, f"{wrapper}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
     if not target.is_file():
@@ -213,7 +230,7 @@ def first_error(output: str, code: int) -> str:
     return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
 
 
-def _run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
+def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) -> Iterator[int]:
     """Run all chains, one a processor at a time, and yield how many are finished; after a failure none is started."""
 
     def run_chain(chain: Sequence[Step]) -> None:
@@ -237,8 +254,9 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
-    return Step(name, (*compiler.command, *flags, "-c", name, "-o", _object_file(name)))
+def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
+    """Compilation of one C file; the object lies beside it."""
+    return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
 
 
 def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path, translated: bool) -> list[Step]:
@@ -249,7 +267,7 @@ def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path,
     pyx, c = f"{wrapper}.pyx", f"{wrapper}.c"
     cython = Step(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
     name = () if wrapper == module else (f"-DPyInit_{wrapper}=PyInit_{module}",)
-    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", _object_file(c))
+    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", object_file(c))
     return [*([] if translated else [cython]), Step(c, command)]
 
 
@@ -259,8 +277,9 @@ def _link_command(compiler: Compiler) -> tuple[str, ...]:
     return (*compiler.command, *platform[1:])
 
 
-def _object_file(name: str) -> str:
-    return f"{Path(name).stem}.o"
+def object_file(name: str) -> str:
+    """Object of a C file, beside it."""
+    return str(Path(name).with_suffix(".o"))
 
 
 def _version(command: Sequence[str]) -> str:

@@ -17,6 +17,7 @@ from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.build import load_extension
 from msfp_gen.jit.cache import cache_root
 from msfp_gen.jit.compiler import check_headers, compile_extension, find_compiler
+from msfp_gen.jit.prebuilt import find_prebuilt, prebuilt_specs
 
 DISTRIBUTION = "msfp-gen"
 FREE_DISK = 200e6  # [bytes] space for several dozen compiled models
@@ -44,10 +45,11 @@ class Check:
 
 
 def diagnose() -> list[Check]:
-    """Check Python, each dependency, compiler, headers, a build of a small module, cache folder and disk."""
+    """Check Python, each dependency, models of the wheel, compiler, headers, a small build, cache folder and disk."""
     return [
         check_python(),
         *check_dependencies(),
+        check_prebuilt(),
         check_compiler(),
         check_python_headers(),
         check_build(),
@@ -76,6 +78,16 @@ def check_dependencies() -> list[Check]:
             Check(DISTRIBUTION, False, "not installed", "pip install -e . in the checkout, or pip install msfp-gen")
         ]
     return [_check_requirement(line) for line in declared if "extra ==" not in line]
+
+
+def check_prebuilt() -> Check:
+    """The models that came compiled; a sound installation may have none."""
+    try:
+        count = sum(find_prebuilt(spec) is not None for spec in prebuilt_specs())
+    except InputError as error:
+        return Check("prebuilt models", False, *_found_and_remedy(error))
+    found = f"{count} that need no compiler" if count else "none: a model is compiled at its first use"
+    return Check("prebuilt models", True, found)
 
 
 def check_compiler() -> Check:

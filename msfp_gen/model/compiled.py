@@ -84,18 +84,25 @@ class Run(Protocol):
 
     @property
     def row_count(self) -> int:
-        """Number of recorded rows."""
+        """Number of rows held: those recorded, less those dropped."""
+
+    @property
+    def dropped_rows(self) -> int:
+        """Number of rows dropped."""
 
     @property
     def rows(self) -> Array:
-        """Recorded rows, shape (T, row size)."""
+        """Rows held, shape (T, row size)."""
 
     @property
     def events(self) -> list[EventRow]:
         """Time, surface, kind, displacement and top force of every event."""
 
-    def advance(self, steps: int = 2000) -> bool:
-        """Take at most `steps` steps; False where the run has ended."""
+    def advance(self, steps: int = 2000, rows: int = 0) -> bool:
+        """Take at most `steps` steps, fewer once so many `rows` are held (0: any); False where the run has ended."""
+
+    def drop_rows(self) -> None:
+        """Forget all rows but the last, which the caller has stored elsewhere."""
 
     def record_now(self) -> None:
         """Record a row of the current state, unless there is one."""
@@ -105,6 +112,18 @@ class Run(Protocol):
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
+
+    def start_gradients(self, *, steps: Sequence[float] = (), **derivatives: Array) -> None:
+        """Begin derivatives with respect to parameters; of everything that the run is given (the wrapper names it)."""
+
+    def gradient_rows(self, count: int) -> Array:
+        """Derivatives of `rows` with respect to `count` parameters, shape (T, count, row size)."""
+
+    def gradient_events(self, count: int) -> Array:
+        """Derivatives of time, displacement and top force of the events, shape (events, count, 7)."""
+
+    def gradient_extremes(self, count: int) -> Array:
+        """Derivatives of `extremes`, shape (count, size)."""
 
 
 class Port(Protocol):

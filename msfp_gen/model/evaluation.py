@@ -57,9 +57,11 @@ def named_vectors(n: int, points: Array, rotations: Array, bases: Array) -> dict
     of each body. bases: rows t_1, t_2, t_3 of each body.
     """
     out: dict[str, Array] = {}
+    between = "" if n < 10 else "_"  # "11" would be both a point of body 1 and the centre of body 11
     for k in range(1, n + 1):
-        bottom = "01" if k == 1 else f"{k - 1}{k}"
-        names = (bottom, str(k), f"{k}{k}") if k == n else (bottom, str(k), f"{k}{k}", f"{k}c")
+        bottom = "01" if k == 1 else f"{k - 1}{between}{k}"
+        top = f"{k}{between}{k}"
+        names = (bottom, str(k), top) if k == n else (bottom, str(k), top, f"{k}c")
         for i, name in enumerate(names):
             for j, kind in enumerate("rva"):
                 out[f"{kind}_{name}"] = points[k - 1, i, j]

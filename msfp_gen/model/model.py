@@ -49,7 +49,7 @@ class Model:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle layout and effects alone: the model is loaded from the cache, or built, where it is unpickled."""
-        return build_model, (self.layout, self.effects)
+        return build_model, (self.layout, self.effects, self.spec.gradients)
 
     def __repr__(self) -> str:
         return f"Model({self.spec.key})"
@@ -226,9 +226,10 @@ class Model:
 
         q, v, a: angles of bodies 2..n, rates and accelerations, shape (n-1, 3) [rad], [rad/s], [rad/s^2]. base: shape
         (3, 6): u_g1, u_g2, u_g3 [m], psi_1, theta_1, phi_1 [rad], and their first and second derivatives; None: zero.
-        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], "v_..." [m/s], "a_..." [m/s^2], "omega_k" and
-        "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1, t_2, t_3. Components along E1,
-        E2, E3. Raises InputError for wrong shapes and planar models.
+        Returns {"r_01", "r_1", "r_11", "r_1c", "r_12", ...} [m], rates of names with v for r [m/s] and
+        with a [m/s^2], "omega_k" and "omega'_k" [rad/s], "alpha_k" and "alpha'_k" [rad/s^2], "t_k" (3, 3): rows t_1,
+        t_2, t_3. In stacks of ten and more bodies pairs have a stroke, "r_1_2", since "r_12" is the centre of body 12.
+        Components along E1, E2, E3. Raises InputError for wrong shapes and planar models.
         """
         if self.planar:
             raise InputError("kinematics: not available for a planar model; build it with dimension = 'spatial'")
@@ -268,13 +269,17 @@ class Model:
         return into_plane(state) if self.planar else state
 
 
-def build_model(layout: Layout, effects: Effects | None = None, *, progress: Progress | None = None) -> Model:
+def build_model(
+    layout: Layout, effects: Effects | None = None, gradients: bool = False, *, progress: Progress | None = None
+) -> Model:
     """The compiled model of a layout: derived, emitted and compiled once, then imported from the cache.
 
     Parameters
     ----------
     layout, effects
         They determine the equations; `effects=None` means `Effects()`.
+    gradients
+        Whether runs of the model can compute derivatives with respect to parameters (docs/gradients.md).
     progress
         Called with the name of the current step of the build and the completed share, 0 to 1; None: no calls.
 
@@ -283,10 +288,10 @@ def build_model(layout: Layout, effects: Effects | None = None, *, progress: Pro
     CompileError
         If there is no C compiler or it refuses the emitted sources.
     InputError
-        If the cache cannot be written.
+        If the cache cannot be written, or the effects have no gradients.
 
     """
-    spec = ModelSpec(layout, Effects() if effects is None else effects)
+    spec = ModelSpec(layout, Effects() if effects is None else effects, gradients)
     if (model := _models.get(spec)) is not None:  # read without the lock, which another thread may hold during a build
         return model
     with _models_lock:

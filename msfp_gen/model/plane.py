@@ -34,7 +34,9 @@ class State:
 def rotated(vectors: Array, angle: float) -> Array:
     """Components (..., 3) of vectors in a frame that is rotated by `angle` [rad] about E3."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.ascontiguousarray(vectors @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    one, two, three = np.moveaxis(vectors, -1, 0)
+    # Component by component: the digits of a product of matrices depend on the number of vectors.
+    return np.stack([c * one + s * two, c * two - s * one, three], axis=-1)
 
 
 def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
@@ -43,7 +45,7 @@ def tilts_into_plane(q: Array, azimuth: float, name: str) -> Array:
     q: shape (..., 3) [rad]; `name` is used in messages. Raises InputError for tilts outside the plane.
     """
     across, along, sign = (0, 1, 1.0) if abs(azimuth) < 1e-9 else (1, 0, -1.0)
-    if azimuth and abs(azimuth - np.pi / 2) > 1e-9 and np.any(q):
+    if min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9 and np.any(q):
         raise InputError(
             f"{name}: a planar model accepts a tilted state in the E1-E3 or E2-E3 plane only; use dimension = 'spatial'"
         )
@@ -144,3 +146,33 @@ def out_of_plane(values: Array, azimuth: float, kind: Kind) -> Array:
     if abs(azimuth - np.pi / 2) < 1e-9:
         out[..., 1] = 0.0
     return out
+
+
+def tilts_out_of_plane(q: Array, v: Array, azimuth: float) -> tuple[Array, Array, Array]:
+    """Angles psi, theta and rates of a stack that tilts in a vertical plane above a level base: exact at any azimuth.
+
+    q, v: theta of bodies 2..n in the frame of the plane, shape (n-1, 3) [rad], [rad/s]. Returns both without spin, with
+    the axes t_3 and their rates of the planar stack; and the twist of bodies 1..n-1 about t_3, shape (n-1,) [rad], by
+    which their t_1 is turned from where a rotation in the plane has it.
+    """
+    along, up = np.array([np.cos(azimuth), np.sin(azimuth), 0.0]), np.array([0.0, 0.0, 1.0])
+    side = np.cross(up, along)
+    angles, rates, twist = np.zeros_like(q), np.zeros_like(v), np.zeros(len(q))
+    t, w = np.eye(3), np.zeros(3)  # rows t_1, t_2, t_3 of the body below, and its angular velocity
+    for k, (tilt, speed) in enumerate(zip(np.cumsum(q[:, 1]), np.cumsum(v[:, 1]), strict=True)):
+        axis = np.sin(tilt) * along + np.cos(tilt) * up
+        x, y, z = t @ axis
+        psi, theta, before = np.arctan2(-y, z), np.arcsin(x), t[0]
+        second = np.cos(psi) * t[1] + np.sin(psi) * t[2]  # (2.4)
+        t = np.array([np.cross(second, axis), second, axis])
+        rest = np.cross(speed * side - w, axis)
+        rate = -(rest @ t[1]) / np.cos(theta), rest @ t[0]
+        w = w + rate[0] * before + rate[1] * t[1]  # (3.12)
+        angles[k, :2], rates[k, :2] = (psi, theta), rate
+        if k + 1 < len(q):
+            radial = np.cross(side, axis)  # of the plane, turned with the body
+            twist[k + 1] = np.arctan2(
+                np.sin(azimuth) * (t[0] @ radial) + np.cos(azimuth) * (t[0] @ side),
+                np.cos(azimuth) * (t[0] @ radial) - np.sin(azimuth) * (t[0] @ side),
+            )
+    return angles, rates, twist

@@ -79,7 +79,8 @@ class Motion(Trajectory):
         """
         positive("duration", duration)
         end, speed, acceleration = (self.evaluate(self.duration, d) for d in range(3))
-        peaks = np.max(np.abs(self.coefficients), axis=0)
+        # Relative to all displacements, or all angles: a component may be the rounding of a cosine.
+        peaks = np.repeat(np.abs(self.coefficients).reshape(-1, 2, 3, piecewise.ORDER).max(axis=(0, 2)), 3, axis=0)
         if np.any(np.abs(speed) > 1e-9 * peaks[:, 1]):
             worst = int(np.argmax(np.abs(speed)))
             raise InputError(

@@ -80,7 +80,9 @@ class Prescribed:
         """Knots at which a channel jumps, ndarray, shape (j,), [s]."""
         width = np.diff(self.knots)[:-1, None]
         left = np.sum(self.coefficients[:-1] * width[..., None] ** np.arange(ORDER), axis=2)
-        size = np.abs(self.coefficients[:, :, 0]).max(axis=0)
+        # Relative to all forces, all moments or all angles: a component may be the rounding of a cosine.
+        values = np.abs(self.coefficients[:, :, 0]).max(axis=0)
+        size = np.concatenate([np.full(len(part), part.max()) for part in np.split(values, max(1, len(values) // 3))])
         return self.knots[1:-1][np.any(np.abs(self.coefficients[1:, :, 0] - left) > 1e-9 * size, axis=1)]
 
     @cached_property

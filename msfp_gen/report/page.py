@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
-SCRIPTS = ("three.min.js", "data.js", "chart.js", "section.js", "scene.js", "page.js")
+SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "section.js", "scene.js", "page.js")
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 FIGURES = {
     "overview": "Loops and sliding",

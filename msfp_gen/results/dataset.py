@@ -19,6 +19,8 @@ from msfp_gen.results.run_data import RunData
 if TYPE_CHECKING:
     import xarray as xr
 
+    from msfp_gen.results.stored_group import ArrayDigest
+
 
 Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
 
@@ -28,14 +30,18 @@ def to_dataset(result: RunData) -> xr.Dataset:
     import xarray as xr
 
     history = result.history
-    coordinates = {
+    variables = dict([*row_variables(history), *energy_variables(history), *_events(result)])
+    return xr.Dataset(variables, coordinates_of(history), attrs=_attributes(result))
+
+
+def coordinates_of(history: History) -> dict[str, Any]:
+    """The coordinates of the dataset: time, bodies, surfaces, and the labels of dimensions of fixed length."""
+    return {
         "time": ("time", history.time, {"units": "s", "long_name": "time t"}),
         "body": ("body", np.arange(2, history.surfaces + 2), {"long_name": "moving body k, base is 1"}),
         "surface": ("surface", np.arange(1, history.surfaces + 1), {"long_name": "sliding surface, bottom first"}),
         **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
     }
-    variables = dict([*_rows(history), *_energies(history), *_events(result)])
-    return xr.Dataset(variables, coordinates, attrs=_attributes(result))
 
 
 def write_netcdf(result: RunData, path: str | Path) -> Path:
@@ -48,7 +54,7 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
     path = check_output(path, DATASET_SUFFIXES)
     dataset = to_dataset(result)
     pieces = to_pieces(result.scene.motion) if dataset.attrs["motion"] == PIECES else None
-    dataset.attrs[DIGEST] = _digest(dataset, pieces)
+    dataset.attrs[DIGEST] = digest_of_dataset(dataset, pieces)
     # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     encoding = {
         name: {"zlib": True, "complevel": 1}
@@ -65,32 +71,41 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
     return path
 
 
-def _digest(dataset: xr.Dataset, pieces: xr.Dataset | None) -> str:
-    """The digest of the values that `read_result` reads."""
+def digest_of_dataset(
+    dataset: xr.Dataset, pieces: xr.Dataset | None, rows: Mapping[str, ArrayDigest] | None = None
+) -> str:
+    """The digest of the values that `read_result` reads. rows: of what was written in blocks, instead of `dataset`."""
     from msfp_gen.scene.file.stored_motion import GROUP
 
-    arrays = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
+    arrays: dict[str, Any] = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
     arrays["time"] = dataset["time"].to_numpy()
     about = dict(dataset.attrs)
+    arrays |= rows or {}
     if pieces is not None:
         arrays |= {f"{GROUP}/{name}": variable.to_numpy() for name, variable in pieces.data_vars.items()}
         about |= {f"{GROUP}/{name}": value for name, value in pieces.attrs.items()}
     return digest_of(about, arrays)
 
 
-def _rows(history: History) -> Variables:
+def row_variables(history: History) -> Variables:
+    """Every quantity of the rows but their time."""
     for field, values in history.arrays().items():
-        if field == "time":
-            continue
-        rows = quantities()[field]
-        dims, names = ("time", *rows.dims), rows.names or (field,)
-        split = len(names) > 1  # one variable for each component
-        for column, name in enumerate(names):
-            about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
-            yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+        if field != "time":
+            yield from named_columns(field, values)
 
 
-def _energies(history: History) -> Variables:
+def named_columns(field: str, values: Any) -> Variables:
+    """The variables of one field of `History`: several where each of its components has a name."""
+    rows = quantities()[field]
+    dims, names = ("time", *rows.dims), rows.names or (field,)
+    split = len(names) > 1  # one variable for each component
+    for column, name in enumerate(names):
+        about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
+        yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+
+
+def energy_variables(history: History) -> Variables:
+    """Every energy of the rows."""
     for name, meaning in ENERGY.items():
         yield f"energy_{name}", (("time",), history.energy[name], {"units": "J", "long_name": meaning})
 

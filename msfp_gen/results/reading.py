@@ -18,7 +18,7 @@ from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.note import Note
 from msfp_gen.results.run_data import RunData
-from msfp_gen.results.stored_group import Attribute, StoredGroup, digest, stored_groups
+from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, stored_groups
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.contract import EVENT_KINDS, names
 
@@ -49,8 +49,13 @@ def read_result(path: str | Path, kind: type[R]) -> R:
 
 
 def digest_of(attributes: dict[str, Attribute], arrays: Arrays) -> str:
-    """The digest of a file with these attributes and arrays; those that are not read do not matter."""
-    return digest({name: value for name, value in attributes.items() if _is_read(name)}, arrays)
+    """The digest of a file with these attributes and arrays; those that are not read do not matter.
+
+    arrays: ndarrays, or the `ArrayDigest` of those that came in blocks.
+    """
+    read = {name: value for name, value in attributes.items() if _is_read(name)}
+    known = {name: v if isinstance(v, ArrayDigest) else ArrayDigest.of(v) for name, v in arrays.items()}
+    return digest(read, known)
 
 
 def _read(root: StoredGroup, kind: type[R]) -> R:

@@ -13,6 +13,7 @@ from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, Event, History
 
 if TYPE_CHECKING:
+    from msfp_gen.results.gradient import Gradients
     from msfp_gen.results.note import Note
     from msfp_gen.scene.scene import Scene
 
@@ -24,7 +25,8 @@ class RunData:
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
     text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
-    recorded_extremes: of all accepted steps; None where only the rows are known.
+    recorded_extremes: of all accepted steps; None where only the rows are known. gradients: derivatives with respect to
+    parameters; None: not computed.
     """
 
     scene: Scene
@@ -36,6 +38,7 @@ class RunData:
     provenance: dict[str, str] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
     recorded_extremes: Extremes | None = None
+    gradients: Gradients | None = None
 
     @cached_property
     def extremes(self) -> Extremes:

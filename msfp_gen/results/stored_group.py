@@ -135,14 +135,38 @@ def stored_groups(path: Path) -> Iterator[StoredGroup]:
         yield StoredGroup(file, path.stat().st_size)
 
 
-def digest(attributes: Mapping[str, Attribute], arrays: Mapping[str, Any]) -> str:
+class ArrayDigest:
+    """The sha256 of an array that comes in blocks of rows, with its type and shape."""
+
+    def __init__(self) -> None:
+        self._total, self._kind, self._shape = hashlib.sha256(), "", (0,)
+
+    @classmethod
+    def of(cls, values: Any) -> ArrayDigest:
+        """That of a whole array."""
+        found = cls()
+        found.add(values)
+        return found
+
+    def add(self, values: Any) -> None:
+        """Add the next rows."""
+        array = np.ascontiguousarray(values)
+        text = array.dtype.kind not in "if"
+        self._kind = "" if text else str(array.dtype)
+        self._shape = (self._shape[0] + len(array), *array.shape[1:])
+        self._total.update("\n".join(map(str, array.tolist())).encode() if text else array.data)
+
+    @property
+    def text(self) -> str:
+        """Type, shape and digest."""
+        return f"{self._kind}{self._shape}{self._total.hexdigest()}"
+
+
+def digest(attributes: Mapping[str, Attribute], arrays: Mapping[str, ArrayDigest]) -> str:
     """The sha256 of attributes and arrays, with their names; it detects damage, not forgery."""
     total = hashlib.sha256()
     for name, value in sorted(attributes.items()):
         total.update(f"{name}={value!r}\n".encode())
     for name, values in sorted(arrays.items()):
-        array = np.ascontiguousarray(values)
-        text = array.dtype.kind not in "if"
-        total.update(f"{name}{'' if text else array.dtype}{array.shape}\n".encode())
-        total.update("\n".join(map(str, array.tolist())).encode() if text else array.data)
+        total.update(f"{name}{values.text}\n".encode())
     return total.hexdigest()

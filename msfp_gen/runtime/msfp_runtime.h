@@ -106,6 +106,7 @@ typedef struct {
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */
     double rim_sum[MSFP_NB]; /* k_c gap + c_c dgap/dt of a closed gap [N]; positive where the damper would pull */
+    double rim_gap[MSFP_NB]; /* gap [m] of a closed rim, with uplift of every rim */
 #if MSFP_LAW
     double coefficient[MSFP_NB]
                       [MSFP_COEFFICIENT_SIZE]; /* mu on entry is the first guess of Newton's method; 0 will do */
@@ -114,10 +115,11 @@ typedef struct {
     double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
     double reference;     /* weight and load, the scale of forces where no normal force is known [N] */
 #if MSFP_UPLIFT
-    double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE];
+    double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE], rim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE];
     double below[MSFP_NB]
                 [MSFP_MOMENT_SIZE]; /* moment of a surface on the body below, about the sphere centre of that body */
-    double dunilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_DOF], dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
+    double dunilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_DOF], drim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE * MSFP_DOF],
+        dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
 #endif
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
@@ -151,19 +153,6 @@ int msfp_accelerations(const msfp_parameters *p, msfp_point *at, msfp_work *w, m
 #define MSFP_ANGLES_A (MSFP_PLANAR ? 1 : 3) /* accelerations of a body */
 #define MSFP_ANGLES_C (MSFP_PLANAR ? 1 : 2) /* position angles of a normal */
 #define MSFP_UNKNOWNS (MSFP_NB * (MSFP_PLANAR ? 3 : 6))
-
-enum msfp_seed_kind {
-    MSFP_SEED_COORDINATE, /* index: body 0..MSFP_NB; field: 3*order + angle */
-    MSFP_SEED_CONTACT,    /* index: surface; field: psi~, theta~, N */
-    MSFP_SEED_FRICTION,   /* index: surface; field: Y, Z */
-    MSFP_SEED_BASE,       /* field: 3*order + axis */
-    MSFP_SEED_LOAD        /* field: 0..5, force and moment */
-};
-
-/* The variable of one column of the Jacobian of the balances. */
-typedef struct {
-    int kind, index, field;
-} msfp_variable;
 
 /* Residual [MSFP_UNKNOWNS] of the balances [N], [N m], body by body: linear, angular. jacobian: [MSFP_UNKNOWNS][count]
  * with respect to `variables`; rates: derivatives of dY/dt, dZ/dt [2 MSFP_NB][count], zeroed by the caller, or NULL. */
@@ -216,7 +205,6 @@ void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, 
 
 /* ---- histories: piecewise polynomials in time ---------------------------------------------- */
 
-#define MSFP_DEGREE 5
 #define MSFP_CHANNELS 8 /* six, rounded up to full vectors */
 typedef struct {
     int pieces;
@@ -240,6 +228,7 @@ typedef struct {
     double max_step, first_step; /* [s]; 0: chosen */
     double max_steps;
     double duration, output_step; /* [s]; output_step 0: a row at every step of the integrator */
+    size_t row_limit;             /* msfp_run_advance returns once so many rows are held; 0: no limit */
     double stop_displacement;     /* [m]; 0: none */
     int stop_all_rims;            /* stop once every rim is in contact */
     int sampled; /* the base acceleration is linear between samples: decides the first guess of Newton's method */
@@ -255,6 +244,7 @@ typedef struct {
     const double *heat;           /* [MSFP_NB][MSFP_HEAT] parts of the temperature rise [K]; NULL: zero */
     int monitors, monitor_stop; /* monitors that are active, and those that stop the run: bits 1 << MSFP_MONITOR_... */
     double monitor_normal;        /* least normal force [N] */
+    double monitor_peak;          /* largest normal force [N]; 0: no limit */
     double monitor_inertia;       /* largest inertial force over normal force [-] */
     double monitor_time;          /* time over which a change of velocity is averaged [s] */
     double monitor_rise;          /* largest rise in temperature [K] */
@@ -262,20 +252,6 @@ typedef struct {
     /* Range in which the friction law was checked: velocity [m/s], normal forces [N], temperatures [degC]. */
     double law_speed, law_load[MSFP_NB][2], law_temperature[2];
 } msfp_options;
-
-/* The first detection of a monitor. value: see enum msfp_monitor. */
-typedef struct {
-    double time; /* [s] */
-    double value;
-    int surface; /* counted from 1; 0: nothing detected */
-} msfp_trip;
-
-typedef struct {
-    double time; /* [s] */
-    int surface; /* counted from 1; 0: none */
-    int kind;    /* enum msfp_event_kind */
-    double displacement[3], top_force[3]; /* across the bearing [m]; on the top support [N] */
-} msfp_event;
 
 /* Event functions of a run [m]: the gap of every rim (a lower bound of it while the gap is wide), what is left to the
  * stop displacement, and with uplift the compression of every unilateral contact. */
@@ -318,7 +294,7 @@ typedef struct {
 } msfp_step_history;
 #endif
 
-typedef struct {
+struct msfp_run {
     msfp_parameters parameters;
     msfp_history motion, load;
 #if MSFP_TOP_ROTATION
@@ -366,6 +342,8 @@ typedef struct {
     double largest_energy;     /* so far [J], see energy_balance.c */
     int stability_limit_steps; /* consecutive steps of an explicit method at its limit of stability */
     int retry_after_newton;    /* the step at hand is a shorter one after Newton's method failed */
+    size_t rows_before; /* rows of the run that came before rows[0] and are no longer held */
+    size_t rows_taken;  /* rows of the run that the callback has received */
     long counts[MSFP_COUNTS];
     int status;         /* enum msfp_status */
     int status_surface; /* counted from 1; 0: none */
@@ -375,7 +353,12 @@ typedef struct {
     size_t row_count, row_capacity;
     msfp_event *events;
     size_t event_count, event_capacity;
-} msfp_run;
+    msfp_row_callback callback; /* NULL: rows are kept */
+    void *user;                 /* its first argument */
+#if MSFP_GRADIENTS
+    struct msfp_gradients *gradients; /* NULL: none are computed */
+#endif
+};
 #define MSFP_SNAPSHOT_BEGIN offsetof(msfp_run, next_jump)
 #define MSFP_SNAPSHOT_END offsetof(msfp_run, rows)
 
@@ -398,10 +381,22 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot);
 /* Continue from a snapshot of a run of the same scene and build. Returns MSFP_OK, MSFP_E_MEMORY, or MSFP_E_FINITE for
  * bytes that no run of this model writes; `run` is then unchanged. */
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
+/* Forget all rows but the last, which the caller has stored elsewhere. */
+void msfp_drop_rows(msfp_run *run);
 /* Record the present state unless it is the last row. Returns MSFP_OK or MSFP_E_MEMORY. */
 int msfp_write_now(msfp_run *run);
 /* Release rows and events. */
 void msfp_run_free(msfp_run *run);
+
+/* ---- derivatives of a run with respect to parameters; docs/gradients.md ---- */
+/* Begin the derivatives of a run after msfp_run_start. Returns run->status. */
+int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs);
+/* Derivatives of the rows, [row][parameter][MSFP_ROW_SIZE]; count: of the rows. */
+const double *msfp_gradient_rows(const msfp_run *run, size_t *count);
+/* Derivatives of time, displacement and top force of the events, [event][parameter][7]; count: of the events. */
+const double *msfp_gradient_events(const msfp_run *run, size_t *count);
+/* Derivatives of the extremes with respect to one parameter, in the order of msfp_extremes. */
+void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out);
 
 #ifdef __cplusplus
 }

@@ -50,7 +50,7 @@ class Surface:
     rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
     rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
     seat_stiffness: Annotated[float, Quantity("N/m", above=0.0)] = 5e9
-    seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 1.0
+    seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 10.0
     contact_damping: Annotated[float, Quantity("s", least=0.0)] = 1e-4
     friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
     velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.slider_response import motion_time_scale, response_time, turned_or_pushed
 from msfp_gen.scene.top import MassTop, RigTop, load_values
 from msfp_gen.specification.layout import Auto, Effects
 
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run
 UPLIFT_MONITOR_SHARE = 0.05  # share of the load at rest below which the monitor of uplift trips
-MAX_PERIOD_RATIO = 0.05  # massless sliders: period of a slider over the time scale of the motion, at most
+PEAK_LOAD_SHARE = 1.5  # N under a rigid mass over the largest load, above which the monitor of uplift trips
+RESPONSE_SHARE = 0.125  # massless sliders: their response time over error x time scale of the motion, at most
 MIN_PLANAR_SHARE = 0.5  # a run starts planar if its scene stays in one vertical plane for this share of the duration
 GIVEN = "given in the scene"  # reason of an effect that `Auto` fixes
 
@@ -53,12 +55,17 @@ def select_effects(scene: SceneParts) -> EffectSelection:
     requested = scene.effects
     if isinstance(requested, Effects):
         return EffectSelection(requested)
-    uplift = _uplift(scene, requested)
-    sliders = _sliders(scene, requested, bool(uplift.chosen))
+    uplift, friction = _uplift(scene, requested), _friction(scene, requested)
     plane, until = _dimension(scene, requested)
-    reasons = (plane, sliders, _rims(scene, requested), uplift, _friction(scene, requested))
-    rotates = scene.top_rotation is not None
-    effects = requested.resolve(**{reason.effect: reason.chosen for reason in reasons}, top_rotation=rotates or None)
+    others = (plane, _rims(scene, requested), uplift, friction)
+    rotates = (scene.top_rotation is not None) or None
+
+    def resolved(*reasons: Reason) -> Effects:
+        return requested.resolve(**{reason.effect: reason.chosen for reason in reasons}, top_rotation=rotates)
+
+    sliders = _sliders(scene, requested, resolved(*others), until)
+    reasons = (plane, sliders, *others[1:])
+    effects = resolved(*reasons)
     plane_until = until if effects.dimension == "planar" else inf
     return EffectSelection(effects, reasons, plane_until, requested.error)
 
@@ -112,26 +119,40 @@ def _initial_sliding(scene: SceneParts) -> float:
     return float(np.max(tilt * [surface.radius for surface in scene.bearing.surfaces]))
 
 
-def _sliders(scene: SceneParts, requested: Auto, uplift: bool) -> Reason:
+def _sliders(scene: SceneParts, requested: Auto, others: Effects, plane_until: float) -> Reason:
+    """Massless only where quasi-static steps apply: elsewhere leaving inertia out saves little and costs accuracy.
+
+    others: the effects selected before. plane_until: time at which a planar scene leaves its plane [s].
+    """
     if (given := _given(requested, "sliders")) is not None:
         return given
-    required = {
-        "a separated body moves by its inertia": uplift,
-        "free spin is determined by inertia": requested.spin == "free",
-        "the explicit method integrates accelerations": scene.solver.method == "dopri5",
-    }
-    for because, holds in required.items():
-        if holds:
-            return Reason("sliders", "inertial", because)
+    if because := _requires_inertia(scene, others, plane_until):
+        return Reason("sliders", "inertial", because)
     share, limit = inertia_share(scene), inertia_limit(scene, requested.error)
-    because = f"inertial forces of the sliders are {share:.2g} of N; the permitted share is {limit:.2g}"
     if share > limit:
+        because = f"inertial forces of the sliders are {share:.2g} of N; the permitted share is {limit:.2g}"
         return Reason("sliders", "inertial", because)
-    period, time_scale = slider_period(scene), motion_time_scale(scene)
-    if period > MAX_PERIOD_RATIO * time_scale:
-        because = f"the period of a slider is {period:.2g} s, the time scale of the motion is {time_scale:.2g} s"
+    time_scale = motion_time_scale(scene.motion, _sampled_times(scene))
+    response = response_time(scene.bearing, scene.top, minimum_load(scene))
+    longest = RESPONSE_SHARE * requested.error * time_scale
+    because = f"sliding bodies respond within {response:.2g} s; for this motion {longest:.2g} s is permitted"
+    if response > longest:
         return Reason("sliders", "inertial", because)
-    return Reason("sliders", "massless", because, "accelerations of the sliders and steps that resolve their ringing")
+    because += f", and inertial forces of {limit:.2g} of N, which are {share:.2g}"
+    return Reason("sliders", "massless", because, "integration in time: quasi-static steps solve the force balance")
+
+
+def _requires_inertia(scene: SceneParts, others: Effects, plane_until: float) -> str:
+    """Why sliders of any mass need inertia; empty where quasi-static steps apply, which do without it."""
+    reasons = {
+        "a separated body moves by its inertia": others.uplift,
+        "free spin is determined by inertia": others.spin == "free",
+        "the explicit method integrates accelerations": scene.solver.method == "dopri5",
+        "quasi-static steps need motion in one vertical plane": others.dimension != "planar" or plane_until < scene.end,
+        "its limits are for a base that only translates, and for vertical loads": turned_or_pushed(scene),
+    }
+    found = next((because for because, holds in reasons.items() if holds), "")
+    return found or _rate_dependence(scene, replace(others, sliders="massless"))
 
 
 def _friction(scene: SceneParts, requested: Auto) -> Reason:
@@ -167,11 +188,26 @@ def load_at_rest(scene: SceneParts) -> float:
 
 def minimum_load(scene: SceneParts) -> float:
     """Smallest vertical load on the lowest surface if all masses follow the vertical motion of the base [N]."""
+    return float(np.min(_loads(scene)))
+
+
+def rigid_mass_limit(scene: SceneParts) -> float:
+    """Normal force [N] above which the contacts of a stack under a rigid mass must not be rigid; 0 for other tops.
+
+    It is `PEAK_LOAD_SHARE` times the largest vertical load if all masses follow the vertical motion of the base. A
+    rigid mass on rigid contacts has peaks beyond it which do not converge (docs/model.md, "Where the model ends").
+    """
+    rigid = isinstance(scene.top, MassTop) and scene.top.vertical_stiffness is None
+    return PEAK_LOAD_SHARE * float(np.max(_loads(scene))) if rigid else 0.0
+
+
+def _loads(scene: SceneParts) -> Array:
+    """Vertical loads on the lowest surface if all masses follow the vertical motion of the base [N]."""
     times = _sampled_times(scene)
     vertical = scene.motion.evaluate(times, 2)[:, 2]
     bodies = sum(body.mass for body in scene.bearing.bodies)
     inertial = (_supported_mass(scene) + bodies) * (scene.bearing.gravity + vertical)
-    return float(np.min(inertial + _applied_load(scene, times) + _held_load(scene, times)))
+    return inertial + _applied_load(scene, times) + _held_load(scene, times)
 
 
 def _held_load(scene: SceneParts, times: Array) -> Array | float:
@@ -206,9 +242,19 @@ def quasistatic(scene: SceneParts, effects: Effects) -> bool:
     Conditions: a planar model without masses and with closed-form friction, no supported mass, the method "implicit",
     and damper forces small against friction. The limit of their share assumes an error of rates of one hundredth.
     """
-    if not effects.permits_quasistatic_steps or scene.solver.method != "implicit" or isinstance(scene.top, MassTop):
-        return False
-    return damping_share(scene) <= min(1e-3, 1e3 * scene.solver.rtol)
+    return effects.dimension == "planar" and effects.sliders == "massless" and not _rate_dependence(scene, effects)
+
+
+def _rate_dependence(scene: SceneParts, effects: Effects) -> str:
+    """Why a planar run without masses is integrated in time; empty where it takes quasi-static steps."""
+    share, limit = damping_share(scene), min(1e-3, 1e3 * scene.solver.rtol)
+    reasons = {
+        f"the method {scene.solver.method!r} has no quasi-static steps": scene.solver.method != "implicit",
+        "the supported mass has inertia, and the sliders move with it": isinstance(scene.top, MassTop),
+        "friction depends on more than the slip": not effects.permits_quasistatic_steps,
+        f"dampers carry {share:.2g} of the friction force; quasi-static steps permit {limit:.2g}": share > limit,
+    }
+    return next((because for because, holds in reasons.items() if holds), "")
 
 
 def damping_share(scene: SceneParts) -> float:
@@ -243,15 +289,6 @@ def slider_period(scene: SceneParts) -> float:
         stiffness = surface.friction * rest / surface.yield_displacement + rest / surface.radius
         longest = max(longest, scene.bearing.bodies[index].mass / stiffness if stiffness > 0 else inf)
     return float(2 * np.pi * np.sqrt(longest))
-
-
-def motion_time_scale(scene: SceneParts) -> float:
-    """Peak velocity of the base over its peak acceleration [s]; inf where it is at rest."""
-    times = _sampled_times(scene)
-    velocity, acceleration = (
-        np.linalg.norm(scene.motion.evaluate(times, order)[:, :3], axis=1).max() for order in (1, 2)
-    )
-    return float(velocity / acceleration) if acceleration > 0 else inf
 
 
 def _sampled_times(scene: SceneParts) -> Array:

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.effect_switching import check
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling
-from msfp_gen.simulation.simulate import RunSequence, check, settle
+from msfp_gen.simulation.simulate import RunSequence, settle
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -71,7 +72,7 @@ def simulate_batch(
     """
     given = _checked(scenes)
     results: dict[int, Result] = {}
-    with _Workers(_worker_count(workers), processes) as pool:
+    with Workers(worker_count(workers), processes) as pool:
         settled = dict(enumerate(given))
         settled |= pool.results(settle, {index: (scene,) for index, scene in settled.items() if needs_settling(scene)})
         for spec in dict.fromkeys(scene.spec for scene in settled.values()):
@@ -105,7 +106,7 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _worker_count(requested: int | None) -> int:
+def worker_count(requested: int | None) -> int:
     """Number of runs at the same time; None: one for each core. Raises InputError for an invalid number."""
     if requested is None:
         return usable_cores()
@@ -114,11 +115,11 @@ def _worker_count(requested: int | None) -> int:
     return requested
 
 
-def _run(scene: Scene, settled: Scene, strict: bool) -> Result:
-    """The result of `simulate`, also for a run that fails; called in a worker."""
+def run_to_end(scene: Scene, settled: Scene, strict: bool, proceed: Callable[[float, float], None]) -> Result:
+    """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run."""
     sequence = RunSequence.of(scene, strict, settled)
     while sequence.effects is not None:
-        sequence.run_segment(_raise_if_stopped)
+        sequence.run_segment(proceed)
     return sequence.result(with_initial_row=True)
 
 
@@ -131,6 +132,11 @@ def _located(index: int) -> Iterator[None]:
         raise InputError(f"scenes[{index}]: {error}") from error
     except RunError as error:
         raise RunError(f"scenes[{index}]: {error}", status=error.status, result=error.result) from error
+
+
+def _run(scene: Scene, settled: Scene, strict: bool) -> Result:
+    """One run of a batch, in a worker."""
+    return run_to_end(scene, settled, strict, raise_if_stopped)
 
 
 class _Flag(Protocol):
@@ -152,15 +158,24 @@ def _start_worker(stop: _Flag, own_process: bool) -> None:
     _worker.stop = stop
     if own_process:  # a terminal sends Ctrl-C to all processes, but only the main process handles it
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def _raise_if_stopped(_: float, __: float) -> None:
-    """The `progress` callback of a run in a worker: ends the run once the flag is set."""
-    if _worker.stop.is_set():
+def _end_with_parent() -> None:
+    """End this process when its parent dies, even by `kill -9`: it would wait for work for ever."""
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(1)
+
+
+def raise_if_stopped(_: float, __: float) -> None:
+    """The `progress` callback of a run in a worker: ends the run once the flag is set. Elsewhere it does nothing."""
+    stop: _Flag | None = getattr(_worker, "stop", None)
+    if stop is not None and stop.is_set():
         raise _StoppedError
 
 
-class _Workers:
+class Workers:
     """A pool of threads or processes, as a context manager; an exception inside its block ends all runs."""
 
     def __init__(self, count: int, processes: bool) -> None:
@@ -174,7 +189,7 @@ class _Workers:
             self.stop = threading.Event()
             self.executor = ThreadPoolExecutor(count, "msfp-gen-batch", _start_worker, (self.stop, False))
 
-    def __enter__(self) -> _Workers:
+    def __enter__(self) -> Workers:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, _: BaseException | None, __: TracebackType | None) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
 from msfp_gen.errors import InputError
+from msfp_gen.simulation.row_file import RowFile, rows_beside
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
@@ -42,6 +43,19 @@ def segment_file(path: str | Path, index: int) -> Path:
 def checkpoint_files(path: str | Path) -> list[Path]:
     """The existing checkpoint files of a run."""
     return [file for file in (segment_file(path, index) for index in range(MAX_SEGMENTS)) if file.is_file()]
+
+
+def kept_rows(path: str | Path) -> list[Path]:
+    """The existing files with the rows of a run that streams them."""
+    return [file for index in range(MAX_SEGMENTS) if (file := rows_beside(segment_file(path, index))).is_file()]
+
+
+def require_no_checkpoint(checkpoint: str | Path) -> None:
+    """Raise InputError where a later segment has a checkpoint file: it would conflict in the middle of the run."""
+    if found := [file for file in checkpoint_files(checkpoint) if file != Path(checkpoint)] + kept_rows(checkpoint):
+        raise InputError(
+            f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
+        )
 
 
 @dataclass(frozen=True)
@@ -86,6 +100,7 @@ class Checkpoint:
         self.wall = 0.0  # wall time of the run in earlier processes [s]
         self._identity, self._every = identity, every
         self._snapshot: bytes | None = None
+        self._checksum: object = 0  # of the rows that are streamed
         if not every >= 0:
             raise InputError(f"every = {every}: give the seconds between two checkpoints, 0 or more")
         check_folder(self.path.parent, "checkpoint")
@@ -99,25 +114,35 @@ class Checkpoint:
         self._start = time.monotonic()
         self._due = self._start + every
 
-    def restore(self, run: Run) -> None:
-        """Set a new run to the saved state, if there is one. Raises InputError where that is damaged."""
+    def restore(self, run: Run, rows: RowFile | None = None) -> None:
+        """Set a new run, and its rows on disk, to the saved state, if there is one. Raises InputError if damaged."""
         if self._snapshot is not None:
             try:
                 run.restore(self._snapshot)
+                if rows is not None:
+                    rows.restore(run.dropped_rows, self._checksum)
             except ValueError as error:
                 raise self._refused(f"damaged ({error})") from None
+            if rows is None and run.dropped_rows:
+                raise self._refused("made by a run that streams its rows")
             self._snapshot = None
 
-    def save_if_due(self, run: Run) -> None:
+    def save_if_due(self, run: Run, rows: RowFile | None = None) -> None:
         """Save the run if enough time has passed since the last checkpoint."""
         if time.monotonic() >= self._due:
-            self.save(run)
+            self.save(run, rows)
 
-    def save(self, run: Run) -> None:
-        """Save the run now. If writing fails, a warning is given and the last checkpoint remains."""
+    def save(self, run: Run, rows: RowFile | None = None) -> None:
+        """Save the run now. If writing fails, a warning is given and the last checkpoint remains.
+
+        rows: those on disk of a run that streams them.
+        """
         start = time.monotonic()
         about = {**vars(self._identity), "time": run.time, "wall": self.wall + start - self._start}
         try:
+            if rows is not None:
+                rows.sync()
+                about["checksum"] = rows.checksum
             write(self.path, about, run.snapshot())
         except (OSError, MemoryError) as error:
             reason = getattr(error, "strerror", None) or error or "no memory"
@@ -136,7 +161,7 @@ class Checkpoint:
             raise self._refused(f"made for another scene: {_difference(about['scene'], self._identity.scene)}")
         if about["build"] != self._identity.build:
             raise self._refused("made by another build of the model (another msfp-gen, compiler or flags)")
-        self.wall, self._snapshot = about["wall"], snapshot
+        self.wall, self._snapshot, self._checksum = about["wall"], snapshot, about.get("checksum", 0)
 
     def _refused(self, reason: str) -> InputError:
         remedy = "give the checkpoint of this run, or start from the beginning"

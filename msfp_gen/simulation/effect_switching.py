@@ -1,10 +1,11 @@
-"""Switching of effects during a run: the monitors that end a segment, and the effects of the next one."""
+"""Effects of a run: those that a method supports; the monitors that end a segment, and the effects of the next one."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from msfp_gen.errors import InputError
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -22,6 +23,18 @@ REQUIRED_EFFECTS: dict[str, dict[str, object]] = {
 JAM_STATUSES = ("newton", "step", "irregular")
 """Failures that another model may avoid: inertia and compliant contacts make the equations regular."""
 MONITORS = ("rims", "uplift", "inertia", "heat")
+
+
+def check(scene: Scene, effects: Effects) -> None:
+    """Raise InputError where the method of the scene does not support these effects."""
+    if effects.sliders == "massless" and scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
+        )
+    if effects.uplift and scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': the equations of PEER 2017/07 have no separation; use 'implicit' with uplift"
+        )
 
 
 def stopping_monitors(scene: Scene, effects: Effects, strict: bool) -> tuple[str, ...]:

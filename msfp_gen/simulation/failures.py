@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.scene.top import MassTop
+from msfp_gen.simulation.effect_switching import JAM_STATUSES
 from msfp_gen.specification.contract import STATUSES
 
 if TYPE_CHECKING:
@@ -14,6 +16,10 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 _STATUSES = {status.name: status for status in STATUSES}
+MASSLESS = (  # docs/model.md, choice 10
+    "; the sliders are massless: where forces depend on rates, only inertia determines how the surfaces share the "
+    "motion; give effects.sliders = 'inertial'"
+)
 OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]
 
 
@@ -25,7 +31,14 @@ def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None
     if surface and found.quantity:
         where += f", {found.quantity} = {value:.4g}"
     text = f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {cause or found.failure}"
-    return text + (_state(scene, model, run) if found.motion and run.row_count else "")
+    text += _state(scene, model, run) if found.motion and run.row_count else ""
+    return text + (MASSLESS if _inertia_missing(scene, model, status) else "")
+
+
+def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:
+    """Whether a run ended because massless sliders had no unique motion, as far as its end tells."""
+    massless, carried = model.effects.sliders == "massless", isinstance(scene.top, MassTop)
+    return massless and (status in JAM_STATUSES or (carried and status == "uplift"))
 
 
 def _state(scene: Scene, model: Model, run: Run) -> str:

@@ -1,13 +1,14 @@
 """Memory of runs: what their rows need, what there is, and the refusal of runs that cannot fit.
 
-All rows of a run lie in memory until its result is written. Rows at even times are counted before a run; those of every
-step are watched while it runs.
+All rows of a run lie in memory until its result is written, unless they are streamed to disk. Rows at even times are
+counted before a run; those of every step are watched while it runs.
 """
 
 from __future__ import annotations
 
 import math
 import os
+import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -42,8 +43,19 @@ def require_memory(scenes: Sequence[Scene]) -> None:
     enough = 1.05 * step * needed / max(room, SMALL)  # more than the rounding of the message
     raise InputError(
         f"output_step = {step:g}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are "
-        f"available; give at least {enough:.2g} [s], or a shorter duration"
+        f"available; give at least {enough:.2g} [s], a shorter duration, or stream the rows to disk"
     )
+
+
+def require_room(scene: Scene, stream: Path | None, copies: int = 1) -> None:
+    """Raise InputError where the rows of a scene at even times do not fit into memory, or on the disk of `stream`.
+
+    copies: numbers kept of each quantity, its derivatives included.
+    """
+    if stream is None:
+        require_memory([scene] * copies)
+    elif scene.output_step is not None:
+        _require_disk(scene, scene.output_step, stream.parent)
 
 
 def outgrown(rows: int, surfaces: int) -> bool:
@@ -66,6 +78,18 @@ def available() -> float:
     MSFP_GEN_MEMORY leaves. Raises InputError where that variable is no positive number.
     """
     return min(_of_machine(), _of_group(), _of_process(), _of_variable())
+
+
+def _require_disk(scene: Scene, step: float, folder: Path) -> None:
+    """Rows lie on the disk as they are until the result, which is smaller, is written beside them."""
+    count, room = 1 + scene.end / step, shutil.disk_usage(folder).free
+    needed = count * row_size(scene.bearing.layout.surfaces)
+    if needed > max(room, SMALL):
+        enough = 1.05 * step * needed / max(room, SMALL)
+        raise InputError(
+            f"output_step = {step:g}: {count:.1e} rows need {needed / GB:.3g} GB on the disk of "
+            f"{str(folder)!r} and {room / GB:.3g} GB are free; give at least {enough:.2g} [s], or a shorter duration"
+        )
 
 
 def _needed(scene: Scene) -> float:

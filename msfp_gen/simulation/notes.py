@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
+from msfp_gen.scene.effect_selection import rigid_mass_limit
 from msfp_gen.scene.friction_parameters import RANGES
 from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
-    from msfp_gen.results.history import History
+    from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
@@ -22,11 +24,15 @@ if TYPE_CHECKING:
 _MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
+FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
+LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
     "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
-    "uplift": "the normal force of surface {surface} is only {value:.4g} N; the model has no separation",
+    "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
+    "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
+    "not converge; give vertical_stiffness",
     "inertia": "the inertial force of body {body} is {value:.2g} of N on surface {surface}; the model has none",
     "heat": "friction may heat surface {surface} by {value:.3g} K; its friction law does not depend on temperature",
     "law_speed": "the slip velocity of surface {surface} is {value:.3g} m/s; its friction law was checked up to "
@@ -40,6 +46,10 @@ TEXTS = {
     "give a smaller contact_damping",
     "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
     "cycles; give bouc_wen = 'plastic'",
+    "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
+    "face: a real slider would tip; give effects.uplift = true",
+    "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
+    "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
     "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
 
@@ -74,7 +84,9 @@ def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
     doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
-    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + creep_notes(scene, effects, history)
+    physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
+    physics += peak_notes(scene, effects, history)
+    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + physics
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
@@ -89,6 +101,46 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
         return ()
     share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where N under a rigid mass exceeds `rigid_mass_limit`."""
+    limit = rigid_mass_limit(scene)
+    row, surface = np.unravel_index(int(history.normal_force.argmax()), history.normal_force.shape)
+    peak = float(history.normal_force[row, surface])
+    if effects.uplift or not 0 < limit < peak:
+        return ()
+    text = TEXTS["peak"].format(surface=surface + 1, value=peak)
+    return (Note(float(history.time[row]), "peak", int(surface) + 1, peak, text),)
+
+
+def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
+    """A note for each surface that landed more than `LANDINGS` times within `LANDING_TIME`: it rattles."""
+    notes = []
+    for surface in sorted({event.surface for event in events if event.kind == "landing"}):
+        times = np.array([event.time for event in events if event.kind == "landing" and event.surface == surface])
+        if (times[LANDINGS:] - times[:-LANDINGS] < LANDING_TIME).any():
+            text = TEXTS["rattle"].format(surface=surface, value=len(times))
+            notes.append(Note(float(times[0]), "rattle", surface, float(len(times)), text))
+    return tuple(notes)
+
+
+def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note for each surface whose contact point (3.14) leaves the face of its slider, which then would tip.
+
+    With uplift the slider stands on its edge instead (docs/uplift.md).
+    """
+    if effects.uplift:
+        return ()
+    bearing, notes = scene.bearing, []
+    loaded = history.normal_force > FOOTPRINT_LOAD * np.median(history.normal_force, axis=0)
+    offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
+    faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
+    for j in np.flatnonzero(offsets.max(axis=0) > faces):
+        row, surface = int(offsets[:, j].argmax()), int(j) + 1
+        text = TEXTS["footprint"].format(surface=surface, value=offsets[row, j])
+        notes.append(Note(float(history.time[row]), "footprint", surface, float(offsets[row, j]), text))
+    return tuple(notes)
 
 
 def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:

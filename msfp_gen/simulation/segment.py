@@ -16,6 +16,7 @@ from msfp_gen.model.plane import (
     rotated_pairs,
     tilt_pieces,
     tilts_into_plane,
+    tilts_out_of_plane,
     wrench_in_plane,
 )
 from msfp_gen.motions.piecewise import ORDER
@@ -26,51 +27,24 @@ from msfp_gen.scene.effect_selection import (
     inertia_limit,
     load_at_rest,
     quasistatic,
+    rigid_mass_limit,
     slider_period,
 )
 from msfp_gen.scene.friction_parameters import checked_range
 from msfp_gen.scene.friction_selection import heating_factors, thermal_softening
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import load_values
+from msfp_gen.simulation.restart_state import RestartState
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.row_file import RowFile
     from msfp_gen.specification.layout import Effects
 
 NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
-
-
-@dataclass(frozen=True, eq=False)
-class RestartState:
-    """The state in which a segment ended, from which the next one starts with another model.
-
-    time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
-    separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
-    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]. origin: displacement
-    across the bearing at the start of the run, shape (3,) [m]. monitor_heat, heat: states of the monitor of heat and
-    of the temperature. All but azimuth and planar come from a snapshot of the run.
-    """
-
-    time: float
-    azimuth: float
-    planar: bool
-    q: Array
-    v: Array
-    f: Array
-    foot: Array
-    force: Array
-    origin: Array
-    monitor_heat: Array
-    heat: Array | None = None
-
-    @classmethod
-    def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
-        """The current state of `run`; a row of it is recorded."""
-        run.record_now()
-        return cls(azimuth=azimuth, planar=model.planar, **model.extension.read_state(run.snapshot(rows=1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +52,7 @@ class Segment:
     """A compiled run that has ended, with its model.
 
     azimuth: of the frame of the model [rad]. status: how the run ended. wall, setup: wall time of the integration, and
-    of build and preparation before it [s].
+    of build and preparation before it [s]. stored: its rows on disk but for the last, where they are streamed.
     """
 
     model: Model
@@ -87,6 +61,7 @@ class Segment:
     status: str
     wall: float
     setup: float
+    stored: RowFile | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +96,7 @@ def start_run(
     the monitors that stop the run; the others only write notes.
     """
     solver, stop = scene.solver, scene.stop
-    load_knots, wrench = _wrench(scene)
+    load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
     q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else _transferred_state(scene, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
@@ -165,7 +140,7 @@ def start_run(
     return run, frame.azimuth
 
 
-def _wrench(scene: Scene) -> tuple[Array, Array]:
+def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
     """Knots and polynomials of force and moment on the top plate: those of the top and of the load history."""
     knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
     if scene.load is not None:
@@ -202,7 +177,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
         for k, value in zip((3, 3, 2), (None,) * 3 if state is None else (state.q, state.v, state.h), strict=True)
     )
     if model.planar:
-        q, v, f = _state_in_plane(q, v, f, azimuth)
+        q, v, f = state_in_plane(q, v, f, azimuth)
     if model.effects.uplift:
         load = 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
         q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, load)])
@@ -210,7 +185,7 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
     return q, v, f
 
 
-def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
+def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
     """An initial state in the frame of a planar model; raises InputError where it leaves the plane."""
     q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
     f = np.ascontiguousarray(rotated_pairs(f, azimuth))
@@ -222,15 +197,19 @@ def _state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array
 def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
-    Angles, rates and friction states are unchanged. Where the earlier model had no separations, they follow from the
-    interface forces: the unilateral contacts are compressed by them.
+    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
+    from the interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
-    q, v, f, force = at.q, at.v, at.f, at.force
+    q, v, f, force = at.q, at.v, at.f, at.contact_force(scene.bearing)
     separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
     q, v = q[:, :3], v[:, :3]
     if at.planar and not model.planar:
-        q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
-        f = out_of_plane(f, at.azimuth, "pair")
+        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
+            q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
+            f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
+        else:
+            q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
+            f = out_of_plane(f, at.azimuth, "pair")
         force = out_of_plane(force, at.azimuth, "vector")
         if separations is not None:
             separations = (
@@ -243,6 +222,11 @@ def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Ar
             separations = (-force / stiffness[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _is_oblique(azimuth: float) -> bool:
+    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
+    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
 
 
 def _transferred_foot(at: RestartState, q: Array) -> Array:
@@ -279,6 +263,7 @@ def _monitor_options(
         "monitors": tuple(name for name, out in left_out.items() if out),
         "monitor_stop": tuple(stops),
         "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "monitor_peak": rigid_mass_limit(scene),
         "monitor_inertia": inertia_limit(scene, selection.error),
         "monitor_time": slider_period(scene),
         "monitor_rise": _significant_rise(scene, effects, selection),

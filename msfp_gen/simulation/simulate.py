@@ -10,33 +10,47 @@ import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
-from operator import or_
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.common.output import DATASET_SUFFIXES, check_output
+from msfp_gen.errors import RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
-from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, History
+from msfp_gen.results.joining import joined
 from msfp_gen.results.note import Note
-from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of, joined
+from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
+from msfp_gen.results.thinning import thinned_history
 from msfp_gen.scene.top import is_sprung
-from msfp_gen.simulation import failures
-from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, checkpoint_files, segment_file
-from msfp_gen.simulation.effect_switching import next_effects, stopping_monitors
-from msfp_gen.simulation.memory import outgrown, require_memory
-from msfp_gen.simulation.notes import history_notes, notes_of
-from msfp_gen.simulation.segment import RestartState, Segment, start_run
+from msfp_gen.simulation.checkpoint import (
+    EVERY,
+    Checkpoint,
+    Identity,
+    checkpoint_files,
+    require_no_checkpoint,
+    segment_file,
+)
+from msfp_gen.simulation.effect_switching import check, next_effects, stopping_monitors
+from msfp_gen.simulation.gradient_inputs import start_gradients
+from msfp_gen.simulation.gradients import gradient_notes, gradient_parameters, run_gradients, switching_error
+from msfp_gen.simulation.memory import outgrown, require_room
+from msfp_gen.simulation.notes import history_notes, landing_notes, notes_of
+from msfp_gen.simulation.outcome import extremes_of, message_of
+from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
+from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
+from msfp_gen.simulation.streamed_rows import StreamedRows
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
+    from msfp_gen.scene.parameters import Parameter
     from msfp_gen.scene.scene import Scene
     from msfp_gen.specification.layout import Effects
 
@@ -54,6 +68,8 @@ def simulate(
     every: float = EVERY,
     resume: bool = False,
     strict: bool = False,
+    stream: str | Path | None = None,
+    gradients: Sequence[str] = (),
 ) -> Result:
     """Integrate a scene.
 
@@ -73,31 +89,42 @@ def simulate(
     strict
         Stop where a monitor trips (status `guard`), instead of continuing with a model that includes the effect
         (`Auto`) or with a note in the result (`Effects`): docs/effects.md.
+    stream
+        File (.nc) to which all rows are written, with the rest of the result, whether the run succeeds or not. They lie
+        on disk while it runs, so that its memory does not grow with their number.
+    gradients
+        Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
 
     Returns
     -------
     Result
-        Rows, events, counters and notes of the run.
+        Rows, events, counters and notes of the run. With `stream`, of many rows a selection that fits into memory, with
+        the extremes of all (`results.thinning`).
 
     Raises
     ------
     InputError
-        The method does not support the effects; the rows do not fit into memory; the checkpoint is damaged, or of
-        another scene or build.
+        The method does not support the effects; the rows do not fit into memory, or on the disk; the checkpoint is
+        damaged, or of another scene or build; `stream` is no name of a result; a parameter does not exist, or the run
+        has no gradients.
     RunError
         The run failed: the message gives time, surface and cause, `.result` has the rows until then.
+    OSError
+        The disk is too full for the rows to be streamed.
 
     """
     if checkpoint is not None and not resume:
-        _require_no_checkpoint(checkpoint)
-    require_memory([scene])
-    sequence = RunSequence.of(scene, strict)
+        require_no_checkpoint(checkpoint)
+    file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
+    parameters = gradient_parameters(scene, gradients, checkpoint, stream)
+    require_room(scene, file, copies=1 + len(parameters))
+    sequence = replace(RunSequence.of(scene, strict), stream=file, parameters=parameters)
     while sequence.effects is not None:
         segments = sequence.segments
-        file = None if checkpoint is None else segment_file(checkpoint, len(segments))
+        saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
         # Later segments have no file yet where the earlier process ended in a previous one.
-        resumed = resume and file is not None and (file.exists() or not (segments or checkpoint_files(file)))
-        sequence.run_segment(progress, (file, every, resumed))
+        resumed = resume and saved is not None and (saved.exists() or not (segments or checkpoint_files(saved)))
+        sequence.run_segment(progress, (saved, every, resumed))
     result = sequence.result()
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
@@ -109,7 +136,8 @@ class RunSequence:
     """The segments of a run that have ended, and the effects of the next one.
 
     given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
-    None: the run has ended. notes: those of the segments that have ended.
+    None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
+    parameters: of the derivatives.
     """
 
     given: Scene
@@ -118,6 +146,8 @@ class RunSequence:
     effects: Effects | None
     segments: list[Segment]
     notes: list[Note]
+    stream: Path | None = None
+    parameters: tuple[Parameter, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
@@ -131,7 +161,11 @@ class RunSequence:
         last = [segment for segment in self.segments if segment.run.row_count][-1:]  # one that failed at once has none
         at = RestartState.of(last[0].model, last[0].run, last[0].azimuth) if last else None
         end = min(scene.end, selection.plane_until) if model.effects.dimension == "planar" else scene.end
-        return start_run(scene, model, selection, end, at, stopping_monitors(scene, model.effects, self.strict))
+        stops = stopping_monitors(scene, model.effects, self.strict)
+        run, azimuth = start_run(scene, model, selection, end, at, stops)
+        if self.parameters:
+            start_gradients(run, scene, model, self.parameters)
+        return run, azimuth
 
     def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
         """Run the next segment to its end, add its notes, and determine the effects of the segment after it."""
@@ -142,6 +176,8 @@ class RunSequence:
         known_kinds = {note.kind for note in self.notes if not note.action}
         notes = notes_of(segment, following)
         self.notes += [note for note in notes if note.action or note.kind not in known_kinds]
+        if self.parameters and following is not None:
+            raise switching_error(segment, notes)
         self.effects = following
 
     def result(self, with_initial_row: bool = False) -> Result:
@@ -149,13 +185,16 @@ class RunSequence:
 
         with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
-        last = self.segments[-1]
+        last, sprung = self.segments[-1], is_sprung(self.scene.top)
+        if self.stream is not None:
+            rows_on_disk = StreamedRows(self.segments, self.given.output_step, sprung)
+            if rows_on_disk.count:
+                return rows_on_disk.written(partial(_result, self), self.stream)
         if with_initial_row and not any(segment.run.row_count for segment in self.segments):
             last.run.record_now()
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
-            raise RunError(_message(self.scene, last), status=last.status)
-        sprung = is_sprung(self.scene.top)
+            raise RunError(message_of(self.scene, last), status=last.status)
         histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
         return _result(self, joined(histories, self.given.output_step))
 
@@ -174,83 +213,59 @@ def settle(scene: Scene) -> Scene:
     return replace(scene, initial_state=state_at_rest(end.tilt_angles[-1], end.friction_state[-1]))
 
 
-def _require_no_checkpoint(checkpoint: str | Path) -> None:
-    """Raise InputError where a later segment has a checkpoint file: it would conflict in the middle of the run."""
-    if found := [file for file in checkpoint_files(checkpoint) if file != Path(checkpoint)]:
-        raise InputError(
-            f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
-        )
-
-
 def _segment(sequence: RunSequence, progress: Progress | None, options: CheckpointOptions) -> Segment:
     """Build the model of the next segment and run it to its end."""
     scene, effects = sequence.scene, sequence.effects
     assert effects is not None
     check(scene, effects)
     start = time.perf_counter()
-    model = build_model(scene.bearing.layout, effects)
+    model = build_model(scene.bearing.layout, effects, gradients=bool(sequence.parameters))
     path, every, resume = options
     checkpoint = None if path is None else Checkpoint(path, Identity.of(scene, model), every, resume)
+    stored = None if sequence.stream is None else RowFile.beside(path, sequence.stream.parent, model, resume)
     run, azimuth = sequence.start_segment(model)
     if checkpoint is not None:
-        checkpoint.restore(run)
+        checkpoint.restore(run, stored)
     ready = time.perf_counter()
     earlier = sum(segment.run.row_count for segment in sequence.segments)
-    status = _advance(run, scene, earlier, progress, checkpoint) or run.status[0]
+    copies = 1 + len(sequence.parameters)
+    status = _advance(run, scene, earlier, copies, progress, checkpoint, stored) or run.status[0]
     wall = time.perf_counter() - ready + (checkpoint.wall if checkpoint is not None else 0.0)
-    return Segment(model, run, azimuth, status, wall, ready - start)
-
-
-def check(scene: Scene, effects: Effects) -> None:
-    """Raise InputError where the method of the scene does not support these effects."""
-    if effects.sliders == "massless" and scene.solver.method == "dopri5":
-        raise InputError(
-            "solver.method = 'dopri5': massless sliders have no accelerations to integrate; use 'implicit'"
-        )
-    if effects.uplift and scene.solver.method == "dopri5":
-        raise InputError(
-            "solver.method = 'dopri5': the equations of PEER 2017/07 have no separation; use 'implicit' with uplift"
-        )
+    return Segment(model, run, azimuth, status, wall, ready - start, stored)
 
 
 def _advance(
-    run: Run, scene: Scene, earlier: int, progress: Progress | None, checkpoint: Checkpoint | None
+    run: Run,
+    scene: Scene,
+    earlier: int,
+    copies: int,
+    progress: Progress | None,
+    checkpoint: Checkpoint | None,
+    stored: RowFile | None,
 ) -> str | None:
     """Take all steps; "interrupted" after Ctrl-C, "memory" where no more rows fit, else None.
 
-    earlier: number of rows of the segments before.
+    earlier: number of rows of the segments before. copies: numbers kept of each quantity. stored: takes the rows of a
+    run that streams them.
     """
     status, surfaces = None, scene.bearing.layout.surfaces
     try:
-        while run.advance(STEPS_PER_CALL):
-            if outgrown(earlier + run.row_count, surfaces):
+        while run.advance(STEPS_PER_CALL, 0 if stored is None else ROWS_HELD):
+            if stored is not None:
+                stored.take(run)
+            elif outgrown(copies * (earlier + run.row_count), surfaces):
                 status = "memory"
                 break
             if checkpoint is not None:
-                checkpoint.save_if_due(run)
+                checkpoint.save_if_due(run, stored)
             if progress is not None:
                 progress(run.time, scene.end)
     except KeyboardInterrupt:
         status = "interrupted"
     # After a failure the last checkpoint is kept: resumed from there, the run fails again in the same way.
     if checkpoint is not None and run.status[0] in ("ok", "stopped"):
-        checkpoint.save(run)
+        checkpoint.save(run, stored)
     return status
-
-
-def _message(scene: Scene, segment: Segment) -> str:
-    """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
-    stopped = segment.status == "guard"
-    cause = "; ".join(note.text for note in notes_of(segment, None)) if stopped else None
-    return failures.message(scene, segment.model, segment.run, segment.status, cause)
-
-
-def _extremes(segments: Sequence[Segment]) -> Extremes | None:
-    """Extremes of all segments in the frame of the user; None where none of them could start."""
-    found = [
-        Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in segments if s.run.row_count
-    ]
-    return reduce(or_, found) if found else None
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
@@ -267,14 +282,19 @@ def _result(sequence: RunSequence, history: History) -> Result:
         "rtol": f"{scene.solver.rtol:g}",
         "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
     }
+    events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))
     return Result(
         scene=scene,
         history=history,
-        events=tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth)),
+        events=events,
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
-        message="" if last.status in ("ok", "stopped") else _message(scene, last),
+        message="" if last.status in ("ok", "stopped") else message_of(scene, last),
         provenance=provenance,
-        notes=tuple(sequence.notes) + history_notes(scene, last.model.effects, history),
-        recorded_extremes=_extremes(segments),
+        notes=tuple(sequence.notes)
+        + history_notes(scene, last.model.effects, thinned_history(history))
+        + landing_notes(events)
+        + gradient_notes(sequence),
+        recorded_extremes=extremes_of(segments),
+        gradients=run_gradients(sequence, len(history.time)),
     )

@@ -110,7 +110,7 @@ METHODS = (
 )
 MONITORS = (
     Word("rims", "a slider is beyond the capacity of its surface [m]"),
-    Word("uplift", "a normal force is below its least value [N]"),
+    Word("uplift", "a normal force is below its least value, or above its largest [N]"),
     Word("inertia", "inertial force of a slider over the normal force below it"),
     Word("heat", "bound of the temperature rise of a surface [K]"),
     Word("law_speed", "slip velocity outside the range in which the friction law was checked [m/s]"),
@@ -190,7 +190,9 @@ STATUSES = (
         "a value is not finite",
         "a value is not finite; check the state and the load",
     ),
-    Status("memory", "no memory for more rows", "no memory for more rows; give output_step"),
+    Status(
+        "memory", "no memory for more rows", "no memory for more rows; give output_step, or stream the rows to disk"
+    ),
     Status("guard", "a monitor stopped the run (`strict`)", "what the model leaves out would matter from here on"),
     Status(
         "parted",

@@ -217,10 +217,40 @@ SELECTABLE = ("dimension", "sliders", "rims", "uplift")
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """Layout and effects: all inputs that determine one set of equations and so one compiled model."""
+    """All inputs that determine one set of equations and so one compiled model.
+
+    Attributes:
+        layout, effects: see their classes.
+        gradients: whether the model also computes the derivatives of a run with respect to parameters.
+
+    Raises:
+        InputError: gradients of effects that have none.
+    """
 
     layout: Layout
     effects: Effects = Effects()
+    gradients: bool = False
+
+    def __post_init__(self) -> None:
+        if self.gradients:
+            self._check_gradients()
+
+    def _check_gradients(self) -> None:
+        if self.effects.uplift:
+            raise InputError(
+                "effects.uplift = True: gradients are not computed through lift-off and landing; leave out the "
+                "gradients, or give uplift = false where the surfaces stay closed"
+            )
+        if self.effects.top_rotation:
+            raise InputError(
+                "effects.top_rotation = True: gradients are not computed with a support that rotates; leave out the "
+                "gradients, or the top_rotation"
+            )
+        if self.effects.law is not None and self.effects.law.depends_on_temperature:
+            raise InputError(
+                f"effects.friction = {self.effects.friction!r}: gradients are not computed through frictional heating; "
+                "leave out the gradients, or give a friction law without temperature"
+            )
 
     @property
     def key(self) -> str:
@@ -234,4 +264,4 @@ class ModelSpec:
                 name += f"-{value}"
             elif value is not None:
                 name += f"[{value.replace(' ', '')}]"
-        return name
+        return f"{name}-gradients" if self.gradients else name

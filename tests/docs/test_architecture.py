@@ -18,8 +18,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "coupling", "results", "analysis", "figures", "result", "simulation", "studies", "report", "",
-    "cli", "__main__",
+    "scene", "model", "coupling", "results", "analysis", "figures", "result", "simulation", "studies", "report",
+    "explorer", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.
@@ -189,35 +189,42 @@ def test_every_package_is_on_the_map():
 
 
 # The folders of the runtime, lowest first, and the headers that each may include beside its own.
-LAYERS = ("equations", "steppers", "run", "port")
+LAYERS = ("equations", "steppers", "run", "port", "api")
+GRADIENTS = ("gradients", {"run.h", "gradients.h", "msfp_gradient_kernels.h"})  # beside `api`, of some models
 RUNTIME = ROOT / "msfp_gen" / "runtime"
 GENERATED = {"msfp_model.h", "msfp_kernels.h"}
+OF_THE_TABLE = {"msfp_fields.h"}  # what the table of functions states about the model
 SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_runtime_includes_one_way(path):
-    """port -> run -> steppers -> equations -> generated headers; the public header includes nothing of ours."""
+    """api -> port -> run -> steppers -> equations -> generated headers; msfp_runtime.h includes nothing of ours."""
     included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
     if path.parent == RUNTIME:
         assert not included
         return
+    if path.parent.name == GRADIENTS[0]:
+        assert included and included <= GRADIENTS[1]
+        return
     layer = LAYERS.index(path.parent.name)
     below = {f"{name}.h" for name in LAYERS[max(layer - 1, 0) : layer + 1]} - {path.name}
-    assert included and included <= (below | GENERATED if layer == 0 else below)
+    generated = {"equations": GENERATED, "api": OF_THE_TABLE}.get(path.parent.name, set())
+    assert included and included <= below | generated
 
 
 def test_names_of_runtime_files_are_unique():
     """Generated sources lie in one folder."""
     assert len({path.name for path in SOURCES}) == len(SOURCES)
-    assert {path.parent.name for path in SOURCES} == {"runtime", *LAYERS}
+    assert {path.parent.name for path in SOURCES} == {"runtime", *LAYERS, GRADIENTS[0]}
 
 
 def test_headers_of_the_runtime_define_only_prefixed_macros():
     headers = [*RUNTIME.rglob("*.h"), *(ROOT / "templates").glob("*.h.jinja")]
-    assert len(headers) == 8
+    assert len(headers) == 14
     for path in headers:
-        macros = re.findall(r"^\s*#\s*define\s+(\w+)", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        text = path.read_text(encoding="utf-8").replace("{{ name | upper }}", "MSFP_N_M_P")
+        macros = re.findall(r"^\s*#\s*define\s+(\w+)", text, flags=re.MULTILINE)
         assert macros and not [m for m in macros if not m.lower().startswith("msfp_")], path.name
 
 

@@ -180,4 +180,5 @@ def test_contact_damping_that_changes_sliding_is_noted() -> None:
     run = simulate(replace(scene, bearing=scene.bearing.replace(contact_damping=1e-2)))
     (note,) = [note for note in run.notes if note.kind == "damping"]
     energy = run.history.energy
+    assert note.time == run.history.time[-1]
     assert note.value == energy["contact_dissipated"][-1] / energy["friction_dissipated"][-1] > 0.01

@@ -14,6 +14,8 @@ from msfp_gen import Auto, Effects, InputError, Load, Motion, Rotation, Scene, T
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.result import Result
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
+from msfp_gen.simulation.settling import needs_settling, settling_scene
+from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.accuracy.library import run_library
 from msfp_gen.studies.accuracy.opensees import run_opensees
 from msfp_gen.studies.accuracy.series import run_series
@@ -84,10 +86,26 @@ def test_energy_closes_with_loads_and_turning_plates(effects: Auto | Effects) ->
     assert simulate(scene).summary["energy"]["closure_error"] < 3e-3
 
 
+def test_plates_are_settled_where_they_are_tilted_at_the_start() -> None:
+    """And not where they are level there and tilted later."""
+    from_tilt = Rotation.from_arrays([0.0, 0.5, 1.0, 2.0], np.outer([1.0, 0.5, 0.0, 0.0], [0.01, 0.0]))
+    to_tilt = Rotation.from_arrays([0.0, 0.5, 1.0, 2.0], np.outer([0.0, 0.5, 1.0, 1.0], [0.01, 0.0]))
+    for rotation, tilted in ((from_tilt, True), (to_tilt, False)):
+        assert needs_settling(double(motion=STILL.rocking(rotation))) is tilted
+
+
+def test_a_settled_run_starts_where_the_settling_ended() -> None:
+    tilted = double(motion=STILL.rocking(Rotation.constant(theta=0.01)))
+    end, state = simulate(settling_scene(tilted)).history, settle(tilted).initial_state
+    assert state is not None and (end.tilt_angles[-1] != end.tilt_angles[-2]).any()
+    np.testing.assert_array_equal(state.q, end.tilt_angles[-1])
+    np.testing.assert_array_equal(state.h, end.friction_state[-1])
+
+
 def test_a_slider_without_friction_finds_the_lowest_point_of_a_tilted_dish() -> None:
-    scene = double(
-        motion=STILL.rocking(Rotation.ramp(theta=0.02, duration=10.0)), top=Top.prescribed((0.0, 0.0, -WEIGHT))
-    )
+    """In statics: with inertia a plate that nothing holds overturns from there."""
+    tilted, top = STILL.rocking(Rotation.ramp(theta=0.02, duration=10.0)), Top.prescribed((0.0, 0.0, -WEIGHT))
+    scene = double(motion=tilted, top=top, effects=Auto(sliders="massless"))
     result = simulate(replace(scene, bearing=scene.bearing.replace(friction=0.0)))
     assert result.history.sliding[-1, 0] == pytest.approx(scene.bearing.surfaces[0].radius * 0.02, rel=1e-4)
 

@@ -24,7 +24,8 @@ from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
-from msfp_gen.simulation.segment import RestartState, start_run
+from msfp_gen.simulation.restart_state import RestartState
+from msfp_gen.simulation.segment import start_run
 
 BEARING = presets.bearing("fenz-tfp")
 MASS, GRAVITY = 11e3, BEARING.gravity
@@ -343,3 +344,29 @@ def test_an_impossible_spring_is_refused(values, word):
 def test_library_integrators_refuse_a_spring():
     with pytest.raises(InputError, match=r"top\.vertical_stiffness = .*foot"):
         Ode(build_model(BEARING.layout, PLANAR), BEARING, HEAVE, sprung())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene_name", ["ridgecrest-clc", "ridgecrest-ccc"])
+@pytest.mark.parametrize("bearing_name", ["prototype-tfp", "becker-tfp", "fenz-tfp"])
+@pytest.mark.parametrize("frequency", [None, 12.4])
+def test_records_complete_with_sliders_of_real_mass(scene_name, bearing_name, frequency):
+    """Sliders of a thousandth of the mass that they carry, full scale: one answer at every tolerance."""
+    scene, bearing = load_scene(scene_name), presets.bearing(bearing_name)
+    mass = scene.top.mass
+    factors = [1e-3 * mass / body.mass for body in bearing.bodies[:-1]] + [1.0]
+    bodies = [
+        replace(body, mass=factor * body.mass, inertia=tuple(factor * value for value in body.moments))
+        for body, factor in zip(bearing.bodies, factors, strict=True)
+    ]
+    stiffness = None if frequency is None else mass * (2 * np.pi * frequency) ** 2
+    damping = 0.0 if frequency is None else 0.1 * mass * 2 * np.pi * frequency
+    top = replace(scene.top, vertical_stiffness=stiffness, vertical_damping=damping)
+    whole = replace(scene, bearing=replace(bearing, bodies=bodies), top=top, effects=Auto())
+    results = [simulate(replace(whole, solver=Solver(rtol=rtol))) for rtol in (1e-3, 1e-4, 1e-5, 1e-6)]
+    assert all(result.status == "ok" for result in results)
+    peaks = [result.extremes.displacement[3] for result in results]
+    assert max(peaks) < 1.005 * min(peaks)
+    if frequency is not None:
+        shears = [result.extremes.top_force[3] for result in results]
+        assert max(shears) < 1.01 * min(shears)

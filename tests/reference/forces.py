@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .kinematics import Rotation, cross, rotate
+from .kinematics import Rotation, cross, joint, rotate
 from .parameters import Array
 
 SPIN_RATE = 0.01  # w_0 [rad/s], the drilling moment of spin="patch"
@@ -125,9 +125,11 @@ def _rim(bearing: Any, turn: Rotation, r: dict[str, Array], g: int) -> tuple[Any
     along = (other[2] @ own[0]) * own[0] + (other[2] @ own[1]) * own[1]
     direction = along / np.sqrt(along @ along)  # (3.24)
     if k == g + 1:
-        point = radius * direction + offset * own[2] + r[f"{g}{g + 1}"]  # (3.25)
+        point = radius * direction + offset * own[2] + r[joint(bearing, g, g + 1)]  # (3.25)
     else:
-        point = -radius * direction - offset * own[2] + r[f"{g}{g}"]  # (3.25), - r f: the rim touches on the far side
+        point = (
+            -radius * direction - offset * own[2] + r[joint(bearing, g)]
+        )  # (3.25), - r f: the rim touches on the far side
     magnitude = surface.rim_stiffness * gap + surface.rim_damping * gap_rate  # (3.23) read as k g + c dg/dt
     pressed = np.real(gap) <= 0 and np.real(magnitude) < 0
     return gap, gap_rate, magnitude * direction if pressed else none, point, direction  # (3.22)

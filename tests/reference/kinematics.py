@@ -109,15 +109,26 @@ def rotation(state: State) -> Rotation:
     return Rotation(t, w, w_total, dw, dw_total)
 
 
+def joint(bearing: Any, one: int, other: int | None = None) -> str:
+    """Name of the point "34" or "33"; with a stroke in stacks of ten and more bodies, whose body 11 is "11"."""
+    return f"{one}{'_' if bearing.layout.n > 9 else ''}{one if other is None else other}"
+
+
 def steps(bearing: Any) -> list[Step]:
     """The position equations (3.2)-(3.11) in order, with (2.20) read as l_4 - z_4."""
     l1 = bearing.base_height
     z1 = bearing.base_centroid if bearing.base_centroid is not None else l1 / 2
-    table = [Step("1", "01", z1, 1), Step("11", "1", l1 - z1, 1)]  # (3.2), (3.3)
+    table = [Step("1", "01", z1, 1), Step(joint(bearing, 1), "1", l1 - z1, 1)]  # (3.2), (3.3)
     for g in range(1, bearing.layout.n):
         R, body = bearing.surfaces[g - 1].radius, bearing.bodies[g - 1]  # bodies[g - 1] is body g + 1
         length, z = body.height, body.centroid
-        own, centre, below, mass, above = f"{g}{g}", f"{g}c", f"{g}{g + 1}", f"{g + 1}", f"{g + 1}{g + 1}"
+        own, centre, below, mass, above = (
+            joint(bearing, g),
+            f"{g}c",
+            joint(bearing, g, g + 1),
+            f"{g + 1}",
+            joint(bearing, g + 1),
+        )
         if g <= bearing.layout.m:
             lengths = (R, -R, z, length - z)  # (3.4)-(3.7)
         else:

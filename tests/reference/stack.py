@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import forces
-from .kinematics import E, Points, Rotation, State, cross, points, rotation
+from .kinematics import E, Points, Rotation, State, cross, joint, points, rotation
 from .parameters import Array
 
 
@@ -125,7 +125,7 @@ def _applied(bearing: Any, at: Points, act: Interfaces, load: Load, k: int) -> t
         )
     if k == bearing.layout.n:
         force = force + load.force
-        moment = moment + cross(at.r[f"{k}{k}"] - at.r[f"{k}"], load.force) + load.moment
+        moment = moment + cross(at.r[joint(bearing, k)] - at.r[f"{k}"], load.force) + load.moment
     return force, moment
 
 

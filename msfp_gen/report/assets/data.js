@@ -27,17 +27,3 @@ const column = (read) => Array.from({ length: frameCount }, (_, frame) => read(f
 const surfaceNumbers = report.surfaces.map((_, index) => index);
 const horizontal = [Math.cos(report.azimuth), Math.sin(report.azimuth)];
 const radial = ([x, y]) => Math.hypot(x, y);
-
-function fixed(value, digits) {
-  const text = value.toFixed(digits);
-  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
-}
-
-function element(parent, name, attributes = {}, text = "") {
-  const svg = parent.namespaceURI === "http://www.w3.org/2000/svg" || name === "svg";
-  const made = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  parent.append(made);
-  return made;
-}

@@ -16,6 +16,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.results.sliding import Flags, separated
 
 if TYPE_CHECKING:
+    from msfp_gen.results.history import History
     from msfp_gen.results.run_data import RunData
     from msfp_gen.scene.bearing import Bearing
 
@@ -61,7 +62,8 @@ def poses(result: RunData) -> Poses:
     signs = np.array(bearing.layout.signs, float)[:, None]
     normal = _rotated(history.contact_angles, basis[:, :-1])[..., 2, :]  # t~_3 (3.13)
     contact = centre - signs * bearing.arrays()["radius"][:, None] * normal  # (3.14); concave down: + R
-    rim, rim_direction = _rims(bearing, basis, bottom, top)
+    rim_direction = _rim_directions(bearing, basis[:, :, 2])
+    rim = _rim_points(bearing, basis[:, :, 2], bottom, top, rim_direction)
     force = np.where(separated(history)[..., None], 0.0, history.interface_force)
     rim_force = -history.rim_force[..., None] * rim_direction  # (3.22), on the body above
     moment = np.cross(contact - centre, force - rim_force) + np.cross(rim - centre, rim_force)
@@ -104,6 +106,19 @@ def body_positions(bearing: Bearing, basis: Array, separation: Array) -> tuple[A
     return bottom, top, centre
 
 
+def contact_offsets(bearing: Bearing, history: History) -> Array:
+    """Distance of the contact point (3.14) from the axis of the slider, ndarray, shape (T, n-1) [m].
+
+    The normal force of a surface acts there. Beyond the radius of the slider's face it could not.
+    """
+    upright = np.broadcast_to(np.eye(3), (*history.contact_angles.shape[:-1], 3, 3))
+    normal = _rotated(history.contact_angles, upright)[..., 2, :]  # t~_3 (3.13), in the basis of the body below
+    above = _rotated(history.tilt_angles[..., :2], upright)[..., 2, :]
+    concave_up = np.array(bearing.layout.signs)[:, None] > 0
+    offsets: Array = np.linalg.norm(np.cross(normal, np.where(concave_up, above, upright[..., 2, :])), axis=-1)
+    return offsets * bearing.arrays()["radius"]
+
+
 def friction_circles(result: RunData) -> Array:
     """Radius mu R/sqrt(1 + mu^2) of the friction circle of every surface, ndarray, shape (T, n-1) [m].
 
@@ -124,18 +139,33 @@ def _rotated(angles: Array, below: Array) -> Array:
     return np.stack([first, second, cosine[..., 1, :] * between + sine[..., 1, :] * t1], axis=-2)
 
 
-def _rims(bearing: Bearing, basis: Array, bottom: Array, top: Array) -> tuple[Array, Array]:
-    """Point of every slider nearest to the rim (3.25), and the direction towards the rim (3.24), each (T, n-1, 3)."""
-    lengths, axis = bearing.arrays(), basis[:, :, 2]
-    points, directions = np.empty_like(axis[:, 1:]), np.empty_like(axis[:, 1:])
-    for surface, sign in enumerate(bearing.layout.signs):
+def rim_forces(bearing: Bearing, angles: Array, size: Array) -> Array:
+    """Rim forces on the bodies above (3.22), ndarray, shape (T, n-1, 3) [N].
+
+    angles: of bodies 1..n, shape (T, n, 3) [rad]. size: of the forces, shape (T, n-1) [N].
+    """
+    forces: Array = -size[..., None] * _rim_directions(bearing, body_bases(angles)[:, :, 2])
+    return forces
+
+
+def _rim_directions(bearing: Bearing, axis: Array) -> Array:
+    """Directions from the sliders towards the rims (3.24), shape (T, n-1, 3); zero where the slider is centred."""
+    directions = np.empty_like(axis[:, 1:])
+    for surface in range(bearing.layout.surfaces):
         body = bearing.slider(surface)
         own, other = axis[:, body], axis[:, surface if body == surface + 1 else surface + 1]
         along = other - np.sum(own * other, axis=-1, keepdims=True) * own
         norm = np.linalg.norm(along, axis=-1, keepdims=True)
-        direction = np.divide(along, norm, out=np.zeros_like(along), where=norm > 1e-12)  # undefined where centred
+        directions[:, surface] = np.divide(along, norm, out=np.zeros_like(along), where=norm > 1e-12)
+    return directions
+
+
+def _rim_points(bearing: Bearing, axis: Array, bottom: Array, top: Array, direction: Array) -> Array:
+    """Point of every slider nearest to the rim (3.25), shape (T, n-1, 3) [m]."""
+    lengths, points = bearing.arrays(), np.empty_like(direction)
+    for surface, sign in enumerate(bearing.layout.signs):
+        body = bearing.slider(surface)
         middle = bottom[:, body] if sign > 0 else top[:, body]
         radius, offset = lengths["rim_radius"][body], lengths["rim_offset"][body]
-        points[:, surface] = middle + sign * (radius * direction + offset * own)
-        directions[:, surface] = direction
-    return points, directions
+        points[:, surface] = middle + sign * (radius * direction[:, surface] + offset * axis[:, body])
+    return points

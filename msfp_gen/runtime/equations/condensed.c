@@ -9,7 +9,7 @@ enum { NB = MSFP_NB, DOF = MSFP_DOF, NA = MSFP_NA, ND = MSFP_ND, FORCE = MSFP_FO
 static const int unknown[ND] = MSFP_FREE;
 
 /* Interface forces that balance loads, weights and inertia, summed from the top down. With uplift the unilateral
- * contacts give the forces instead, and the differences are rows of the residual. */
+ * contacts and the rims give the forces instead, and the differences are rows of the residual. */
 static void forces(const msfp_parameters *p, msfp_work *w, double *residual)
 {
     double sum[FORCE];
@@ -46,6 +46,7 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
         msfp_base(p, at, w);
     msfp_kinematics(p, at, w);
     msfp_top(p, at, w);
+    msfp_rims(p, w, tangent ? &jacobians : NULL);
     forces(p, w, residual);
 #if MSFP_LAW
     msfp_friction_conditions(at, w);

@@ -53,13 +53,15 @@ void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
     }
     if (contact[MSFP_UNILATERAL_GRIP] <= 0.0)
         memset(contact, 0, (FORCE + MOMENT) * sizeof *contact);
-    memcpy(w->force[j], contact, sizeof w->force[j]);
+    msfp_rim_to_world(w->body[j], w->x[j + 1], w->rim[j], w->rim_wrench[j]);
+    for (int i = 0; i < FORCE; ++i)
+        w->force[j][i] = contact[i] + w->rim_wrench[j][i];
 }
 
-void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j)
+void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j, const double *drim)
 {
     const int k = slider_of(j);
-    double along, across, contact[MSFP_UNILATERAL_SIZE], *dunilateral = w->dunilateral[j];
+    double along, across, contact[MSFP_UNILATERAL_SIZE], wrench[FORCE + MOMENT], *dunilateral = w->dunilateral[j];
     compression(w, j, &along, &across);
     if (w->unilateral[j][MSFP_UNILATERAL_GRIP] <= 0.0)
         memset(dunilateral, 0, sizeof w->dunilateral[j]);
@@ -69,28 +71,32 @@ void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j)
     else
         msfp_unilateral_edge_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
                                      dunilateral);
-    memcpy(w->dforce[j], dunilateral, sizeof w->dforce[j]);
+    msfp_rim_to_world_tangent(w->body[j], w->x[j + 1], w->rim[j], wrench, w->dbody[j], w->dx[j + 1], drim,
+                              w->drim_wrench[j]);
+    for (int i = 0; i < FORCE * DOF; ++i)
+        w->dforce[j][i] = dunilateral[i] + w->drim_wrench[j][i];
 }
 
-/* Moments are about the sphere centre of each body; on the slider, the moment of the interface force is added. */
+/* Moments of `count` components on the body above (in place) and the reverse of those on the body below, equal so far
+ * and about the sphere centre of each body: on the slider, the moments of contact and rim by the separation are added. */
+static void split(int j, const double *contact, const double *rim, double *on_above, double *below, int count)
+{
+    const int above = signs[j] > 0;
+    double *slider = above ? on_above : below;
+    memcpy(below, on_above, count * sizeof *below);
+    for (int i = 0; i < count; ++i)
+        slider[i] += above ? contact[i] + rim[i] : -contact[i] - rim[i];
+}
+
 void msfp_split_moment(msfp_work *w, int j)
 {
-    const double *moment = w->unilateral[j] + FORCE;
-    const int above = signs[j] > 0;
-    memcpy(w->below[j], w->moment[j], sizeof w->below[j]);
-    double *slider = above ? w->moment[j] : w->below[j];
-    for (int i = 0; i < MOMENT; ++i) /* `below` is the reverse of the moment on the body below */
-        slider[i] += above ? moment[i] : -moment[i];
+    split(j, w->unilateral[j] + FORCE, w->rim_wrench[j] + FORCE, w->moment[j], w->below[j], MOMENT);
 }
 
 void msfp_split_moment_tangent(msfp_work *w, int j)
 {
-    const double *dmoment = w->dunilateral[j] + FORCE * DOF;
-    const int above = signs[j] > 0;
-    memcpy(w->dbelow[j], w->dmoment[j], sizeof w->dbelow[j]);
-    double *dslider = above ? w->dmoment[j] : w->dbelow[j];
-    for (int i = 0; i < MOMENT * DOF; ++i)
-        dslider[i] += above ? dmoment[i] : -dmoment[i];
+    split(j, w->dunilateral[j] + FORCE * DOF, w->drim_wrench[j] + FORCE * DOF, w->dmoment[j], w->dbelow[j],
+          MOMENT * DOF);
 }
 #else
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)

@@ -132,6 +132,8 @@ void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work 
 int msfp_top_is_sprung(const msfp_parameters *p);
 /* The mass that rests on it [kg]; 0 for that of a rig. */
 double msfp_sprung_mass(const msfp_parameters *p);
+/* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
+void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage);
 /* Compression of that spring and its rate [m], [m/s]; 0 without one. */
 void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2]);
 #if MSFP_TOP_ROTATION
@@ -144,10 +146,12 @@ void msfp_support_axis(const msfp_point *at, double *upright);
 /* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 #if MSFP_UPLIFT
-/* Force of the unilateral contact of surface j, into w->force[j]; zero where it is open or its damping would pull. */
+/* Force of surface j, into w->force[j]: that of the unilateral contact, zero where it is open or its damping would
+ * pull, and that of the rim. */
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);
-/* Columns of that force and of its moment; the force itself is in `w`. */
-void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j);
+/* Columns of that force and of the moments of its parts; the force itself is in `w`. drim: columns of the rim force in
+ * the basis of the body below. */
+void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j, const double *drim);
 /* Moments of surface j on the body above and on the body below, from the moment about the centre of its concave
  * side. */
 void msfp_split_moment(msfp_work *w, int j);
@@ -161,13 +165,12 @@ void msfp_split_moment_tangent(msfp_work *w, int j);
 typedef struct {
     double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
 } msfp_surface_jacobians;
-/* Rim force of surface j; drim: its Jacobian [force, moment][psi, theta and their rates], or NULL. */
+/* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 /* Columns of that force and of its moment, from the Jacobian. */
 void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
-/* Share of the rim force that the contact of surface j carries: 1, but with uplift no more than the interface force, so
- * that a rim met by an open surface adds no normal force. */
-double msfp_rim_share(const msfp_work *w, int j);
+/* Rim forces of all surfaces, with their Jacobians for the tangent, or NULL. */
+void msfp_rims(const msfp_parameters *p, msfp_work *w, msfp_surface_jacobians *jacobians);
 /* Moment of surface j on the body above, in the basis of the body below [N m]. */
 void msfp_surface_moment(const msfp_work *w, int j, double *moment);
 /* Contact force, slip, friction and moment of all surfaces; g as of msfp_condensed; jacobians: for the tangent, or NULL.
@@ -245,6 +248,15 @@ void msfp_heat_finish(msfp_run *run);
 /* Largest error of a temperature over its tolerance [-]; weights: of the method less the embedded ones. */
 double msfp_heat_error(const msfp_run *run, const double *weights, int stages, double h, double beta);
 #else
+/* In place of their prefixed names, see msfp_symbols.h. */
+#undef msfp_heat_point
+#undef msfp_heat_initial_state
+#undef msfp_heat_begin
+#undef msfp_heat_prepare
+#undef msfp_heat_stage
+#undef msfp_heat_node
+#undef msfp_heat_finish
+#undef msfp_heat_error
 #define msfp_heat_point(s, at) ((void)0)
 #define msfp_heat_initial_state(run) ((void)0)
 #define msfp_heat_begin(run) ((void)0)

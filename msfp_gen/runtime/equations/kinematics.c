@@ -162,8 +162,7 @@ double msfp_sprung_mass(const msfp_parameters *p)
     return p->top[MSFP_TOP_PARAMETERS_M] - p->top[MSFP_TOP_PARAMETERS_MZ];
 }
 
-/* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
-static void load_foot(const msfp_parameters *p, const msfp_point *at, double *stage)
+void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage)
 {
     memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
     if (!msfp_top_is_sprung(p))
@@ -218,7 +217,7 @@ MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_wor
 {
     double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE];
     load_top(at, force, moment);
-    load_foot(p, at, stage);
+    msfp_foot_stage(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
     msfp_support_axis(at, upright);
@@ -235,7 +234,7 @@ MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, 
     double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE],
         dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
     load_top(at, force, moment);
-    load_foot(p, at, stage);
+    msfp_foot_stage(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
     msfp_support_axis(at, upright);

@@ -95,10 +95,7 @@ static double rim_lever(const double *par)
  * force and the damper dissipates what the spring releases. */
 static double rim_power(const msfp_parameters *p, const msfp_work *w, int j)
 {
-    double sliding[MSFP_GAP_SIZE];
-    const double *par = p->surface[j];
-    msfp_gap(par, w->body[j + 1], sliding);
-    const double gap = sliding[MSFP_GAP_G], spring = par[MSFP_SURFACE_PARAMETERS_KC] * gap;
+    const double *par = p->surface[j], gap = w->rim_gap[j], spring = par[MSFP_SURFACE_PARAMETERS_KC] * gap;
     const double damper = w->rim_sum[j] - spring;
     if (gap >= 0.0 || par[MSFP_SURFACE_PARAMETERS_CC] == 0.0)
         return 0.0;
@@ -259,13 +256,7 @@ static double unilateral_energy(const msfp_work *w)
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical)
 {
-    double sliding[MSFP_GAP_SIZE], gap[NB] = { 0.0 };
-    for (int j = 0; j < NB; ++j)
-        if (w->rim_sum[j] != 0.0) { /* the rim is in contact */
-            msfp_gap(p->surface[j], w->body[j + 1], sliding);
-            gap[j] = sliding[MSFP_GAP_G];
-        }
-    return mechanical->kinetic + mechanical->potential + restraint_energy(p, at, w) + rim_energy(p, gap) +
+    return mechanical->kinetic + mechanical->potential + restraint_energy(p, at, w) + rim_energy(p, w->rim_gap) +
            unilateral_energy(w);
 }
 
@@ -298,7 +289,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
         row->angles[j][1] = msfp_angle(contact[MSFP_CONTACT_ST], contact[MSFP_CONTACT_CT]);
         msfp_gap(p->surface[j], w->body[j + 1], sliding);
         row->sliding[j] = sliding[MSFP_GAP_S];
-        row->gap[j] = sliding[MSFP_GAP_G];
+        row->gap[j] = MSFP_UPLIFT && MSFP_RIMS ? w->rim_gap[j] : sliding[MSFP_GAP_G];
         row->rim[j] = w->rim_active[j] ? -w->rim[j][MSFP_RIM_FC] : 0.0;
         row->slip[j][0] = contact[MSFP_CONTACT_U];
         row->slip[j][1] = msfp_contact_v(contact);

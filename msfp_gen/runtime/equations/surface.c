@@ -7,11 +7,22 @@
 enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE, PAIR = MSFP_PAIR };
 
 #if MSFP_RIMS
+/* Inputs of the rim of surface j. */
 static void rim_coordinates(const msfp_work *w, int j, double *x)
 {
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < PAIR; ++i)
             x[order * PAIR + i] = w->x[j + 1][msfp_coordinate_field(order, i)];
+#if MSFP_UPLIFT
+    msfp_offset(w->body[j], w->x[j + 1], x + 2 * PAIR);
+#endif
+}
+
+/* Whether the rim of surface j needs no evaluation: comparing cosines of the tilt avoids an arc cosine. With uplift the
+ * gap follows from the separation too. */
+static int rim_is_clear(const msfp_parameters *p, const msfp_work *w, int j)
+{
+    return !MSFP_UPLIFT && msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j];
 }
 #endif
 
@@ -20,9 +31,9 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
     memset(w->rim[j], 0, sizeof w->rim[j]);
     w->rim_active[j] = 0;
     w->rim_sum[j] = 0.0;
+    w->rim_gap[j] = p->surface[j][MSFP_SURFACE_PARAMETERS_SC];
 #if MSFP_RIMS
-    /* Comparing cosines of the tilt avoids an arc cosine while the rim is not in contact. */
-    if (msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j])
+    if (rim_is_clear(p, w, j))
         return;
     double x[MSFP_RIM_LOCAL], out[MSFP_RIM_SIZE];
     rim_coordinates(w, j, x);
@@ -33,13 +44,15 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
         msfp_rim_tangent(p->surface[j], x, out, seed, drim);
     } else
         msfp_rim(p->surface[j], x, out);
+    w->rim_gap[j] = out[MSFP_RIM_G];
+    if (MSFP_UPLIFT && out[MSFP_RIM_G] >= 0.0)
+        return;
     w->rim_sum[j] = out[MSFP_RIM_FC];
     if (out[MSFP_RIM_FC] < 0.0) { /* a rim only pushes: docs/model.md, choice 4 */
         memcpy(w->rim[j], out, sizeof out);
         w->rim_active[j] = 1;
     }
 #else
-    (void)p;
     (void)drim;
 #endif
 }
@@ -58,46 +71,40 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
     }
 }
 
+/* Columns of input i of the rim of surface j; offset: columns of its separation. */
+static const double *rim_columns(const msfp_work *w, int j, const double *offset, int i)
+{
+    if (i >= 2 * PAIR)
+        return offset + (i - 2 * PAIR) * DOF;
+    return w->dx[j + 1] + msfp_coordinate_field(i / PAIR, i % PAIR) * DOF;
+}
+
 void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment)
 {
     memset(dforce, 0, FORCE * DOF * sizeof *dforce);
     memset(dmoment, 0, MOMENT * DOF * sizeof *dmoment);
     if (!w->rim_active[j])
         return;
-    for (int order = 0; order < 2; ++order)
-        for (int i = 0; i < PAIR; ++i) {
-            const double *dx = w->dx[j + 1] + msfp_coordinate_field(order, i) * DOF;
-            const int from = order * PAIR + i;
-            for (int r = 0; r < FORCE + MOMENT; ++r) {
-                double *to = r < FORCE ? dforce + r * DOF : dmoment + (r - FORCE) * DOF;
-                const double factor = drim[r * MSFP_RIM_LOCAL + from];
-                for (int c = 0; c < DOF; ++c)
-                    to[c] += factor * dx[c];
-            }
+    double offset[MSFP_OFFSET_SIZE * DOF];
+#if MSFP_UPLIFT
+    double value[MSFP_OFFSET_SIZE];
+    msfp_offset_tangent(w->body[j], w->x[j + 1], value, w->dbody[j], w->dx[j + 1], offset);
+#endif
+    for (int i = 0; i < MSFP_RIM_LOCAL; ++i) {
+        const double *dx = rim_columns(w, j, offset, i);
+        for (int r = 0; r < FORCE + MOMENT; ++r) {
+            double *to = r < FORCE ? dforce + r * DOF : dmoment + (r - FORCE) * DOF;
+            const double factor = drim[r * MSFP_RIM_LOCAL + i];
+            for (int c = 0; c < DOF; ++c)
+                to[c] += factor * dx[c];
         }
-}
-
-double msfp_rim_share(const msfp_work *w, int j)
-{
-    double interface = 0.0, rim = 0.0;
-    if (!MSFP_UPLIFT || !w->rim_active[j])
-        return 1.0;
-    for (int i = 0; i < FORCE; ++i) {
-        interface += w->force[j][i] * w->force[j][i];
-        rim += w->rim[j][i] * w->rim[j][i];
     }
-    return interface < rim ? sqrt(interface / rim) : 1.0;
 }
 
-/* Rim force of surface j, and the inputs of its contact: force and slip in the basis of the body below. */
-MSFP_INLINE void contact_inputs(const msfp_parameters *p, msfp_work *w, int j, double *drim)
+void msfp_rims(const msfp_parameters *p, msfp_work *w, msfp_surface_jacobians *jacobians)
 {
-    double rim[FORCE];
-    msfp_rim_force(p, w, j, drim);
-    const double share = msfp_rim_share(w, j);
-    for (int i = 0; i < FORCE; ++i)
-        rim[i] = share * w->rim[j][i];
-    msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], rim, w->local[j]);
+    for (int j = 0; j < NB; ++j)
+        msfp_rim_force(p, w, j, jacobians ? jacobians->rim[j] : NULL);
 }
 
 void msfp_surface_moment(const msfp_work *w, int j, double *moment)
@@ -111,7 +118,7 @@ MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_s
 {
     double moment[MOMENT];
     for (int j = 0; j < NB; ++j)
-        contact_inputs(p, w, j, jacobians ? jacobians->rim[j] : NULL);
+        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
     const int status = msfp_contacts(p, w, seed, g, jacobians ? jacobians->contact : NULL);
     if (status)
         return status;

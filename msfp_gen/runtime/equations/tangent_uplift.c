@@ -21,9 +21,14 @@ static void seed_columns(msfp_work *w, const msfp_seed *seed)
         }
 }
 
-/* Columns of the forces of the unilateral contacts, and of the linear balances. The kernels are linear in forces, whose
- * values therefore do not enter. */
-static void forces(const msfp_parameters *p, msfp_work *w, double *tangent)
+/* Columns of the rim forces and of their moments, in the basis of the body below. */
+typedef struct {
+    double force[NB][FORCE * DOF], moment[NB][MOMENT * DOF];
+} rim_columns;
+
+/* Columns of the forces of the surfaces, and of the linear balances. The kernels are linear in forces, whose values
+ * therefore do not enter. */
+static void forces(const msfp_parameters *p, msfp_work *w, const rim_columns *rims, double *tangent)
 {
     double dsum[FORCE * DOF], unused[FORCE];
     memcpy(dsum, w->dforce[NB], sizeof dsum);
@@ -32,23 +37,19 @@ static void forces(const msfp_parameters *p, msfp_work *w, double *tangent)
         msfp_interface_force_tangent(p->body[j + 1], w->body[j + 1], w->force[j + 1], unused, w->dbody[j + 1], dsum,
                                      dforce);
         memcpy(dsum, dforce, sizeof dsum);
-        msfp_unilateral_tangent(p, w, j);
+        msfp_unilateral_tangent(p, w, j, rims->force[j]);
         for (int i = 0; i < MSFP_SPACE * DOF; ++i)
             tangent[(j * ND + NA) * DOF + i] = dsum[i] - dforce[i];
     }
 }
 
 /* Columns of the moments of surface j on its two bodies, and of N. */
-static void surface(msfp_work *w, const msfp_surface_jacobians *jacobians, int j)
+static void surface(msfp_work *w, const msfp_surface_jacobians *jacobians, rim_columns *rims, int j)
 {
-    double dlocal[MSFP_LOCAL_SIZE * DOF], drf[FORCE * DOF], dmoment[MOMENT * DOF], local[MSFP_LOCAL_SIZE],
-        moment[MOMENT], unused[MOMENT];
-    const double share = msfp_rim_share(w, j);
-    msfp_rim_force_tangent(w, j, jacobians->rim[j], drf, dmoment);
-    for (int i = 0; i < FORCE * DOF; ++i)
-        drf[i] *= share;
+    double dlocal[MSFP_LOCAL_SIZE * DOF], local[MSFP_LOCAL_SIZE], moment[MOMENT], unused[MOMENT];
+    double *dmoment = rims->moment[j];
     msfp_surface_local_tangent(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], local,
-                               w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], drf, dlocal);
+                               w->dbody[j], w->dbody[j + 1], w->dx[j + 1], w->dx[j], w->dforce[j], rims->force[j], dlocal);
     memset(w->dnormal[j], 0, sizeof w->dnormal[j]);
     for (int r = 0; r <= MOMENT; ++r) {
         double *row = r < MOMENT ? dmoment + r * DOF : w->dnormal[j];
@@ -67,12 +68,15 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
                             const msfp_surface_jacobians *jacobians, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
+    rim_columns rims;
     seed_columns(w, seed);
     msfp_kinematics_tangent(p, at, w);
     msfp_top_tangent(p, at, w, NULL);
-    forces(p, w, tangent);
     for (int j = 0; j < NB; ++j)
-        surface(w, jacobians, j);
+        msfp_rim_force_tangent(w, j, jacobians->rim[j], rims.force[j], rims.moment[j]);
+    forces(p, w, &rims, tangent);
+    for (int j = 0; j < NB; ++j)
+        surface(w, jacobians, &rims, j);
     for (int k = 1; k <= NB; ++k) {
         const double *above = k < NB ? w->below[k] : w->moment[k], *dabove = k < NB ? w->dbelow[k] : w->dmoment[k];
         msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out,

@@ -23,7 +23,7 @@ typedef struct {
     double coefficients[6][MSFP_DEGREE + 1];
 } msfp_polynomials;
 
-typedef struct {
+struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
     msfp_ends from, to; /* motion of the ends in those states */
@@ -37,7 +37,7 @@ typedef struct {
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
     size_t time_count, time_capacity;
     int tried; /* a trial has succeeded since the last commit, revert or failure */
-} msfp_port;
+};
 
 /* ---- port.c ---- */
 

@@ -34,8 +34,10 @@ void msfp_event_values(msfp_run *run, const msfp_state *s, double *g)
     }
 #if MSFP_UPLIFT
     msfp_observe_state(run, s, &row);
-    for (int j = 0; j < NB; ++j)
+    for (int j = 0; j < NB; ++j) {
+        g[j] = row.gap[j];
         g[FIRST_CONTACT + j] = row.compression[j];
+    }
 #endif
 }
 

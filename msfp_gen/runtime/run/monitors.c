@@ -76,16 +76,18 @@ static finding beyond_capacity(const double *gaps)
     return worst;
 }
 
-/* Smallest normal force below the limit [N]. */
+/* Smallest normal force below its limit, else the largest one above its limit [N]. */
 static finding unloaded(const msfp_run *run)
 {
     finding worst = { 0.0, 0.0, 0 };
-    const double least = run->options.monitor_normal;
+    const double least = run->options.monitor_normal, most = run->options.monitor_peak;
     for (int j = 0; j < NB && least > 0.0; ++j) {
         const double normal = run->work.contact[j][MSFP_CONTACT_N];
         if (normal < least && (!worst.surface || normal < worst.value))
             worst = (finding){ 2.0, normal, j + 1 };
     }
+    for (int j = 0; j < NB && !worst.surface; ++j)
+        consider(&worst, run->work.contact[j][MSFP_CONTACT_N], most, j + 1);
     return worst;
 }
 

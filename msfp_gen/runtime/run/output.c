@@ -21,8 +21,10 @@ static void *grown(void *items, size_t count, size_t *capacity, size_t size)
 {
     if (count < *capacity)
         return items;
-    *capacity = *capacity ? 2 * *capacity : 256;
-    return realloc(items, *capacity * size);
+    const size_t wider = *capacity ? 2 * *capacity : 256;
+    void *more = realloc(items, wider * size);
+    *capacity = more ? wider : *capacity; /* without memory the array stays as it is */
+    return more;
 }
 
 static msfp_row *new_row(msfp_run *run)
@@ -81,7 +83,7 @@ static void restore_bounds(const msfp_run *run, msfp_row *row)
         if (row->normal[j] < 0.0)
             row->normal[j] = row->force[j][0] = row->force[j][1] = row->force[j][2] = 0.0;
         row->sliding[j] = sliding[j][MSFP_GAP_S];
-        row->gap[j] = sliding[j][MSFP_GAP_G];
+        row->gap[j] = MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]; /* with uplift it follows the separation too */
         row->rim[j] = row->gap[j] > 0.0 ? 0.0 : fmax(row->rim[j], 0.0); /* a rim only pushes, and only in contact */
     }
 }
@@ -89,12 +91,22 @@ static void restore_bounds(const msfp_run *run, msfp_row *row)
 double msfp_next_output(const msfp_run *run)
 {
     const double step = run->options.output_step;
-    return step * (floor(run->options.start_time / step + 1e-9) + (double)run->row_count);
+    return step * (floor(run->options.start_time / step + 1e-9) + (double)(run->rows_before + run->row_count));
+}
+
+void msfp_drop_rows(msfp_run *run)
+{
+    if (run->row_count < 2)
+        return;
+    run->rows[0] = run->rows[run->row_count - 1];
+    run->rows_before += run->row_count - 1;
+    run->row_count = 1;
 }
 
 int msfp_write_now(msfp_run *run)
 {
-    if (run->row_count && run->rows[run->row_count - 1].time >= run->now.t)
+    const double t = run->now.t; /* closer times count as equal, as where an output time is the end of a segment */
+    if (run->row_count && run->rows[run->row_count - 1].time >= t - msfp_smallest_step(t))
         return MSFP_OK;
     return msfp_write_row(run, &run->now);
 }

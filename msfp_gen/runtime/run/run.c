@@ -7,6 +7,7 @@
 
 enum {
     NB = MSFP_NB,
+    ROWS_OF_STEP = 10000, /* rows inside one step, at most: those of a long rest need not fit into memory */
     STABILITY_LIMIT_STEPS =
         500 /* consecutive steps; rim contact causes a few (Hairer and Wanner, Solving ODEs II, IV.2: 15) */
 };
@@ -139,6 +140,8 @@ static double allowed_step(msfp_run *run, double h)
         h = fmin(h, o->span_steps[run->span]);
     for (int i = run->span; i + 1 < o->span_count && t + h > o->span_ends[i]; ++i)
         h = fmin(h, fmax(o->span_ends[i] - t, o->span_steps[i + 1]));
+    if (o->output_step > 0.0)
+        h = fmin(h, ROWS_OF_STEP * o->output_step);
     return o->max_step > 0.0 ? fmin(h, o->max_step) : h;
 }
 
@@ -194,6 +197,7 @@ static int shorten_step(msfp_run *run, double h, double factor, int status)
 static int accept(msfp_run *run, const double *before, const double *after, double error, double h)
 {
     ++run->counts[MSFP_COUNT_STEPS];
+    MSFP_IF_GRADIENTS(msfp_gradients_before_step(run), (void)0);
     /* A step that was cut to end at a given time says little about the step size: the earlier proposal stands. */
     const int cut = h < 0.9 * run->h && error < 0.5;
     run->h = fmax(h * step_factor(run, error), cut ? run->h : 0.0);
@@ -207,9 +211,12 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     if (run->status)
         return 0;
     msfp_extremes_step(run);
+    if ((run->status = MSFP_IF_GRADIENTS(msfp_gradients_step(run, before, after), MSFP_OK)))
+        return 0;
     if (run->options.sampled && at_stop(run)) /* the slope of the accelerations changes here */
         memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
     run->now = run->next;
+    MSFP_IF_GRADIENTS(msfp_gradients_accept(run), (void)0);
 #if MSFP_CLOSED_FORM
     run->step_history = run->next_step_history;
 #endif
@@ -217,12 +224,14 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     if (stop) {
         if (run->options.output_step > 0.0)
             msfp_write_row(run, &run->now);
-        run->status = MSFP_STOPPED;
+        run->status = MSFP_IF_GRADIENTS(msfp_gradients_last_row(run), MSFP_OK) ? MSFP_E_MEMORY : MSFP_STOPPED;
         return 0;
     }
     if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] - msfp_smallest_step(run->now.t)) {
         run->now.t = fmax(run->now.t, run->jumps[run->next_jump++]);
         run->status = consistent_initial_state(run);
+        if (run->status == MSFP_OK)
+            run->status = MSFP_IF_GRADIENTS(msfp_gradients_jump(run), MSFP_OK);
         run->h = fmin(run->h, 1e-4);
     }
     return run->status == MSFP_OK;
@@ -237,6 +246,9 @@ static int one_step(msfp_run *run)
     if (msfp_is_quasistatic(run))
         h = msfp_limit_step(run, h);
     h = h > 0.999 * left ? left : h > 0.5 * left ? 0.5 * left : h;
+    const double prescribed = MSFP_IF_GRADIENTS(msfp_prescribed_step(run), 0.0);
+    if (prescribed > 0.0)
+        h = prescribed;
     for (int relocations = 0;; ++relocations) {
         const int status = try_step(run, h, &error);
         if (status) {
@@ -245,14 +257,14 @@ static int one_step(msfp_run *run)
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];
             return !shorten_step(run, h, 0.25, status);
         }
-        if (error > 1.0) {
+        if (error > 1.0 && !(prescribed > 0.0)) {
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];
             return !shorten_step(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_control_order(run->options.method))),
                                  MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);
         msfp_event_values(run, &run->next, after);
-        const double share = relocations < 4 ? msfp_first_event(run, before, after) : 1.0;
+        const double share = relocations < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
@@ -281,6 +293,8 @@ int msfp_run_advance(msfp_run *run, long steps)
     for (long i = 0; i < steps && run->status == MSFP_OK; ++i) {
         if (finished(run))
             return 0;
+        if (run->options.row_limit && run->row_count >= run->options.row_limit)
+            break;
         if ((double)(run->counts[MSFP_COUNT_STEPS] + run->counts[MSFP_COUNT_REJECTED_STEPS]) >=
             run->options.max_steps) {
             run->status = MSFP_E_STEPS;
@@ -294,6 +308,7 @@ int msfp_run_advance(msfp_run *run, long steps)
 
 void msfp_run_free(msfp_run *run)
 {
+    MSFP_IF_GRADIENTS(msfp_gradients_free(run), (void)0);
     free(run->rows);
     free(run->events);
     run->rows = NULL;

@@ -61,7 +61,9 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot)
     h.state_size = state_size();
     h.row_count = kept_rows(run, rows);
     h.event_count = rows < 0 ? run->event_count : 0;
+    const size_t rows_before = run->rows_before + (run->row_count - h.row_count);
     memcpy(to, (const char *)run + MSFP_SNAPSHOT_BEGIN, state_size());
+    memcpy(to + (offsetof(msfp_run, rows_before) - MSFP_SNAPSHOT_BEGIN), &rows_before, sizeof rows_before);
     to += state_size();
     if (h.row_count)
         memcpy(to, run->rows + (run->row_count - h.row_count), h.row_count * sizeof(msfp_row));
@@ -74,15 +76,15 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot)
 
 /* ---- what is read ------------------------------------------------------------------------------------------ */
 
-static int finite_numbers(const double *values, size_t count)
+int msfp_all_finite(const double *values, size_t count)
 {
     double sum = 0.0; /* 0 x infinity and 0 x NaN are NaN */
-    for (size_t i = 0; i < count; ++i)
+    for (size_t i = 0; values && i < count; ++i)
         sum += 0.0 * values[i];
     return sum == 0.0;
 }
 
-#define FINITE(field) finite_numbers((const double *)&(field), sizeof(field) / sizeof(double))
+#define FINITE(field) msfp_all_finite((const double *)&(field), sizeof(field) / sizeof(double))
 
 static int in_range(long value, long least, long most) { return value >= least && value <= most; }
 
@@ -94,6 +96,7 @@ static int valid_integers(const msfp_run *run)
     valid = valid && in_range(run->determinant, -1, 1) && in_range(run->work_sign, -1, 1);
     valid = valid && in_range(run->have_unknowns, 0, 1) && in_range(run->restart, 0, 1);
     valid = valid && in_range(run->retry_after_newton, 0, 1) && run->stability_limit_steps >= 0;
+    valid = valid && run->rows_before < SIZE_MAX / 2 && run->rows_taken <= run->rows_before + run->row_count;
     for (int i = 0; i < MSFP_DOF; ++i)
         valid = valid && in_range(run->pivots[i], 0, MSFP_DOF - 1);
     for (int i = 0; i < MSFP_COUNTS; ++i)

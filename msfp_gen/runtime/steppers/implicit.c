@@ -135,6 +135,9 @@ static int stage(msfp_run *run, stages *s, int i, double h)
     if (status)
         return status;
     memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
+#if MSFP_GRADIENTS
+    msfp_gradients_stage(run, i, &s->now);
+#endif
     memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
     memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
     memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);

@@ -87,4 +87,9 @@ double msfp_limit_step(const msfp_run *run, double h);
 /* Prepare quasi-static steps from a state without a step before it. */
 void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
 
+/* ---- gradients ---- */
+
+/* Stage i of the step in progress, solved. */
+void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage);
+
 #endif

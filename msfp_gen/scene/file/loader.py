@@ -44,20 +44,34 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
 
     changes: dotted path of a field, such as `motion.scale` -> value. Raises InputError as `load_scene` does.
     """
+    table, path = scene_table(source)
+    try:
+        return scene_from_table(changed_table(table, changes), None if path is None else path.parent)
+    except InputError as error:
+        if path is None:
+            raise
+        raise InputError(f"{path}: {error}") from None
+
+
+def scene_table(source: str | Path) -> tuple[Table, Path | None]:
+    """The table of a scene file, not validated, and the path of the file; of a preset, which has no file, None.
+
+    Raises InputError as `load_scene` does.
+    """
     known = catalogue.descriptions("scene")
     if str(source) in known:
-        return scene_from_table(_changed(catalogue.scene_table(str(source)), changes))
+        return catalogue.scene_table(str(source)), None
     path = Path(source)
     if not is_file(path):
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
-        return scene_from_table(_changed(toml_file(path), changes), path.parent)
+        return toml_file(path), path
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _changed(table: Table, changes: Mapping[str, Any]) -> Table:
+def changed_table(table: Table, changes: Mapping[str, Any]) -> Table:
     """A copy of a table with the fields at dotted paths set; the schema checks afterwards that they exist."""
     table = deepcopy(table)
     for path, value in changes.items():

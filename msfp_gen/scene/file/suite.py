@@ -52,16 +52,23 @@ def load_suite(path: str | Path, progress: Callable[[float, float], None] | None
     if not is_file(path):
         raise InputError(f"suite = {str(path)!r}: no such file; give the path of a TOML file with [[records]]")
     try:
-        given = schema.validate_suite(toml_file(path))
-        if not given["records"]:
-            raise InputError("records = []: give at least one [[records]]")
-        tables = [_located(table, path.parent, index) for index, table in enumerate(given["records"])]
-        return _suite(tables, given.get("scale_to"), progress)
+        return suite_from_table(toml_file(path), path.parent, progress)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _located(table: Table, folder: Path, index: int) -> Table:
+def suite_from_table(
+    table: Table, folder: Path | None, progress: Callable[[float, float], None] | None = None
+) -> Suite:
+    """The suite of a plain table, as in a suite file. folder: as of `scene_from_table`. Raises InputError."""
+    given = schema.validate_suite(table)
+    if not given["records"]:
+        raise InputError("records = []: give at least one [[records]]")
+    tables = [_located(each, folder, index) for index, each in enumerate(given["records"])]
+    return _suite(tables, given.get("scale_to"), progress)
+
+
+def _located(table: Table, folder: Path | None, index: int) -> Table:
     """The table of a record with absolute paths."""
     if "file" not in table:
         return table

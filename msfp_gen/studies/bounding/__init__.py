@@ -1,14 +1,16 @@
 """Bounding analysis: tables of lambda factors, and runs at lower bound, nominal and upper bound (docs/bounding.md)."""
 
 from msfp_gen.studies.bounding.factors import Factor, FactorTable, factor_tables, factor_text, load_factors
-from msfp_gen.studies.bounding.runs import Bounds, Case, bound, bounded_scenes
+from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_scene, bounded_scenes
 
 __all__ = [
+    "CASES",
     "Bounds",
     "Case",
     "Factor",
     "FactorTable",
     "bound",
+    "bounded_scene",
     "bounded_scenes",
     "factor_tables",
     "factor_text",

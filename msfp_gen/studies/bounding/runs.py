@@ -177,21 +177,23 @@ def _cases(scene: Scene, table: FactorTable, progress: Progress | None) -> list[
 
 def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`."""
+    return {case: bounded_scene(scene, table, case) for case in CASES}
+
+
+def bounded_scene(scene: Scene, table: FactorTable, case: str) -> Scene:
+    """The scene of one case of CASES. Raises InputError as `bound`."""
     lambdas, law = _lambdas(scene.bearing, table), scene.law[1]
     if "friction" in lambdas and law is not None and not proportional(law, scene.bearing):
         raise InputError(
             f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, to which this formula is not "
             "proportional; give a formula of the form mu * (...)"
         )
-    scenes = {}
-    for case in CASES:
-        bearing = scene.bearing
-        for named, factors in lambdas.items():
-            for column in PROPERTIES[named]:
-                bearing = _scaled(bearing, column, factors[case])
-        label = f"{scene.name or 'scene'}, {case}"
-        scenes[case] = scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
-    return scenes
+    bearing = scene.bearing
+    for named, factors in lambdas.items():
+        for column in PROPERTIES[named]:
+            bearing = _scaled(bearing, column, factors[case])
+    label = f"{scene.name or 'scene'}, {case}"
+    return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
 
 
 def _scaled(bearing: Bearing, column: str, factors: tuple[float, ...]) -> Bearing:

@@ -11,7 +11,8 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.simulation.batch import usable_cores
-from msfp_gen.simulation.simulate import check, simulate
+from msfp_gen.simulation.effect_switching import check
+from msfp_gen.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene

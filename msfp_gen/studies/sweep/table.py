@@ -22,7 +22,7 @@ WIDTH = 80  # columns of a terminal
 LONGEST = 16  # characters of a varied value, or of the name of a scene, in a terminal
 
 # Column -> (unit, path in the summary). A path that ends in * gives one column for each surface, bottom first.
-_COLUMNS = {
+COLUMNS = {
     "status": ("", "status"),
     "message": ("", "message"),
     "duration": ("s", "duration"),
@@ -80,27 +80,28 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
     table: dict[tuple[str, str], list[Any]] = {
         ("number", ""): [row.number for row in rows],
         ("scene", ""): [row.source for row in rows],
-        **{(path, ""): [_plain(row.varied.get(path)) for row in rows] for path in varied},
+        **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
     }
-    for name, (unit, path) in _COLUMNS.items():
+    for name, (unit, path) in COLUMNS.items():
         key, each, _ = path.partition(".*")
-        values = [_at(row.summary, key) for row in rows]
+        values = [summary_value(row.summary, key) for row in rows]
         if not each:
-            table[name, unit] = [_plain(value) for value in values]
+            table[name, unit] = [plain_cell(value) for value in values]
             continue
         for index in range(max(map(len, values), default=0)):
             table[f"{name}_{index + 1}", unit] = [v[index] if index < len(v) else None for v in values]
     return {**table, ("file", ""): [row.file for row in rows]}
 
 
-def _at(summary: Mapping[str, Any], path: str) -> Any:
+def summary_value(summary: Mapping[str, Any], path: str) -> Any:
+    """The value of a summary at a dotted path."""
     value: Any = summary
     for part in path.split("."):
         value = value[part]
     return value
 
 
-def _plain(value: Any) -> Any:
+def plain_cell(value: Any) -> Any:
     """A value of a cell: lists of whole numbers separated by spaces (`rims_met`), other lists and tables as JSON."""
     if isinstance(value, list) and all(type(item) is int for item in value):
         return " ".join(map(str, value))

@@ -9,9 +9,9 @@
 #define MSFP_MODEL_H
 
 #include <stddef.h>
+#include "msfp_symbols.h"
+#include "msfp.h"
 
-#define MSFP_SPEC "5_2_2-spatial-locked-inertial-rims-report-velocity"
-#define MSFP_VERSION "0.1.0"
 #define MSFP_N 5            /* bodies, base included */
 #define MSFP_NB 4           /* moving bodies = sliding surfaces */
 #define MSFP_LANES 4        /* MSFP_NB rounded up to full vectors; spare lanes repeat the last surface */
@@ -39,6 +39,7 @@
 #define MSFP_SIGNS { 1, 1, -1, -1 }
 /* Which of the coordinates are unknown: psi, theta, phi (0, 1, 2), then the separation (3, 4, 5). */
 #define MSFP_FREE { 0, 1 }
+#define MSFP_GRADIENTS 0 /* derivatives of a run with respect to parameters */
 
 /* dimensions */
 enum {
@@ -928,6 +929,76 @@ static inline double msfp_rim_coordinates_psi1(const double *block)
 static inline double msfp_rim_coordinates_theta1(const double *block)
 {
     return block[3];
+}
+
+/* rim_wrench */
+enum {
+    MSFP_RIM_WRENCH_FX = 0, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_FY = 1, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_FZ = 2, /* [N] F_c on the body above, along E1, E2, E3 */
+    MSFP_RIM_WRENCH_TX = 3, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_TY = 4, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_TZ = 5, /* [N m] F_c x delta: moment on the slider about its sphere centre, beside that of the rim */
+    MSFP_RIM_WRENCH_SIZE = 6
+};
+static inline void msfp_rim_wrench_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_rim_wrench_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_rim_wrench_T_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_rim_wrench_T_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+
+/* offset */
+enum {
+    MSFP_OFFSET_DX = 0, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_DY = 1, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_DZ = 2, /* [m] separation delta, basis of the body below */
+    MSFP_OFFSET_D1X = 3, /* [m/s] rate of these components */
+    MSFP_OFFSET_D1Y = 4, /* [m/s] rate of these components */
+    MSFP_OFFSET_D1Z = 5, /* [m/s] rate of these components */
+    MSFP_OFFSET_SIZE = 6
+};
+static inline void msfp_offset_d_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_offset_d_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_offset_d1_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_offset_d1_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
 }
 
 /* gap */
@@ -2033,111 +2104,10 @@ enum msfp_top_value {
     MSFP_TOP_VALUES
 };
 
-/* How a run or an evaluation ended. */
-enum msfp_status {
-    MSFP_OK, /* the run reached its end */
-    MSFP_STOPPED, /* the run met the scene's stop condition */
-    MSFP_E_NEWTON, /* Newton's method did not converge at the smallest step; the bearing may have jammed */
-    MSFP_E_STEP, /* the error control asks for a step below the smallest */
-    MSFP_E_IRREGULAR, /* loss of regularity: the determinant changed sign, or a normal force grew without bound */
-    MSFP_E_UPLIFT, /* an interface would have to transmit tension, and the model has no separation */
-    MSFP_E_ANGLE, /* a tilt exceeds 1.5 rad, next to the singularity of the Euler angles */
-    MSFP_E_STEPS, /* the permitted number of steps is used up */
-    MSFP_E_FINITE, /* a value is not finite */
-    MSFP_E_MEMORY, /* no memory for more rows */
-    MSFP_E_GUARD, /* a monitor stopped the run (`strict`) */
-    MSFP_E_PARTED, /* a separated body lies farther from its place than the radius of its slider: the stack has come apart */
-    MSFP_E_STIFF, /* the explicit method runs at its limit of stability, where its error estimate has no meaning */
-    MSFP_E_LAW, /* the friction law gives a coefficient below zero */
-    MSFP_STATUSES
-};
 static inline const char *msfp_status_name(int value)
 {
     static const char *const names[] = { "ok", "stopped", "newton", "step", "irregular", "uplift", "angle", "steps", "finite", "memory", "guard", "parted", "stiff", "law" };
     return value >= 0 && value < MSFP_STATUSES ? names[value] : "unknown";
-}
-
-/* Integrals over a run [J]. */
-enum msfp_integral {
-    MSFP_WORK_INPUT, /* work done on the bearing and its top by the base motion and the loads */
-    MSFP_WORK_FRICTION_STORED, /* recoverable energy stored in friction while stuck */
-    MSFP_WORK_FRICTION_DISSIPATED, /* energy dissipated by friction */
-    MSFP_WORK_CONTACT_DISSIPATED, /* energy dissipated by the damping of sheared contacts */
-    MSFP_WORK_RIM_DISSIPATED, /* energy dissipated at the rims */
-    MSFP_WORK_TOP_DISSIPATED, /* energy dissipated by the dampers of the top */
-    MSFP_WORK_SEAT_DISSIPATED, /* energy dissipated in the unilateral contacts */
-    MSFP_WORKS
-};
-static inline const char *msfp_integral_name(int value)
-{
-    static const char *const names[] = { "input", "friction_stored", "friction_dissipated", "contact_dissipated", "rim_dissipated", "top_dissipated", "seat_dissipated" };
-    return value >= 0 && value < MSFP_WORKS ? names[value] : "unknown";
-}
-
-/* Kinds of events. */
-enum msfp_event_kind {
-    MSFP_EVENT_RIM_CONTACT, /* a slider meets its rim */
-    MSFP_EVENT_RIM_RELEASE, /* a slider leaves its rim */
-    MSFP_EVENT_STOP, /* the stop condition of the scene is met */
-    MSFP_EVENT_LIFT_OFF, /* the faces of a surface separate */
-    MSFP_EVENT_LANDING, /* the faces of a surface meet again */
-    MSFP_EVENT_KINDS
-};
-static inline const char *msfp_event_kind_name(int value)
-{
-    static const char *const names[] = { "rim_contact", "rim_release", "stop", "lift_off", "landing" };
-    return value >= 0 && value < MSFP_EVENT_KINDS ? names[value] : "unknown";
-}
-
-/* Counters of a run. */
-enum msfp_count {
-    MSFP_COUNT_STEPS, /* accepted steps */
-    MSFP_COUNT_REJECTED_STEPS, /* steps that failed or whose error was too large */
-    MSFP_COUNT_NEWTON_ITERATIONS, /* iterations of Newton's method */
-    MSFP_COUNT_EVALUATIONS, /* evaluations of the equations */
-    MSFP_COUNT_FACTORISATIONS, /* factorisations of a tangent */
-    MSFP_COUNT_NEWTON_FAILURES, /* steps in which Newton's method did not converge */
-    MSFP_COUNT_EVENTS, /* recorded events */
-    MSFP_COUNT_HALVED_NEWTON_STEPS, /* halvings of a Newton step that did not reduce the residual */
-    MSFP_COUNT_FRESH_TANGENTS, /* tangents evaluated again because old factors converged slowly */
-    MSFP_COUNT_OTHER_STARTS, /* stages solved again from the rates of the present state */
-    MSFP_COUNT_QUASISTATIC_STARTS, /* stages solved again from rates that balance all forces but inertia */
-    MSFP_COUNTS
-};
-static inline const char *msfp_count_name(int value)
-{
-    static const char *const names[] = { "steps", "rejected_steps", "newton_iterations", "evaluations", "factorisations", "newton_failures", "events", "halved_newton_steps", "fresh_tangents", "other_starts", "quasistatic_starts" };
-    return value >= 0 && value < MSFP_COUNTS ? names[value] : "unknown";
-}
-
-/* Methods of integration. */
-enum msfp_method {
-    MSFP_METHOD_IMPLICIT, /* TR-BDF2 */
-    MSFP_METHOD_DOPRI5, /* Dormand-Prince 5(4), explicit */
-    MSFP_METHOD_ESDIRK4, /* ESDIRK of order 4 */
-    MSFP_METHODS
-};
-static inline const char *msfp_method_name(int value)
-{
-    static const char *const names[] = { "implicit", "dopri5", "esdirk4" };
-    return value >= 0 && value < MSFP_METHODS ? names[value] : "unknown";
-}
-
-/* Monitors of what a model leaves out. */
-enum msfp_monitor {
-    MSFP_MONITOR_RIMS, /* a slider is beyond the capacity of its surface [m] */
-    MSFP_MONITOR_UPLIFT, /* a normal force is below its least value [N] */
-    MSFP_MONITOR_INERTIA, /* inertial force of a slider over the normal force below it */
-    MSFP_MONITOR_HEAT, /* bound of the temperature rise of a surface [K] */
-    MSFP_MONITOR_LAW_SPEED, /* slip velocity outside the range in which the friction law was checked [m/s] */
-    MSFP_MONITOR_LAW_LOAD, /* normal force outside that range [N] */
-    MSFP_MONITOR_LAW_TEMPERATURE, /* temperature outside that range [degC] */
-    MSFP_MONITORS
-};
-static inline const char *msfp_monitor_name(int value)
-{
-    static const char *const names[] = { "rims", "uplift", "inertia", "heat", "law_speed", "law_load", "law_temperature" };
-    return value >= 0 && value < MSFP_MONITORS ? names[value] : "unknown";
 }
 
 /* One row of output: numbers and nothing else, in this order. */

@@ -25,6 +25,7 @@ MODELS = {
     "triple-spatial-velocity": ModelSpec(Layout(5, 2, 2), Effects(friction="velocity")),
 }
 FILES = ("msfp_kernels.h", "msfp_model.h")
+INTERFACE = "msfp.h"  # the same for every model
 SHOWN = 60  # lines of a difference
 
 
@@ -60,3 +61,16 @@ def test_emitted_headers_are_the_golden_ones(name: str, update: bool) -> None:
                 f"{difference(golden.decode(), files[file])}",
                 pytrace=False,
             )
+
+
+def test_a_change_of_the_public_header_raises_its_version(update: bool) -> None:
+    """A program that was compiled with an earlier header must see that the table of functions is another."""
+    path, text = GOLDEN / INTERFACE, generate(MODELS["single-planar"]).files[INTERFACE]
+    if update:
+        path.write_bytes(text.encode())
+        return
+    golden = path.read_text(encoding="utf-8")
+    assert golden == text, (
+        "msfp.h changed: if a compiled program notices, raise ABI_VERSION in generator/interface.py and the Fortran "
+        f"module with it; then run pytest with --update\n{difference(golden, text)}"
+    )

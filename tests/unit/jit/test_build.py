@@ -230,6 +230,7 @@ def test_compiler_that_is_not_there(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     monkeypatch.delenv("CC")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(compiler.sysconfig, "get_config_var", lambda name: "mycc -pthread")
+    monkeypatch.setattr(compiler, "zig_program", lambda: None)
     with pytest.raises(CompileError, match=r"looked for mycc -pthread, cc, gcc, clang\)"):
         compiler.find_compiler()
 

@@ -87,6 +87,7 @@ def test_a_built_model_needs_no_compiler(models: Path, tmp_path: Path, monkeypat
             patch.setenv(name, value)
             if name == "PATH":
                 patch.setattr(compiler.sysconfig, "get_config_var", lambda _: None)
+                patch.setattr(compiler, "zig_program", lambda: None)
             with pytest.raises(CompileError):
                 compiler.find_compiler()
             found = build.prepare(SPEC)

@@ -168,6 +168,14 @@ def test_held_stays_where_the_motion_ended():
         Motion.circle(0.1, 0.1).held(1.0)
 
 
+def test_a_component_that_is_rounding_does_not_move():
+    """The cosine of a right angle is 6e-17; what is left of it at the end is no speed."""
+    t = np.linspace(0.0, 2.0, 201)
+    across = np.outer(np.sin(np.pi * t / 2.0) ** 4, [1e-17, 0.1, 0.0])
+    across[:, 0] += 1e-18 * np.sin(7.0 * t)
+    assert Motion.from_arrays(t, across).held(1.0).duration == 3.0
+
+
 def test_a_record_ends_at_rest_and_is_held_without_a_jump(every):
     assert every["from_record"].held(20.0).jumps.size == 0
     assert every["from_record"].max_step == pytest.approx(0.02)

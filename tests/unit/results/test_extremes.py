@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import scene_of
+from support import preset_run, scene_of
 
 from msfp_gen import Motion, Result, simulate
+from msfp_gen.results.extremes import Extremes
 
 PEAKS = ("peak_displacement", "peak_top_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
 
@@ -44,6 +45,16 @@ def test_extremes_hold_for_the_rows_and_the_file(tmp_path: Path) -> None:
     assert extremes.top_force[3] > 1.02 * np.hypot(*history.top_force[:, :2].T).max()
     again = Result.from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
     assert again.summary == result.summary
+
+
+def test_parted_surfaces_do_not_slide() -> None:
+    history = preset_run("fenz-test2").history
+    lift = np.zeros_like(history.lift)
+    lift[:, 1] = 1e-4
+    lift[100:, 2] = 1e-4
+    speed = Extremes.of_rows(replace(history, lift=lift)).slip_speed
+    whole = np.linalg.norm(history.slip_velocity, axis=2)
+    assert speed.tolist() == pytest.approx([whole[:, 0].max(), 0.0, whole[:100, 2].max(), whole[:, 3].max()])
 
 
 def test_a_turning_point_inside_a_step_counts() -> None:

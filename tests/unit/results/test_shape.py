@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,7 +14,7 @@ from support import bearing_of, preset_run
 
 from msfp_gen.errors import InputError
 from msfp_gen.results.geometry.outline import dish_radius, outline, slider_face, slider_radius
-from msfp_gen.results.geometry.section import Plane, cut
+from msfp_gen.results.geometry.section import Plane, azimuth_of, cut
 from msfp_gen.results.geometry.shape import body_bases, body_positions, poses
 from msfp_gen.results.resample import at_times
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
@@ -40,6 +41,29 @@ def test_stack_stands_where_the_reference_puts_it(layout):
         assert top[body - 1] == pytest.approx(at[f"{body}{body}"] - at["01"], abs=1e-12)
     for surface in range(1, layout[0]):
         assert centre[surface - 1] == pytest.approx(at[f"{surface}c"] - at["01"], abs=1e-12)
+
+
+def test_sphere_centres_of_parted_bodies_are_those_of_the_sliders():
+    """The slider is the body above where a surface is concave up, the one below where it is concave down."""
+    layout = (5, 2, 2)
+    values, state, _, _ = random_case(layout, 1)
+    bearing, rng = bearing_of(values), np.random.default_rng(1)
+    basis = body_bases(np.vstack([state.base.angles, state.q])[None])
+    bottom, top, centre = body_positions(bearing, basis, 1e-2 * rng.normal(size=(1, 4, 3)))
+    for surface, sign in enumerate(bearing.layout.signs):
+        body = surface + 1 if sign > 0 else surface
+        radius = bearing.surfaces[surface].radius
+        face = bottom[0, body] if sign > 0 else top[0, body]
+        assert centre[0, surface] == pytest.approx(face + sign * radius * basis[0, body, 2], abs=1e-12)
+
+
+@pytest.mark.parametrize(("u", "azimuth"), [((0, 0.1), 90), ((-0.1, 0), 0), ((0.1, -0.1), -45), ((0, 0), 0)])
+def test_the_section_lies_along_the_largest_displacement(u, azimuth):
+    run = preset_run("fenz-test5")
+    moved = np.zeros_like(run.history.displacement)
+    moved[7, :2] = u
+    still = replace(run, history=replace(run.history, displacement=moved))
+    assert azimuth_of(still) == pytest.approx(np.radians(azimuth), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -115,6 +139,8 @@ def test_outline_has_the_height_and_the_spheres_of_its_data(layout):
         assert (shape[:, 0] >= 0).all()
     for surface, sign in enumerate(bearing.layout.signs):
         face, radius = slider_face(bearing, surface), bearing.surfaces[surface].radius
+        near = outline(bearing, bearing.slider(surface))[:, None] - face
+        assert np.linalg.norm(near, axis=-1).min(axis=0) == pytest.approx(np.zeros(len(face)), abs=1e-12)
         middle = (0 if sign > 0 else bearing.arrays()["height"][bearing.slider(surface)]) + sign * radius
         assert np.hypot(face[:, 0], face[:, 1] - middle) == pytest.approx(np.full(len(face), radius), rel=1e-9)
 

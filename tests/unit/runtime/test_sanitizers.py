@@ -5,23 +5,20 @@ from __future__ import annotations
 import shutil
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, failure_of
+from support import failure_of
+from support.replay import REPLAY, inputs
 from support.stacks import a_body, a_surface
 
-from msfp_gen import Bearing, Effects, Layout, Motion, Scene, Solver, Top, build_model, simulate
+from msfp_gen import Bearing, Effects, Layout, Motion, Scene, Solver, Top, simulate
 from msfp_gen.generator import generate
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, find_compiler
-from msfp_gen.model.model import Model
 from msfp_gen.result import Result
-from msfp_gen.simulation.segment import start_run
 
-REPLAY = ROOT / "tests" / "support" / "c" / "replay.c"
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g", "-O1")
 PROGRAM = "int main(void) { return 0; }\n"
 Values = dict[str, Any]
@@ -74,30 +71,6 @@ QUICK = ("planar",)  # the others cost half a minute of compiling each
 TESTED = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
 
 
-def inputs(scene: Scene) -> str:
-    """Everything that `simulate` would hand to the compiled run, as numbers in a row."""
-    model = build_model(scene.bearing.layout, scene.effects)
-    seen: list[Any] = []
-
-    def stack(*values: Any) -> None:
-        seen.extend(values)
-
-    def run(_: None, *arrays: Any, **options: Any) -> None:
-        motion_knots, motion, load_knots, load, jumps, q, v, f = arrays
-        seen.extend([len(motion), motion_knots, motion, len(load), load_knots, load, len(jumps), jumps, q, v, f])
-        names = ("rtol", "atol_angle", "max_steps", "duration", "output_step", "sampled")
-        seen.extend([model.extension.METHODS[options["method"]], *(options[name] for name in names)])
-        seen.extend([len(options["stops"]), options["stops"]])
-        seen.extend([len(options["span_ends"]), options["span_ends"], options["span_steps"]])
-
-    fake: Any = SimpleNamespace(Stack=stack, Run=run)
-    start_run(scene, Model(model.spec, fake, model.info), scene.effect_selection, scene.end, None, ())
-    words = [np.atleast_1d(np.asarray(value)).ravel() for value in seen]
-    return "\n".join(
-        " ".join(repr(x.item()) for x in row.astype(row.dtype if row.dtype != bool else int)) for row in words
-    )
-
-
 def compiled(scene: Scene, folder: Path, flags: tuple[str, ...]) -> Path:
     """The program of one scene's model."""
     sources = runtime_sources() | generate(scene.spec).files
@@ -105,7 +78,8 @@ def compiled(scene: Scene, folder: Path, flags: tuple[str, ...]) -> Path:
         (folder / name).write_text(content, encoding="utf-8")
     shutil.copy(REPLAY, folder)
     units = sorted(path.name for path in folder.glob("*.c"))
-    command = [*find_compiler().command, "-std=c99", *flags, *units, "-o", "program", *FLAGS["libraries"]]
+    name = f"-DMODEL=msfp_{scene.bearing.layout.name}"
+    command = [*find_compiler().command, "-std=c99", name, *flags, *units, "-o", "program", *FLAGS["libraries"]]
     built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
     return folder / "program"

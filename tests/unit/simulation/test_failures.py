@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from support import failure_of, hearing, scene_of
 
-from msfp_gen import Effects, Motion, RunError, Scene, Top, build_model, presets
+from msfp_gen import Effects, Motion, RunError, Scene, Top, build_model, presets, simulate
 from msfp_gen.result import Result
 from msfp_gen.scene.parts import InitialState
 
@@ -47,6 +47,22 @@ def test_uplift_under_a_falling_base_names_surface_and_force() -> None:
     result = partial(failure_of(scene), "uplift")
     assert re.search(r", surface [1-4], P\.t3 \[N\] = \S+: .*uplift", result.message), result.message
     assert len(result.history.time) > 2 and result.history.normal_force.min() > 0
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-4])
+def test_massless_sliders_without_a_unique_motion_name_the_remedy(damping: float) -> None:
+    """With the law of pressure, velocity and temperature: contact damping is one remedy, inertia the one for all."""
+    bearing = presets.bearing("fenz-tfp").replace(reference_pressure=15e6, contact_damping=damping)
+    top = Top.rig(LOAD, 1e8, 5.0, 1e6, 5.0)
+    effects = Effects(dimension="planar", friction="pvt", bouc_wen="plastic", sliders="massless")
+    scene = Scene(bearing, Motion.harmonic(0.05, 0.5, cycles=1), top, effects, duration=0.5)
+    if damping:
+        assert simulate(scene).succeeded
+        return
+    error = failure_of(scene)
+    result = partial(error, error.status)
+    assert "sliders are massless" in result.message and "give effects.sliders = 'inertial'" in result.message
+    assert simulate(replace(scene, effects=replace(effects, sliders="inertial"))).succeeded
 
 
 @pytest.mark.parametrize("top", [Top.rig(0.0, 1e8), Top.prescribed((0.0, 0.0, 5e3))], ids=["lifted off", "pulled up"])

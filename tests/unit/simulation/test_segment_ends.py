@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from support.stacks import holds
 from msfp_gen import Auto, Effects, Load, Motion, RunError, Scene, Solver, Top, load_scene, presets, simulate
 from msfp_gen.result import Result
 from msfp_gen.results.history import History
-from msfp_gen.results.row_unpacking import joined
+from msfp_gen.results.joining import joined
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.simulate import RunSequence
@@ -90,6 +91,27 @@ def test_a_segment_without_a_step_changes_nothing() -> None:
     np.testing.assert_array_equal(whole.top_force, history.top_force)
     for name, values in history.energy.items():
         np.testing.assert_allclose(whole.energy[name], values, rtol=1e-12, atol=1e-9)
+
+
+def test_the_first_row_is_of_the_model_that_goes_on() -> None:
+    """A lateral load from the start: there massless sliders are out of balance, and the run goes on with their mass."""
+    scene = replace(load_scene("fenz-test2"), effects=AUTO, duration=0.1, load=Load.constant((2e3, 0.0, 0.0)))
+    sequence, result = ended(with_effects(scene, **WRONG))
+    light, heavy = sequence.segments
+    assert (light.model.effects.sliders, heavy.model.effects.sliders) == ("massless", "inertial")
+    assert light.run.counts["steps"] == 0 and light.run.row_count == 1
+    alone = simulate(replace(scene, effects=heavy.model.effects))
+    np.testing.assert_array_equal(result.history.contact_angles, alone.history.contact_angles)
+    out_of_balance = light.model.unpack(light.run.rows)["angles"][0]
+    assert np.abs(out_of_balance - alone.history.contact_angles[0]).max() > 1e-3
+    np.testing.assert_array_equal(result.extremes.most_normal, alone.extremes.most_normal)
+
+
+def test_the_times_of_a_run_are_no_longer_than_it_took() -> None:
+    begin = time.perf_counter()
+    result = simulate(replace(load_scene("fenz-test2"), duration=5.0))
+    took = time.perf_counter() - begin
+    assert 0.0 < result.counters.wall_time < took and 0.0 <= float(result.provenance["build_seconds"]) < took
 
 
 def rows_of(history: History, rows: slice) -> History:

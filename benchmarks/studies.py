@@ -1,0 +1,261 @@
+"""Proof that studies hold what docs/studies.md says: `python benchmarks/studies.py [PROOF ...] [--runs 100000]`.
+
+Proofs: kills, shards, dask, cores, overhead, fragility; all of them unless some are named. Each prints one row of the
+table in docs/studies.md. `kills` also measures the memory of an uninterrupted run. Ten minutes on two idle cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pandas as pd
+
+import msfp_gen
+from msfp_gen import simulate
+from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.simulation.batch import usable_cores
+from msfp_gen.studies import fragility, load_study, read_study
+
+KILLS = 5
+PLANAR = {  # about 2 ms a run
+    "bearing": "fenz-tfp",
+    "motion": {"kind": "harmonic", "amplitude": 0.025, "frequency": 0.5, "cycles": 1.0},
+    "top": {"kind": "rig", "axial_load": 112e3, "stiffness": 1e8, "rotational_stiffness": 1e6},
+    "effects": {"dimension": "planar", "sliders": "massless", "rims": False, "bouc_wen": "plastic"},
+    "solver": {"rtol": 1e-2},
+}
+KEEP = ["peak_displacement", "peak_top_force", "peak_sliding"]
+
+
+def planar(runs: int, seed: int = 1, **changes: Any) -> dict[str, Any]:
+    """A study of short planar runs without masses."""
+    axes = {
+        "friction": {"multiplies": "bearing.friction", "distribution": "lognormal", "median": 1.0, "dispersion": 0.2},
+        "load": {"sets": "top.axial_load", "distribution": "uniform", "low": 90e3, "high": 130e3},
+    }
+    sampling = {"samples": runs, "seed": seed, "method": "random"}
+    return {"name": "proof", "scene": PLANAR, "axes": axes, "sampling": sampling, "keep": KEEP, **changes}
+
+
+def ten_ms(runs: int, **changes: Any) -> dict[str, Any]:
+    """A study of spatial runs of about 10 ms."""
+    axes = {"friction": {"multiplies": "bearing.friction", "distribution": "uniform", "low": 0.8, "high": 1.2}}
+    sampling = {"samples": runs, "seed": 1}
+    return {"name": "proof", "scene": "fenz-test4", "axes": axes, "sampling": sampling, "keep": KEEP, **changes}
+
+
+@dataclass
+class Memory:
+    """Resident memory of a process and its children [MB], by the share of the study that was done."""
+
+    samples: list[tuple[float, float]] = field(default_factory=list)
+
+    def add(self, share: float, pid: int) -> None:
+        """Add what the processes have now."""
+        total = sum(_resident(each) for each in (pid, *_children(pid)))
+        self.samples.append((share, total))
+
+    def between(self, low: float, high: float) -> float:
+        """The largest value between two shares."""
+        return max(total for share, total in self.samples if low <= share <= high)
+
+
+def _resident(pid: int) -> float:
+    try:
+        text = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    except OSError:
+        return 0.0
+    return next((int(line.split()[1]) / 1024 for line in text.splitlines() if line.startswith("VmRSS")), 0.0)
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()]
+    except OSError:
+        return []
+
+
+def hash_of(folder: Path) -> str:
+    """Digest of all rows of a study, sorted by run."""
+    rows = read_study(folder)
+    return sha256(pd.util.hash_pandas_object(rows, index=False).to_numpy().tobytes()).hexdigest()[:16]
+
+
+def parts(folder: Path) -> int:
+    """The number of parts that are written."""
+    return sum(1 for _ in folder.glob("part-*.parquet"))
+
+
+def start(file: Path, folder: Path, *options: str) -> subprocess.Popen[bytes]:
+    """The command that runs a study."""
+    command = [sys.executable, "-m", "msfp_gen", "study", str(file), "-o", str(folder), *options]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def kills(folder: Path, runs: int) -> Iterator[str]:
+    """A study that is killed five times at random moments against one that is not, and the memory of the latter."""
+    file, whole, killed = folder / "study.toml", folder / "whole", folder / "killed"
+    file.write_text(dumps(planar(runs)), encoding="utf-8")
+    total, memory = load_study(file).chunks, Memory()
+    process = start(file, whole)
+    while process.poll() is None:
+        memory.add(parts(whole) / total, process.pid)
+        time.sleep(0.5)
+    rng = random.Random(1)
+    for index, share in enumerate(sorted(rng.uniform(0.02, 0.9) for _ in range(KILLS))):
+        process = start(file, killed)
+        while parts(killed) < share * total and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0.0, 0.2))
+        victim = process.pid if index % 2 == 0 else _children(process.pid)[-1]  # the study, or one of its workers
+        os.kill(victim, signal.SIGKILL)
+        process.wait()
+    done = parts(killed)
+    assert start(file, killed).wait() == 0
+    same = hash_of(whole) == hash_of(killed)
+    yield (
+        f"{runs} runs, {KILLS} `kill -9` of the study or a worker at random moments (the last with {done} of {total} "
+        f"parts) | tables equal: {same}"
+    )
+    early, late = memory.between(0.05, 0.25), memory.between(0.75, 1.0)
+    yield f"resident memory of all processes in the last quarter of {runs} runs over that in the first | {late / early:.2f}"
+
+
+def shards(folder: Path, runs: int) -> Iterator[str]:
+    """Two shards at the same time against one run."""
+    file, whole, halves = folder / "study.toml", folder / "whole", folder / "halves"
+    file.write_text(dumps(planar(runs // 10)), encoding="utf-8")
+    assert start(file, whole).wait() == 0
+    both = [start(file, halves, "--shard", f"{i}/2", "--workers", "1") for i in (1, 2)]
+    assert [process.wait() for process in both] == [0, 0]
+    yield f"{runs // 10} runs in two shards at the same time | tables equal: {hash_of(whole) == hash_of(halves)}"
+
+
+def dask(folder: Path, runs: int) -> Iterator[str]:
+    """A Dask cluster of which a worker is killed against a local run."""
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        yield f"{runs // 10} runs on Dask, one worker killed | not run: distributed is not installed"
+        return
+    from threading import Thread
+
+    table, whole, cluster_folder = planar(runs // 10, chunk=64), folder / "whole", folder / "dask"
+    msfp_gen.study(table, whole)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        victim = next(iter(cluster.workers.values())).pid
+
+        def kill() -> None:
+            while parts(cluster_folder) < 20:
+                time.sleep(0.005)
+            os.kill(victim, signal.SIGKILL)
+
+        Thread(target=kill, daemon=True).start()
+        msfp_gen.study(table, cluster_folder, dask=cluster.scheduler_address)
+    yield f"{runs // 10} runs on Dask, one worker killed | tables equal: {hash_of(whole) == hash_of(cluster_folder)}"
+
+
+def rate(folder: Path) -> float:
+    """Runs per second from the first part to the last: without the start of the processes."""
+    times = sorted((path.stat().st_mtime, path) for path in folder.glob("part-*.parquet"))
+    counted = sum(len(pd.read_parquet(path, columns=["run"])) for _, path in times[1:])
+    return counted / (times[-1][0] - times[0][0])
+
+
+def cores(folder: Path, _: int) -> Iterator[str]:
+    """Runs per second on all cores over those on one, best of three rounds in turns."""
+    count = usable_cores()
+    file = folder / "study.toml"
+    file.write_text(dumps(ten_ms(1024, chunk=8)), encoding="utf-8")
+    found: dict[int, list[float]] = {1: [], count: []}
+    for number in range(3):
+        for workers, rates in found.items():
+            out = folder / f"{workers}-{number}"
+            assert start(file, out, "--workers", str(workers)).wait() == 0
+            rates.append(rate(out))
+    ratio = max(found[count]) / max(found[1]) / count
+    yield f"runs per second on {count} cores over {count} times those on one, 10 ms a run | {ratio:.2f}"
+
+
+def overhead(folder: Path, _: int) -> Iterator[str]:
+    """CPU time of a study on one worker over that of a loop of `simulate` with its scenes, best of rounds in turns."""
+    study = load_study(ten_ms(256, chunk=32))
+    scenes = [study.scene(run) for run in range(1, study.runs + 1)]
+
+    def loop() -> None:
+        for scene in scenes:
+            simulate(scene)
+
+    loops, studies = [], []
+    for number in range(5):
+        loops.append(_seconds(loop))
+        studies.append(_seconds(lambda: msfp_gen.study(study, folder / str(number), threads=True, workers=1)))  # noqa: B023
+    share = min(studies) / min(loops) - 1
+    each = 1e3 * min(loops) / len(scenes)
+    yield f"CPU time of a study on one worker beyond that of a loop of `simulate`, {each:.0f} ms a run | {100 * share:.1f} %"
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    """CPU time of a call, all threads together: other programs on the machine count little."""
+    begin = time.process_time()
+    work()
+    return time.process_time() - begin
+
+
+def fragilities(folder: Path, _: int) -> Iterator[str]:
+    """Demand over a lognormal capacity of median 1.2 and dispersion 0.4: how often the 95 % intervals hold these."""
+    axes = {
+        "capacity": {"distribution": "lognormal", "median": 1.2, "dispersion": 0.4},
+        "scale": {"distribution": "uniform", "low": 0.3, "high": 3.0},
+    }
+    held = {"median": 0, "dispersion": 0}
+    seeds = 20
+    for seed in range(seeds):
+        sampling = {"samples": 300, "seed": seed, "method": "random"}
+        table = planar(300, axes=axes, sampling=sampling, quantities={"ratio": "scale / capacity"})
+        msfp_gen.study(table, folder / str(seed), threads=True, workers=1)
+        state = fragility(read_study(folder / str(seed)), "scale", "ratio", [1.0]).states[0]
+        held["median"] += state.median_interval[0] <= 1.2 <= state.median_interval[1]
+        held["dispersion"] += state.dispersion_interval[0] <= 0.4 <= state.dispersion_interval[1]
+    yield f"{seeds} studies of 300 runs with a known fragility: 95 % intervals that hold it | {json.dumps(held)}"
+
+
+PROOFS: dict[str, Callable[[Path, int], Iterator[str]]] = {
+    "kills": kills,
+    "shards": shards,
+    "dask": dask,
+    "cores": cores,
+    "overhead": overhead,
+    "fragility": fragilities,
+}
+
+
+def main() -> None:
+    """Print the rows of the chosen proofs."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("proofs", nargs="*", metavar="PROOF", help=", ".join(PROOFS))
+    parser.add_argument("--runs", type=int, default=100_000, help="runs of `kills`; a tenth of them elsewhere")
+    given = parser.parse_args()
+    if unknown := [name for name in given.proofs if name not in PROOFS]:
+        parser.error(f"{unknown[0]!r} is no proof; they are {', '.join(PROOFS)}")
+    for name in given.proofs or PROOFS:
+        with TemporaryDirectory() as folder:
+            for row in PROOFS[name](Path(folder), given.runs):
+                print(f"| {row} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

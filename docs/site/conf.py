@@ -1,0 +1,94 @@
+"""Sphinx configuration of the documentation site; `make_site.py` puts its sources together and runs it."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from docutils import nodes
+from latex2mathml.converter import convert
+from pygments.lexers.special import TextLexer
+from sphinx.application import Sphinx
+from sphinx.highlighting import lexers
+
+from msfp_gen.version import __version__
+
+project = "msfp-gen"
+author = "The msfp-gen developers"
+copyright = author
+version = release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+if os.environ.get("MSFP_GEN_SITE_GALLERY") == "1":  # the gallery runs every example
+    extensions.append("sphinx_gallery.gen_gallery")
+root_doc = "index"
+exclude_patterns = [
+    "**/GALLERY_HEADER.rst",
+    "gallery_scripts/**",
+    "**/sg_execution_times.rst",
+    "sg_execution_times.rst",
+]
+html_theme = "pydata_sphinx_theme"
+html_title = f"msfp-gen {release}"
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options: dict[str, Any] = {
+    "navigation_with_keys": False,
+    "show_nav_level": 1,
+    "show_prev_next": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "header_links_before_dropdown": 12,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "icon_links": [],
+}
+
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_heading_anchors = 4
+lexers["mermaid"] = TextLexer()  # diagrams are shown as their source: drawing them needs a script from the network
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_format = "short"
+autodoc_class_signature = "mixed"
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+python_use_unqualified_type_names = True
+default_role = "code"
+nitpicky = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery_scripts",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"plot_",
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+    "abort_on_example_error": True,
+    "within_subsection_order": "FileNameSortKey",
+    "capture_repr": ("_repr_html_", "__repr__"),
+    "image_scrapers": ("matplotlib",),
+}
+
+
+def _inline(writer: Any, node: nodes.math) -> None:
+    writer.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def _block(writer: Any, node: nodes.math_block) -> None:
+    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>\n')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Formulas become MathML, which browsers draw without a script."""
+    app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+
+
+html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]

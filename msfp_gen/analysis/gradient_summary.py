@@ -1,0 +1,88 @@
+"""Derivatives of the scalars of the summary of a run with respect to parameters of its scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.analysis.summary import axial_load
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.results.gradient_dataset import gradients_of
+from msfp_gen.results.history import LABELS
+from msfp_gen.results.peaks import gradients_of_extremes
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+    from msfp_gen.scene.parameters import Parameter
+
+WITHOUT = {
+    "rims_met": "it is a list of surfaces, which jumps where another rim is met",
+    "transitions": "they are read from rows",
+    "counters": "they count the work of the solver",
+    "energy": "its terms are integrals and ratios; result.gradient has the energies of the state",
+}
+"""Keys of the summary that have no derivative, with the reason."""
+
+
+class SummaryGradient(dict[str, Any]):
+    """Derivatives of the summary with respect to one parameter; a key without derivative raises InputError."""
+
+    def __missing__(self, key: str) -> Any:
+        reason = WITHOUT.get(key, "it is no number that depends on a parameter")
+        raise InputError(f"gradient_summary: {key!r} has no derivative: {reason}; give one of {', '.join(self)}")
+
+
+def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
+    """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
+
+    Keys: peak_displacement, peak_top_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
+    maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary. Raises
+    InputError where the run computed no derivatives, and for a key whose value jumps (`WITHOUT`).
+    """
+    gradients = gradients_of(result)
+    recorded = result.recorded_extremes
+    assert recorded is not None  # a run that computed derivatives has recorded its extremes
+    slopes = gradients_of_extremes(gradients, result.history, recorded)
+    return {
+        parameter.path: _summary(result, parameter, {name: values[i] for name, values in slopes.items()})
+        for i, parameter in enumerate(gradients.parameters)
+    }
+
+
+def _summary(result: RunData, parameter: Parameter, slopes: dict[str, Array]) -> SummaryGradient:
+    names = (*LABELS["axis"], "radial")
+    force = slopes["top_force"]
+    found = SummaryGradient(
+        peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
+        peak_top_force=dict(zip(names, force.tolist(), strict=True)),
+        peak_force_ratio=_ratio_slope(result, parameter, float(force[3])),
+        peak_sliding=slopes["sliding"].tolist(),
+        minimum_gap=slopes["gap"].tolist(),
+        minimum_normal_force=slopes["least_normal"].tolist(),
+        maximum_normal_force=slopes["most_normal"].tolist(),
+    )
+    for name in ("least_friction", "most_friction"):
+        if name in slopes:
+            found[name] = slopes[name].tolist()
+    return found
+
+
+def _ratio_slope(result: RunData, parameter: Parameter, slope: float) -> float | None:
+    """Derivative of peak radial force over axial load; None without a constant load."""
+    load = axial_load(result)
+    if not load:
+        return None
+    peak = float(result.extremes.top_force[3])
+    return slope / load - peak * _load_slope(result, parameter) / load**2
+
+
+def _load_slope(result: RunData, parameter: Parameter) -> float:
+    """Derivative of `axial_load` with respect to a parameter."""
+    scene, name = result.scene, parameter.path
+    gravity, mass = scene.bearing.gravity, float(getattr(scene.top, "mass", 0.0)) if scene.top.kind == "mass" else 0.0
+    slopes = {"top.axial_load": 1.0, "top.force[2]": -1.0, "top.mass": gravity, "bearing.gravity": mass}
+    if name == "load.scale" and scene.load is not None:
+        return -float(np.asarray(scene.load.coefficients)[0, 2, 0])
+    return slopes.get(name, 0.0)

@@ -1,0 +1,192 @@
+// The page: controls, requests to the worker, and what is drawn of the answer.
+"use strict";
+
+const explorer = JSON.parse(document.getElementById("explorer-data").textContent);
+const find = (id) => document.getElementById(id);
+const RANGE = { friction: [0, 2.5], radius: [0.6, 1.6], load: [0.1, 3], amplitude: [0.02, 1.5], rate: [0.2, 5] };
+const MOST_POINTS = 3000; // of a line in a chart
+const state = { index: 0, settings: null, sent: 0, shown: 0, busy: false, waiting: false, last: null, row: null };
+
+const problemAt = (index) => explorer.problems[index];
+const nominalOf = (problem, name) => problem.surfaces.map((row) => row[problem.values.indexOf(name)]);
+
+function nominalSettings(problem) {
+  return { friction: nominalOf(problem, "friction"), radius: nominalOf(problem, "radius"), load: 1, amplitude: 1, rate: 1, angle: 0 };
+}
+
+// One slider; `read` and `write` get and set the value in the settings, `text` shows it.
+function addSlider(parent, { name, low, high, value, text, write }) {
+  const label = element(parent, "label", { class: "control" });
+  element(label, "span", {}, name);
+  const input = element(label, "input", { type: "range", min: low, max: high, step: "any", value, "data-name": name });
+  const shown = element(label, "output", {}, text(value));
+  input.value = value;
+  input.addEventListener("input", () => {
+    write(Number(input.value));
+    shown.textContent = text(Number(input.value));
+    request();
+  });
+}
+
+function addControls() {
+  const problem = problemAt(state.index);
+  const { settings } = state;
+  const panel = find("controls");
+  panel.replaceChildren();
+  const ranged = (value, [low, high]) => ({ low: low * value, high: high * value, value });
+  settings.friction.forEach((value, k) => addSlider(panel, {
+    name: `friction of surface ${k + 1}`, ...ranged(value || 0.05, RANGE.friction), value,
+    text: (v) => `${fixed(100 * v, 2)} %`, write: (v) => { settings.friction[k] = v; },
+  }));
+  settings.radius.forEach((value, k) => addSlider(panel, {
+    name: `radius of surface ${k + 1}`, ...ranged(value, RANGE.radius),
+    text: (v) => `${fixed(1000 * v, 0)} mm`, write: (v) => { settings.radius[k] = v; },
+  }));
+  if (problem.axialLoad !== null) addSlider(panel, {
+    name: "axial load", ...ranged(1, RANGE.load), text: (v) => `${fixed((v * problem.axialLoad) / 1000, 0)} kN`,
+    write: (v) => { settings.load = v; },
+  });
+  addSlider(panel, {
+    name: problem.record ? "scale of the record" : "amplitude", ...ranged(1, RANGE.amplitude),
+    text: (v) => (problem.record ? `${fixed(v, 2)} ×` : `${fixed(1000 * v * problem.amplitude, 1)} mm`),
+    write: (v) => { settings.amplitude = v; },
+  });
+  if (!problem.record) addSlider(panel, {
+    name: problem.period ? "frequency" : "speed", ...ranged(1, RANGE.rate),
+    text: (v) => (problem.period ? `${fixed(v / problem.period, 4)} Hz` : `${fixed(v, 2)} ×`),
+    write: (v) => { settings.rate = v; },
+  });
+  if (!problem.planar) addSlider(panel, {
+    name: "direction", low: -90, high: 90, value: 0, text: (v) => `${fixed(v, 0)}°`,
+    write: (v) => { settings.angle = (v * Math.PI) / 180; },
+  });
+}
+
+// At most one run at a time: while one is under way, the latest settings wait.
+function request() {
+  if (state.busy) {
+    state.waiting = true;
+    return;
+  }
+  state.busy = true;
+  state.sent += 1;
+  worker.postMessage({ request: performance.now(), index: state.index, settings: state.settings });
+}
+
+function answered({ data }) {
+  if (data.ready) {
+    choose(0);
+    return;
+  }
+  state.busy = false;
+  if (data.index === state.index) {
+    if (data.failure) fail(data.failure);
+    else show(data);
+  }
+  if (state.waiting) {
+    state.waiting = false;
+    request();
+  }
+}
+
+function fail(text) {
+  find("status").textContent = `failed: ${text}`;
+  find("status").className = "status failed";
+}
+
+function choose(index) {
+  state.index = index;
+  state.settings = nominalSettings(problemAt(index));
+  state.row = null;
+  addControls();
+  request();
+}
+
+const cell = (row, name, text) => element(row, name, name === "th" ? { scope: "row" } : {}, text);
+
+function table(parent, rows) {
+  parent.replaceChildren();
+  for (const [name, text] of rows) {
+    const row = element(parent, "tr");
+    cell(row, "th", name);
+    cell(row, "td", text);
+  }
+}
+
+const stride = (count) => Math.max(1, Math.ceil(count / MOST_POINTS));
+const thinned = (values) => values.filter((_, i) => i % stride(values.length) === 0);
+
+// Shows the instant of a point of a chart.
+function goTo(point) {
+  state.row = point * stride(state.last.numbers.at.count);
+  find("row").value = state.row;
+  section();
+}
+
+function show({ found, settings, request: begun, cost }) {
+  const problem = problemAt(state.index);
+  const numbers = numbersOf(problem, found, settings.angle);
+  const ok = ["ok", "stopped"].includes(found.status);
+  find("status").textContent = ok ? "" : `the run ended at ${fixed(found.reached, 3)} s: ${found.status}`;
+  find("status").className = ok ? "status" : "status failed";
+  const kilo = numbers.force.map((v) => v / 1000);
+  const milli = numbers.path.map((v) => v * 1000);
+  const blue = problem.colours[0];
+  find("loop").replaceChildren();
+  const markers = [addChart(find("loop"), {
+    title: "Hysteresis loop", xlabel: "displacement u = base − top [mm]", ylabel: "force on the top support [kN]",
+    lines: [{ x: thinned(milli), y: thinned(kilo), colour: blue }],
+  }, goTo)];
+  find("orbit").replaceChildren();
+  if (!problem.planar) markers.push(addChart(find("orbit"), {
+    title: "Orbit in plan", xlabel: "u₁ [mm]", ylabel: "u₂ [mm]", equal: true,
+    lines: [{ x: thinned(numbers.u.map((v) => v[0] * 1000)), y: thinned(numbers.u.map((v) => v[1] * 1000)), colour: blue }],
+  }, goTo));
+  const { cycle } = numbers;
+  const weight = problem.axialLoad === null ? null : problem.axialLoad * settings.load;
+  table(find("numbers"), [
+    ["largest displacement", `${fixed(1000 * numbers.peakDisplacement[3], 2)} mm`],
+    ["largest horizontal force", `${fixed(numbers.peakForce[3] / 1000, 3)} kN`],
+    ...(weight === null ? [] : [["over the axial load", fixed(numbers.peakForce[3] / weight, 4)]]),
+    ["effective stiffness, last cycle", cycle ? `${fixed(cycle.stiffness / 1e6, 4)} kN/mm` : (problem.record ? "not defined for a record" : "no closed cycle")],
+    ["effective damping, last cycle", cycle && cycle.damping !== null ? `${fixed(100 * cycle.damping, 2)} %` : "–"],
+    ["energy dissipated in it", cycle ? `${fixed(cycle.energy / 1000, 4)} kJ` : "–"],
+    ["least normal force", `${fixed(Math.min(...numbers.leastNormal) / 1000, 2)} kN`],
+  ]);
+  table(find("surfaces"), numbers.sliding.map((slid, k) => {
+    const capacity = problem.surfaces[k][problem.values.indexOf("capacity")];
+    const rim = numbers.gap[k] <= 0 ? ", rim met" : "";
+    return [`surface ${k + 1}`, `${fixed(1000 * slid, 2)} mm, ${fixed((100 * slid) / capacity, 0)} % of capacity${rim}`];
+  }));
+  table(find("regimes"), regimes(problem, numbers).slice(0, 12).map(({ set, from }) => [`from ${fixed(1000 * from, 1)} mm`, set]));
+  state.last = { problem, found, settings, numbers, markers };
+  find("row").max = numbers.at.count - 1;
+  find("row").value = state.row ?? numbers.peak;
+  section();
+  state.shown += 1;
+  state.times = { run: cost, redraw: performance.now() - begun };
+  find("cost").textContent = `${fixed(cost, 0)} ms run, ${fixed(state.times.redraw, 0)} ms in all`;
+}
+
+function section() {
+  const { problem, settings, numbers, markers } = state.last;
+  const row = Math.min(Number(find("row").value), numbers.at.count - 1);
+  for (const mark of markers) mark(Math.floor(row / stride(numbers.at.count)));
+  drawStack(find("section"), problem, numbers, settings.radius, settings.angle, row);
+  find("instant").textContent = `t = ${fixed(numbers.at.read("time", row)[0], 3)} s, u = ${fixed(1000 * numbers.path[row], 2)} mm`;
+}
+
+const worker = new Worker(URL.createObjectURL(new Blob([find("worker").textContent], { type: "text/javascript" })));
+worker.onmessage = answered;
+worker.onerror = (event) => fail(event.message);
+explorer.problems.forEach(({ title }, index) => element(find("preset"), "option", { value: index }, title));
+find("preset").addEventListener("change", () => choose(Number(find("preset").value)));
+find("reset").addEventListener("click", () => choose(state.index));
+find("row").addEventListener("input", () => {
+  state.row = Number(find("row").value);
+  section();
+});
+worker.postMessage({
+  problems: explorer.problems,
+  modules: explorer.modules.map((text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0))),
+});

@@ -1,0 +1,117 @@
+"""The page of the explorer: template, scripts, modules and problems in one file that loads no other."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msfp_gen.common.output import check_output, write_bytes
+from msfp_gen.explorer.module import wasm_module
+from msfp_gen.explorer.problem import Problem, problem_of
+from msfp_gen.version import __version__
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+
+Progress = Callable[[float, float], None]
+SUFFIXES = (".html", ".htm")
+# Presets of a page without a scene of the user's: laboratory tests, orbits, other devices, and a bundled record.
+EXPLORED = (
+    "fenz-test2", "fenz-test5", "becker-circle-88", "becker-eight-88", "unusual-tfp", "double-push", "ridgecrest-clc",
+)  # fmt: skip
+RECORD = 15.0  # of a record [s]: the strong part of the bundled one
+SHARED = ("dom.js", "chart.js")  # scripts of the HTML report
+WORKER = ("solver.js", "worker.js")
+SCRIPTS = ("numbers.js", "stack.js", "explorer.js")
+
+
+def write_explorer(path: str | Path, scene: Scene | None = None, progress: Progress | None = None) -> Path:
+    """Write the explorer to `path`; the file appears only when complete. Arguments and errors as of `explorer_html`.
+
+    Raises InputError for a path that does not end in .html or cannot be written.
+    """
+    path = check_output(path, SUFFIXES)
+    write_bytes(path, [explorer_html(scene, progress).encode()])
+    return path
+
+
+def explorer_html(scene: Scene | None = None, progress: Progress | None = None) -> str:
+    """The explorer as text: of a scene, with the presets that have its model, or of the presets `EXPLORED`.
+
+    Args:
+        scene: the scene that the page shows first; None: presets only.
+        progress: called with the number of compiled models and of all models.
+
+    Raises:
+        InputError: the page cannot run the scene.
+        CompileError: ziglang is missing, or it rejected a file.
+    """
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    problems = _problems(scene)
+    specs = list(dict.fromkeys(problem.spec for problem in problems))
+    modules = []
+    for done, spec in enumerate(specs, start=1):
+        modules.append(base64.b64encode(wasm_module(spec)).decode("ascii"))
+        if progress is not None:
+            progress(done, len(specs))
+    data = {
+        "modules": modules,
+        "problems": [{**problem.data, "module": specs.index(problem.spec)} for problem in problems],
+    }
+    report = files("msfp_gen.report").joinpath("assets")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(_asset("explorer.html.jinja")).render(
+        version=__version__,
+        style=Markup(report.joinpath("page.css").read_text(encoding="utf-8")),
+        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        worker=Markup("".join(_asset(name) for name in WORKER)),
+        scripts=[
+            *(Markup(report.joinpath(name).read_text(encoding="utf-8")) for name in SHARED),
+            *(Markup(_asset(name)) for name in SCRIPTS),
+        ],
+    )
+
+
+def explored_scene(name: str) -> Scene:
+    """The preset of a page, with selected effects. Of a record its first 15 s, at a tolerance and rows for drawing."""
+    from msfp_gen.scene.file import presets
+    from msfp_gen.specification.layout import Auto
+
+    scene = presets.scene(name)
+    scene = replace(scene, effects=Auto(rims=True, bouc_wen=scene.effects.bouc_wen))
+    if not scene.motion.sampled:
+        return scene
+    return replace(scene, duration=RECORD, output_step=0.02, solver=replace(scene.solver, rtol=1e-2))
+
+
+def _title(name: str, text: str) -> str:
+    return f"{name}: {text}" + (f", the first {RECORD:g} s" if name.startswith("ridgecrest") else "")
+
+
+def _problems(scene: Scene | None) -> Sequence[Problem]:
+    """What the page shows, in the order of its list."""
+    from msfp_gen.scene.file import presets
+
+    known = presets.names("scene")
+    named = [problem_of(explored_scene(name), _title(name, known[name])) for name in EXPLORED]
+    if scene is None:
+        return named
+    first = problem_of(scene, scene.name or "scene")
+    return [first, *(problem for problem in named if problem.spec == first.spec and problem.scene.name != scene.name)]
+
+
+def _escaped(text: str) -> str:
+    """JSON with <, > and & escaped, so that no text in it can end the script element."""
+    return re.sub(r"[<>&]", lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def _asset(name: str) -> str:
+    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")

@@ -1,0 +1,85 @@
+"""Models that a wheel brings compiled, so that common layouts need no compiler; made by `tools/prebuilt_wheel.py`.
+
+`msfp_gen/prebuilt/` has one folder for each model and level of the processor, with a manifest and an extension that
+uses only the limited API of Python, so that one file serves all versions. A checkout has none, nor has a pure wheel.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+from msfp_gen.jit import cache
+from msfp_gen.jit.options import CFLAGS, COMPILER, words
+from msfp_gen.jit.processor import x86_64_level
+from msfp_gen.specification.layout import Effects, Layout, ModelSpec
+
+SUFFIX = ".abi3.so"
+# Levels of x86-64 that a wheel has models for: every processor, and those with AVX2.
+LEVELS = (3, 1)
+LAYOUTS = (Layout(2, 1, 0), Layout.dfp(), Layout.tfp())
+
+
+def prebuilt_specs() -> list[ModelSpec]:
+    """The models of a wheel: single, double and triple pendulum, planar and spatial, sliders and rims as selected."""
+    return [
+        ModelSpec(layout, Effects(dimension=dimension, sliders=sliders, rims=rims))
+        for layout in LAYOUTS
+        for dimension in ("spatial", "planar")
+        for sliders in ("inertial", "massless")
+        for rims in (True, False)
+    ]
+
+
+def prebuilt_folder() -> Path:
+    """Folder of the models that came with the package; it need not exist."""
+    return cache.PACKAGE / "prebuilt"
+
+
+def find_prebuilt(spec: ModelSpec) -> tuple[Path, cache.Manifest] | None:
+    """Folder and manifest of a model that came with the package and runs on this processor; None if there is none.
+
+    None too where the user names a compiler or its flags (CC, MSFP_GEN_CFLAGS). A damaged one raises a warning.
+    """
+    root = prebuilt_folder()
+    if not root.is_dir() or words(COMPILER) or words(CFLAGS):
+        return None
+    reached = x86_64_level() or 1
+    for level in (level for level in LEVELS if level <= reached):
+        folder = root / _folder_name(spec, level)
+        if not folder.is_dir():
+            continue
+        try:
+            manifest = cache.Manifest.read(folder)
+            if cache.digest(folder / manifest.extension) == manifest.files[manifest.extension]:
+                return folder, manifest
+        except (OSError, ValueError, TypeError, KeyError):
+            pass
+        warnings.warn(f"{folder} is damaged and not used; install msfp-gen again", RuntimeWarning, stacklevel=2)
+    return None
+
+
+def add_prebuilt(spec: ModelSpec, level: int, built: Path, root: Path) -> Path:
+    """Copy the model in the folder `built`, compiled for a level of the processor, to `root`; returns its folder."""
+    manifest = cache.Manifest.read(built)
+    data = (built / manifest.extension).read_bytes()
+    folder = root / _folder_name(spec, level)
+    folder.mkdir(parents=True)
+    extension = f"{manifest.module}{SUFFIX}"
+    (folder / extension).write_bytes(data)
+    files = {extension: hashlib.sha256(data).hexdigest()}
+    replace(manifest, key=folder.name, extension=extension, files=files).write(folder)
+    return folder
+
+
+def prebuilt_key(manifest: cache.Manifest) -> str:
+    """`BuildInfo.key` of a prebuilt model: one for all levels of the processor, since all give the same numbers."""
+    return hashlib.sha256(f"prebuilt\0{manifest.inputs['sources']}\0{manifest.spec}".encode()).hexdigest()
+
+
+def _folder_name(spec: ModelSpec, level: int) -> str:
+    """A name that only a model of these sources and this specification has."""
+    key = hashlib.sha256(f"{cache.digest_sources()}\0{spec.key}".encode()).hexdigest()
+    return f"{cache.module_name(spec)}-{key[:20]}-v{level}"

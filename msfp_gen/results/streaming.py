@@ -1,0 +1,108 @@
+"""A netCDF-4 file written block by block, for runs whose rows do not fit into memory.
+
+It holds what `write_netcdf` writes: variables, attributes and digest are the same.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from msfp_gen.common.output import replacing
+from msfp_gen.results.dataset import digest_of_dataset, energy_variables, row_variables, to_dataset
+from msfp_gen.results.history import History
+from msfp_gen.results.joining import taken
+from msfp_gen.results.reading import DIGEST
+from msfp_gen.results.run_data import RunData
+from msfp_gen.results.stored_group import ArrayDigest
+from msfp_gen.results.thinning import BLOCK
+
+
+def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[History]) -> None:
+    """Write a result with other rows than its own, completely or not at all.
+
+    result: scene, events, status and the rest. count: number of all rows. blocks: these rows in order. Raises OSError
+    where the disk is full.
+    """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, needs_pieces, to_pieces
+
+    first = to_dataset(replace(result, history=taken(result.history, slice(0, 1))))
+    pieces = to_pieces(result.scene.motion) if needs_pieces(result.scene) else None
+    along_time = {str(name): v for name, v in first.variables.items() if "time" in v.dims}
+    encoding: dict[str, dict[str, Any]] = {
+        name: {"chunksizes": (min(count, BLOCK), *variable.shape[1:])} for name, variable in along_time.items()
+    }
+    for name in encoding.keys() - {"time"}:
+        encoding[name] |= {"zlib": True, "complevel": 1}
+    with replacing(path) as temporary, _Disk(temporary) as disk:
+        with h5netcdf.File(disk, "w") as file:
+            first.dump_to_store(H5NetCDFStore(file), encoding=encoding, unlimited_dims=["time"])
+            if pieces is not None:
+                pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+            file.resize_dimension("time", count)
+            try:
+                digests = _write_rows(file, disk, blocks)
+            except Exception:  # of HDF5, which reads what was not written
+                disk.raise_failure()
+                raise
+            file.attrs[DIGEST] = digest_of_dataset(first, pieces, digests)
+        disk.finish()
+
+
+def _write_rows(file: Any, disk: _Disk, blocks: Iterable[History]) -> dict[str, ArrayDigest]:
+    """Write all rows; the digest of each variable."""
+    digests: dict[str, ArrayDigest] = {}
+    start = 0
+    for block in blocks:
+        end = start + len(block.time)
+        columns = {name: values for name, (_, values, _) in [*row_variables(block), *energy_variables(block)]}
+        for name, values in ({"time": block.time} | columns).items():
+            file[name][start:end] = values
+            digests.setdefault(name, ArrayDigest()).add(values)
+        disk.raise_failure()
+        start = end
+    return digests
+
+
+class _Disk(io.FileIO):
+    """A file for HDF5, which ends the process where a write fails: a failure is kept and raised between writes."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self._failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all bytes; after a failure none."""
+        view = memoryview(data).cast("B")
+        done = 0
+        try:
+            while self._failure is None and done < len(view):
+                done += super().write(view[done:])
+        except OSError as error:
+            self._failure = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Change the size of the file; after a failure nothing."""
+        try:
+            return self.tell() if self._failure else super().truncate(size)
+        except OSError as error:
+            self._failure = error
+            return self.tell()
+
+    def raise_failure(self) -> None:
+        """Raise the OSError of an earlier write."""
+        if self._failure is not None:
+            raise self._failure
+
+    def finish(self) -> None:
+        """Flush to the disk; raises OSError where that fails or an earlier write did."""
+        self.raise_failure()
+        os.fsync(self.fileno())

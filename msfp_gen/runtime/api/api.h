@@ -1,0 +1,76 @@
+/* api.h: what stands behind the table of functions of msfp.h. Private to the runtime.
+ *
+ * Functions of the table check what they are given, since a program in C is not Python: no input leads to a NaN, to a
+ * wrong number or to damaged memory without a status. `message` receives a constant text, so nothing is formatted.
+ */
+#ifndef MSFP_API_H
+#define MSFP_API_H
+#include "port.h"
+
+struct msfp_bearing {
+    msfp_parameters parameters;
+};
+
+/* ---- checks.c ---- */
+
+/* MSFP_OK, or MSFP_E_ARGUMENT with what is wrong in *message, where message is not NULL. */
+int msfp_check_bearing(double gravity, const double *bodies, const double *surfaces, const double *top,
+                       const char **message);
+int msfp_check_scene(const msfp_scene *scene, const char **message);
+/* Sets *message and returns MSFP_E_ARGUMENT; message: NULL where nothing is asked. */
+int msfp_refuse(const char **message, const char *text);
+
+/* ---- bearing.c: evaluations ---- */
+
+int msfp_api_bearing_new(double gravity, const double *bodies, const double *surfaces, const double *top,
+                         msfp_bearing **bearing, const char **message);
+void msfp_api_bearing_free(msfp_bearing *bearing);
+int msfp_api_accelerations(const msfp_bearing *bearing, const msfp_inputs *at, int balances, double *a, double *row,
+                           double *rates, double *unknowns, msfp_convergence *how);
+int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double *row, double *powers, double *rates,
+                     int *in_tension);
+int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
+                       double beta, double warming, double *residual, double *tangent, double *found);
+int msfp_api_momentum_balances(const msfp_bearing *bearing, const msfp_inputs *at, const double *unknowns,
+                               const msfp_variable *variables, int count, double *residual, double *jacobian,
+                               double *rates);
+int msfp_api_named_vectors(const msfp_bearing *bearing, const msfp_inputs *at, double *points, double *rotations,
+                           double *bases);
+
+/* ---- scene.c: runs ---- */
+
+void msfp_api_scene_default(msfp_scene *scene);
+int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **message);
+void msfp_api_run_free(msfp_run *run);
+int msfp_api_run_advance(msfp_run *run, long steps);
+void msfp_api_run_on_rows(msfp_run *run, msfp_row_callback callback, void *user);
+
+/* What the scene says of solver, rows and monitors. */
+msfp_options msfp_scene_options(const msfp_scene *scene);
+
+/* ---- progress.c: what a run states ---- */
+
+void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress);
+void msfp_api_run_state(const msfp_run *run, msfp_run_state *state);
+void msfp_api_run_hold_rows(msfp_run *run, size_t rows);
+void msfp_api_run_counts(const msfp_run *run, int64_t *counts);
+void msfp_api_run_extremes(const msfp_run *run, double *extremes);
+void msfp_api_run_trips(const msfp_run *run, msfp_trip *trips);
+const msfp_event *msfp_api_run_events(const msfp_run *run, size_t *count);
+const double *msfp_api_run_rows(const msfp_run *run, size_t *count);
+int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
+int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
+
+/* ---- two_port.c ---- */
+
+int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
+int msfp_api_port_trial(msfp_port *port, double time, const double *ends);
+int msfp_api_port_wrench(const msfp_port *port, double *wrench);
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
+int msfp_api_port_row(const msfp_port *port, double *row);
+void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
+void msfp_api_port_counts(const msfp_port *port, int64_t *counts);
+double msfp_api_port_time(const msfp_port *port);
+int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
+
+#endif

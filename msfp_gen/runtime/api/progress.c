@@ -1,0 +1,100 @@
+/* progress.c: what a run states about itself, and its snapshots, for the table of functions. */
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "api.h"
+
+enum { NB = MSFP_NB };
+
+void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress)
+{
+    *progress = (msfp_progress){ run->status, run->status_surface, run->status_value, run->now.t, run->h,
+                                  run->rows_before };
+}
+
+static void give(double *to, const void *from, size_t size)
+{
+    if (to)
+        memcpy(to, from, size);
+}
+
+void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
+{
+    const msfp_state *now = &run->now;
+    state->time = now->t;
+    give(state->q, now->q, sizeof now->q);
+    give(state->v, now->v, sizeof now->v);
+    give(state->f, now->f, sizeof now->f);
+    give(state->foot, now->foot, 2 * sizeof *now->foot);
+#if MSFP_HEAT
+    give(state->heat, now->heat, sizeof now->heat);
+#endif
+    static const msfp_row none; /* for a run that failed before its first row */
+    const msfp_row *last = run->row_count ? &run->rows[run->row_count - 1] : &none;
+    give(state->force, last->force, sizeof last->force);
+    give(state->rim_force, last->rim, sizeof last->rim);
+    give(state->base_angles, last->base + 3, 3 * sizeof *last->base);
+    give(state->origin, run->start, sizeof run->start);
+    if (state->monitor_heat) {
+        memcpy(state->monitor_heat, run->monitor.energy, sizeof run->monitor.energy);
+        memcpy(state->monitor_heat + NB, run->monitor.peak, sizeof run->monitor.peak);
+    }
+}
+
+void msfp_api_run_hold_rows(msfp_run *run, size_t rows) { run->options.row_limit = rows; }
+
+void msfp_api_run_counts(const msfp_run *run, int64_t *counts)
+{
+    for (int i = 0; i < MSFP_COUNTS; ++i)
+        counts[i] = run->counts[i];
+}
+
+void msfp_api_run_extremes(const msfp_run *run, double *extremes)
+{
+    memcpy(extremes, &run->extremes, sizeof run->extremes);
+}
+
+void msfp_api_run_trips(const msfp_run *run, msfp_trip *trips)
+{
+    memcpy(trips, run->monitor.trips, sizeof run->monitor.trips);
+}
+
+const msfp_event *msfp_api_run_events(const msfp_run *run, size_t *count)
+{
+    *count = run->event_count;
+    return run->events;
+}
+
+const double *msfp_api_run_rows(const msfp_run *run, size_t *count)
+{
+    *count = run->row_count;
+    return (const double *)run->rows;
+}
+
+/* The statuses of runs tell a scene that fails from bytes that are no snapshot. */
+static int status_of_snapshot(int status) { return status == MSFP_E_FINITE ? MSFP_E_SNAPSHOT : status; }
+
+int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
+{
+    return snapshot ? status_of_snapshot(msfp_snapshot_read(run, snapshot, size)) : MSFP_E_SNAPSHOT;
+}
+
+int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run)
+{
+    *run = calloc(1, sizeof **run);
+    if (!*run)
+        return MSFP_E_MEMORY;
+    (*run)->options.start_time = -INFINITY; /* of a run of any scene */
+    (*run)->options.duration = INFINITY;
+    (*run)->jump_count = INT_MAX;
+    const int status = msfp_api_snapshot_read(*run, snapshot, size);
+    if (status) {
+        free(*run);
+        *run = NULL;
+        return status;
+    }
+    (*run)->jump_count = 0;
+    (*run)->options.duration = -INFINITY; /* it is at its end: it takes no steps */
+    return MSFP_OK;
+}

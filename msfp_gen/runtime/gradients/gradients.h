@@ -1,0 +1,200 @@
+/* gradients.h: derivatives of a run with respect to parameters, by direct differentiation of its steps
+ * (docs/gradients.md). Private to the runtime; only models with gradients have it.
+ *
+ * "Columns" are derivatives with respect to MSFP_COLUMNS parameters, stored [field][column]. A "d" before a name means
+ * the columns of that quantity.
+ */
+#ifndef MSFP_GRADIENTS_H
+#define MSFP_GRADIENTS_H
+#include "run.h"
+
+#if MSFP_GRADIENTS
+typedef double msfp_columns[MSFP_COLUMNS];
+
+/* ---- columns.c: one evaluation of the equations ---- */
+
+/* Of the parameters: blocks of msfp_parameters. */
+typedef struct {
+    double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE * MSFP_COLUMNS];
+    double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE * MSFP_COLUMNS];
+    double top[MSFP_TOP_PARAMETERS_SIZE * MSFP_COLUMNS];
+} msfp_parameter_columns;
+
+/* Of a state and its inputs, and of the stage formula of Y, Z: f is fp of msfp_seed. */
+typedef struct {
+    msfp_columns base[3][6], load[6];
+    msfp_columns q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
+    msfp_columns foot[2], foot_beta, beta;
+    msfp_columns turn[MSFP_NB]; /* of a quasi-static step */
+} msfp_point_columns;
+
+/* Of the results of one evaluation: blocks of msfp_work. */
+typedef struct {
+    double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_COLUMNS], body[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_COLUMNS];
+    double force[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_COLUMNS], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_COLUMNS];
+    double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
+    double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
+    msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
+} msfp_work_columns;
+
+/* Derivatives of the contacts of one evaluation with respect to their local unknowns. */
+typedef struct {
+    double of[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_UNKNOWN_COLUMNS];
+} msfp_slopes;
+
+/* Columns of the condensed equations at the evaluation in `w`, whose g is the friction force over -mu N there. */
+void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                            const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
+                            const msfp_slopes *slopes, const double g[MSFP_NB][2], msfp_work_columns *d);
+
+/* ---- contact_columns.c ---- */
+
+void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+                         const double g[MSFP_NB][2], msfp_slopes *slopes);
+/* Columns of the contact of surface j, after those of its local block. */
+void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
+                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes,
+                          const double g[MSFP_NB][2], int j, msfp_work_columns *d);
+
+/* ---- observation.c: what is recorded ---- */
+
+/* Columns of a row [MSFP_ROW_SIZE] at the evaluation in `w`, but for its integrals. */
+void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                         const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
+                         msfp_columns *row);
+/* Columns of the sliding displacements and gaps at given coordinates. */
+void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
+                       msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE]);
+
+/* ---- a run ---- */
+
+/* Columns of a state, and of its time. */
+typedef struct {
+    msfp_columns t, q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
+    msfp_columns foot[MSFP_FOOT_SIZE];
+} msfp_state_columns;
+
+/* MSFP_COLUMNS parameters of a run. */
+typedef struct {
+    msfp_parameter_columns parameters;
+    msfp_history motion[MSFP_COLUMNS], load[MSFP_COLUMNS]; /* pieces 0: does not depend on the parameter */
+    msfp_state_columns now, next, node[MSFP_NODES];
+    msfp_columns h;               /* of the length of the step */
+    msfp_columns start[3];        /* of r_01 - r_nn at the start */
+    msfp_columns before[MSFP_NB]; /* theta before the step that led to `now`, of quasi-static steps */
+    msfp_point_columns point;     /* of the last stage of the step, and its evaluation */
+    msfp_work_columns work;
+    msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
+} msfp_group;
+
+/* The stages of a step as the method solved them, and their factored tangents. */
+typedef struct {
+    msfp_stage stage[MSFP_STAGES];
+    msfp_work work[MSFP_STAGES];
+    msfp_slopes slopes[MSFP_STAGES];
+    double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
+    int pivots[MSFP_STAGES][MSFP_DOF];
+} msfp_trail;
+
+struct msfp_gradients {
+    int count, groups; /* parameters, and groups of MSFP_COLUMNS of them */
+    msfp_group *group;
+    msfp_trail trail;
+    const double *steps; /* ends of the steps where they are prescribed [s], with their number and how many are taken */
+    int step_count, step;
+    double *rows; /* [row][parameter][MSFP_ROW_SIZE] */
+    size_t row_count, row_capacity;
+    double *events; /* [event][parameter]: time, displacement, top force */
+    size_t event_count, event_capacity;
+    msfp_extremes extremes; /* before the step */
+    double outward_rate;    /* likewise */
+};
+
+/* ---- gradients.c ---- */
+
+/* Columns of the time at which the gap of surface j is zero, from those of the state at the end of the step: minus the
+ * columns of the gap before contact, over its rate. Where the gap does not change they are zero. */
+void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt);
+
+/* ---- initial_columns.c, step_columns.c: states ---- */
+
+/* sum += weight * columns, of `count` numbers */
+MSFP_INLINE void msfp_add_columns(msfp_columns *sum, const msfp_columns *columns, double weight, int count)
+{
+    for (int i = 0; i < count; ++i)
+        for (int c = 0; c < MSFP_COLUMNS; ++c)
+            sum[i][c] += weight * columns[i][c];
+}
+/* sum += values * factor: columns of a product whose other factor has the columns `factor`. */
+MSFP_INLINE void msfp_add_scaled(msfp_columns *sum, const double *values, const msfp_columns factor, double weight,
+                                   int count)
+{
+    for (int i = 0; i < count; ++i)
+        for (int c = 0; c < MSFP_COLUMNS; ++c)
+            sum[i][c] += weight * values[i] * factor[c];
+}
+/* Whether a column is not zero. */
+MSFP_INLINE int msfp_any_column(const double *columns)
+{
+    for (int c = 0; c < MSFP_COLUMNS; ++c)
+        if (columns[c] != 0.0)
+            return 1;
+    return 0;
+}
+
+/* Columns of base motion and load at time t [s], whose columns are dt, into `dat`. */
+void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat);
+/* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
+void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns);
+/* Columns of the rates of Y, Z, and where f is given of Y, Z. */
+void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][2], msfp_columns f[MSFP_NB][2]);
+/* Columns of accelerations and rates that are consistent with the present state, after those of q, v, f and the foot;
+ * first: at the start of the run, where the columns of the foot follow too. Returns a status. */
+int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
+/* Columns of the accepted step, whose stages are in the trail; group->h is given. */
+void msfp_step_columns(msfp_run *run, msfp_group *group);
+
+/* ---- row_columns.c ---- */
+
+typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
+/* Rows at the ends of the last step and at its interpolation nodes, with their columns. */
+typedef struct {
+    msfp_row value[MSFP_NODES + 2];
+    msfp_row_columns d[MSFP_NODES + 2];
+} msfp_node_rows;
+/* Row of a state, with its columns; ds: columns of the state. */
+void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
+                          msfp_row *row, msfp_row_columns d);
+void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows *rows);
+/* Columns of the row at a share of the last step; moving: whether the share is a fixed time, and so depends on the
+ * parameters where the ends of the step do. */
+void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_rows *rows, double share, int moving,
+                              msfp_row_columns d);
+/* Columns of the row of the end of the step as the evaluation that ended it records it. */
+void msfp_row_reached_columns(const msfp_run *run, const msfp_group *group, msfp_row_columns d);
+/* Row and columns at a share of a quasi-static step. */
+void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d);
+
+/* ---- extreme_columns.c ---- */
+
+/* Rows of one step, and the columns of what a row contributes to the extremes. */
+typedef struct {
+    msfp_node_rows rows;
+    int observed; /* whether `rows` are those of the step */
+    msfp_row_columns row;
+    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)];
+} msfp_recording;
+/* Columns of the extremes that the first row, or the step, has changed. */
+void msfp_extremes_of_first_row(const msfp_run *run, msfp_group *group, const msfp_row *row, const msfp_row_columns d);
+void msfp_extremes_of_step(msfp_run *run, msfp_group *group, msfp_recording *s);
+
+/* ---- recording.c ---- */
+
+/* Record the columns of the present state, and those of the extremes of a first row. Returns MSFP_OK or
+ * MSFP_E_MEMORY. */
+int msfp_record_present_columns(msfp_run *run, int first);
+/* Columns of the rows that the accepted step recorded, and of the extremes that it changed. Returns MSFP_OK or
+ * MSFP_E_MEMORY. */
+int msfp_record_step_columns(msfp_run *run);
+#endif
+#endif

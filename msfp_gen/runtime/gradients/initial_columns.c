@@ -1,0 +1,122 @@
+/* initial_columns.c: derivatives of base motion, load and initial state. */
+#include <math.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, C = MSFP_COLUMNS };
+static const int unknown[ND] = MSFP_FREE;
+
+/* Derivatives of orders 1 to 3 of a history at its last search. */
+static void rates_at(const msfp_history *h, double t, double out[3][6])
+{
+    const double s = t - h->knots[h->last];
+    memset(out, 0, 3 * sizeof *out);
+    for (int order = 1; order <= 3; ++order)
+        for (int i = 0; i < 6; ++i)
+            for (int k = h->degree; k >= order; --k) {
+                double factor = 1.0;
+                for (int m = 0; m < order; ++m)
+                    factor *= k - m;
+                out[order - 1][i] = out[order - 1][i] * s + factor * h->powers[k][i];
+            }
+}
+
+void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat)
+{
+    double found[3][6];
+    if (run->next_jump < run->jump_count && t >= run->jumps[run->next_jump]) /* as msfp_point_at */
+        t = nextafter(run->jumps[run->next_jump], -INFINITY);
+    memset(dat->base, 0, sizeof dat->base);
+    memset(dat->load, 0, sizeof dat->load);
+    for (int c = 0; c < C; ++c) {
+        if (group->motion[c].pieces) {
+            msfp_history_at(&group->motion[c], t, 3, found);
+            for (int order = 0; order < 3; ++order)
+                for (int i = 0; i < 6; ++i)
+                    dat->base[order][i][c] = found[order][i];
+        }
+        if (group->load[c].pieces) {
+            msfp_history_at(&group->load[c], t, 1, found);
+            for (int i = 0; i < 6; ++i)
+                dat->load[i][c] = found[0][i];
+        }
+    }
+    if (!msfp_any_column(dt))
+        return;
+    msfp_history_at(&run->motion, t, 3, found);
+    rates_at(&run->motion, t, found);
+    for (int order = 0; order < 3; ++order)
+        msfp_add_scaled(dat->base[order], found[order], dt, 1.0, 6);
+    msfp_history_at(&run->load, t, 1, found);
+    rates_at(&run->load, t, found);
+    msfp_add_scaled(dat->load, found[0], dt, 1.0, 6);
+}
+
+/* Height of the foot at rest: the top plate less the settlement under the supported mass (msfp_foot_at_rest). */
+static void foot_at_rest(const msfp_parameters *p, const msfp_group *group, msfp_columns foot[2])
+{
+    const double *plate = group->work.body[NB], *dtop = group->parameters.top;
+    const double stiffness = p->top[MSFP_TOP_PARAMETERS_KV], mass = msfp_sprung_mass(p);
+    for (int c = 0; c < C; ++c) {
+        const double dmass = dtop[MSFP_TOP_PARAMETERS_M * C + c] - dtop[MSFP_TOP_PARAMETERS_MZ * C + c];
+        const double dweight = dmass * p->gravity + mass * dtop[MSFP_TOP_PARAMETERS_G * C + c];
+        const double sunk = stiffness > 0.0 ? (dweight - mass * p->gravity / stiffness *
+                                                             dtop[MSFP_TOP_PARAMETERS_KV * C + c]) /
+                                                  stiffness
+                                            : 0.0;
+        foot[0][c] = plate[MSFP_BODY_CZ * C + c] - sunk;
+        foot[1][c] = mass > 0.0 ? plate[MSFP_BODY_VZ * C + c] : 0.0;
+    }
+}
+
+int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
+{
+    const msfp_parameters *p = &run->parameters;
+    const msfp_parameter_columns *dp = &group->parameters;
+    msfp_trail *trail = &run->gradients->trail;
+    msfp_work *w = &trail->work[0];
+    msfp_slopes *slopes = &trail->slopes[0];
+    msfp_state_columns *now = &group->now;
+    msfp_point_columns *dat = &group->point;
+    msfp_seed seed = { .ca = 1.0 };
+    msfp_point at;
+    double g[NB][2], residual[DOF];
+    msfp_to_point(run, &run->now, &at);
+    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(g, at.f, sizeof g);
+#if MSFP_LAW
+    memset(w->coefficient, 0, sizeof w->coefficient);
+#endif
+    const int status = msfp_condensed(p, &at, &seed, w, g, residual, trail->factors[0]);
+    if (status)
+        return status;
+    msfp_contact_slopes(p, &seed, w, (const double(*)[2])g, slopes);
+    memset(dat, 0, sizeof *dat);
+    memset(now->t, 0, sizeof now->t);
+    memset(now->a, 0, sizeof now->a);
+    memcpy(dat->q, now->q, sizeof dat->q);
+    memcpy(dat->v, now->v, sizeof dat->v);
+    memcpy(dat->f, now->f, sizeof dat->f);
+    msfp_inputs_columns(run, group, run->now.t, now->t, dat);
+    if (first) {
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, (const double(*)[2])g, &group->work);
+        foot_at_rest(p, group, now->foot);
+    }
+    memcpy(dat->foot, now->foot, sizeof dat->foot);
+    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, (const double(*)[2])g, &group->work);
+    if (!MSFP_MASSLESS) {
+        if (msfp_lu(trail->factors[0], DOF, trail->pivots[0]) == 0)
+            return MSFP_E_IRREGULAR;
+        msfp_solve_columns(trail->factors[0], trail->pivots[0], group->work.residual);
+        for (int k = 0; k < NB; ++k)
+            for (int i = 0; i < ND; ++i)
+                msfp_add_columns(&now->a[k][unknown[i]], &group->work.residual[k * ND + i], -1.0, 1);
+        memcpy(dat->a, now->a, sizeof dat->a);
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, (const double(*)[2])g, &group->work);
+    }
+    msfp_friction_columns(&group->work, now->df, NULL);
+    memcpy(now->foot, group->work.foot, sizeof now->foot);
+    return MSFP_OK;
+}
+#endif

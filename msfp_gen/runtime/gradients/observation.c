@@ -1,0 +1,200 @@
+/* observation.c: directional derivatives of what a run records. */
+#include <math.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+#include "msfp_gradient_kernels.h"
+
+enum { NB = MSFP_NB, C = MSFP_COLUMNS, FORCE = MSFP_FORCE_SIZE };
+
+/* The columns of a polar vector of a block along E1, E2, E3. */
+MSFP_INLINE void get_polar(const double *block, msfp_columns *vector)
+{
+    if (MSFP_PLANAR)
+        memset(vector[1], 0, sizeof *vector);
+    for (int i = 0; i < FORCE; ++i)
+        memcpy(vector[MSFP_PLANAR ? 2 * i : i], block + i * C, sizeof *vector);
+}
+
+/* Sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the centre,
+ * where its columns are zero. */
+MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
+                        msfp_columns *gap)
+{
+    double out[MSFP_GAP_SIZE], d[MSFP_GAP_SIZE * C];
+    msfp_gap_direction(par, above, out, dpar, dabove, d);
+    const int centred = out[MSFP_GAP_S] == 0.0;
+    for (int c = 0; c < C; ++c) {
+        gap[MSFP_GAP_S][c] = centred ? 0.0 : d[MSFP_GAP_S * C + c];
+        gap[MSFP_GAP_G][c] = dpar[MSFP_SURFACE_PARAMETERS_SC * C + c] - gap[MSFP_GAP_S][c];
+    }
+}
+
+MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
+                       msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
+{
+    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
+    for (int j = 0; j < NB; ++j) {
+        body[MSFP_BODY_ST] = sin(q[j][1]);
+        body[MSFP_BODY_CT] = cos(q[j][1]);
+        for (int c = 0; c < C; ++c) {
+            d[MSFP_BODY_ST * C + c] = body[MSFP_BODY_CT] * dq[j][1][c];
+            d[MSFP_BODY_CT * C + c] = -body[MSFP_BODY_ST] * dq[j][1][c];
+        }
+#if !MSFP_PLANAR
+        body[MSFP_BODY_SP] = sin(q[j][0]);
+        body[MSFP_BODY_CP] = cos(q[j][0]);
+        for (int c = 0; c < C; ++c) {
+            d[MSFP_BODY_SP * C + c] = body[MSFP_BODY_CP] * dq[j][0][c];
+            d[MSFP_BODY_CP * C + c] = -body[MSFP_BODY_SP] * dq[j][0][c];
+        }
+#endif
+        gap_columns(p->surface[j], dp->surface[j], body, d, gaps[j]);
+    }
+}
+
+/* Kinetic and potential energy of all masses. */
+MSFP_INLINE void mechanical(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                       const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
+                       msfp_columns *row)
+{
+    double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C], out[MSFP_ENERGY_SIZE];
+    double one[MSFP_ENERGY_SIZE * C];
+    static const int first[3] = { MSFP_BASE_MOTION_OX, MSFP_BASE_MOTION_UX, MSFP_BASE_MOTION_BX };
+    msfp_base_motion_O_put(base, at->base[0]);
+    msfp_base_motion_U_put(base, at->base[1]);
+    msfp_base_motion_B_put(base, at->base[2]);
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < FORCE; ++i)
+            memcpy(dbase + (first[order] + i) * C, dat->base[order][MSFP_PLANAR ? 2 * i : i], C * sizeof *dbase);
+    memset(row[MSFP_ROW_KINETIC], 0, sizeof *row);
+    memset(row[MSFP_ROW_POTENTIAL], 0, sizeof *row);
+    for (int k = 1; k <= NB + 1; ++k) {
+        if (k <= NB)
+            msfp_body_energy_direction(p->body[k], w->body[k], base, out, dp->body[k], d->body[k], dbase, one);
+        else
+            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, out, dp->top, d->body[NB], dbase, d->foot,
+                                      one);
+        for (int c = 0; c < C; ++c) {
+            row[MSFP_ROW_KINETIC][c] += one[MSFP_ENERGY_KINETIC * C + c];
+            row[MSFP_ROW_POTENTIAL][c] += one[MSFP_ENERGY_POTENTIAL * C + c];
+        }
+    }
+}
+
+/* Settlement of the top and energy of its springs (restraint_energy of observe.c). */
+MSFP_INLINE void restraint(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                      const msfp_work *w, const msfp_work_columns *d, msfp_columns *row)
+{
+    const double *t = p->top, *dt = dp->top;
+    double C0[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, settlement[2];
+    msfp_columns dC[3], daxis[3], danchor[3];
+    msfp_body_C_get(w->body[NB], C0);
+    msfp_body_t3_get(w->body[NB], axis);
+    msfp_top_parameters_x0_get(t, anchor);
+    get_polar(d->body[NB] + MSFP_BODY_CX * C, dC);
+    get_polar(d->body[NB] + MSFP_BODY_T3X * C, daxis);
+    get_polar(dt + MSFP_TOP_PARAMETERS_X0X * C, danchor);
+#if MSFP_TOP_ROTATION
+    double upright[MSFP_UPRIGHT_SIZE];
+    msfp_support_axis(at, upright);
+    msfp_upright_e_get(upright, held);
+#else
+    (void)at;
+#endif
+    msfp_settlement(p, w, settlement);
+    for (int c = 0; c < C; ++c) {
+        double square = 0.0, dsquare = 0.0, lean = 0.0, dlean = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            const double x = i < 2 ? C0[i] - anchor[i] : 0.0, dx = i < 2 ? dC[i][c] - danchor[i][c] : 0.0;
+            square += x * x;
+            dsquare += 2.0 * x * dx;
+            lean += 0.5 * (axis[i] - held[i]) * (axis[i] - held[i]);
+            dlean += (axis[i] - held[i]) * daxis[i][c];
+        }
+        const double sunk = msfp_top_is_sprung(p)
+                                ? d->body[NB][MSFP_BODY_CZ * C + c] - d->foot[MSFP_FOOT_Y * C + c]
+                                : 0.0;
+        row[MSFP_ROW_TOP_SETTLEMENT][c] = sunk;
+        row[MSFP_ROW_RESTRAINT][c] =
+            0.5 * (dt[MSFP_TOP_PARAMETERS_K * C + c] * square + t[MSFP_TOP_PARAMETERS_K] * dsquare) +
+            dt[MSFP_TOP_PARAMETERS_KR * C + c] * lean + t[MSFP_TOP_PARAMETERS_KR] * dlean +
+            0.5 * dt[MSFP_TOP_PARAMETERS_KV * C + c] * settlement[0] * settlement[0] +
+            t[MSFP_TOP_PARAMETERS_KV] * settlement[0] * sunk;
+    }
+}
+
+/* Energy of the spring of a closed rim, k_c gap^2/2 times the ratio of lever arms (rim_energy of observe.c). */
+MSFP_INLINE void rim_energy(const double *par, const double *dpar, double gap, const msfp_columns dgap, double *sum)
+{
+    const double k = par[MSFP_SURFACE_PARAMETERS_KC], R = par[MSFP_SURFACE_PARAMETERS_R];
+    const double offset = par[MSFP_SURFACE_PARAMETERS_PR], lever = 1.0 - offset / R;
+    for (int c = 0; c < C; ++c) {
+        const double dlever = (offset / R * dpar[MSFP_SURFACE_PARAMETERS_R * C + c] -
+                               dpar[MSFP_SURFACE_PARAMETERS_PR * C + c]) /
+                              R;
+        sum[c] += 0.5 * gap * gap * (dpar[MSFP_SURFACE_PARAMETERS_KC * C + c] * lever + k * dlever) +
+                  k * gap * dgap[c] * lever;
+    }
+}
+
+/* Quantities of surface j. */
+MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                    const msfp_work_columns *d, int j, msfp_columns *row)
+{
+    const double *contact = w->contact[j], *dcontact = d->contact[j];
+    msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
+    double sliding[MSFP_GAP_SIZE];
+    memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
+    memset(angles[0], 0, sizeof *angles);
+    memset(slip[1], 0, sizeof *slip);
+    for (int c = 0; c < C; ++c) {
+#if !MSFP_PLANAR
+        angles[0][c] = contact[MSFP_CONTACT_CP] * dcontact[MSFP_CONTACT_SP * C + c] -
+                       contact[MSFP_CONTACT_SP] * dcontact[MSFP_CONTACT_CP * C + c];
+        slip[1][c] = dcontact[MSFP_CONTACT_V * C + c];
+#endif
+        angles[1][c] = contact[MSFP_CONTACT_CT] * dcontact[MSFP_CONTACT_ST * C + c] -
+                       contact[MSFP_CONTACT_ST] * dcontact[MSFP_CONTACT_CT * C + c];
+        slip[0][c] = dcontact[MSFP_CONTACT_U * C + c];
+        row[MSFP_ROW_RIM + j][c] = w->rim_active[j] ? -d->rim[j][MSFP_RIM_FC * C + c] : 0.0;
+#if MSFP_LAW
+        row[MSFP_ROW_MU + j][c] = dcontact[MSFP_CONTACT_MU * C + c];
+#endif
+    }
+    gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], gap);
+    memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
+    memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
+    get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
+    msfp_gap(p->surface[j], w->body[j + 1], sliding);
+    if (MSFP_RIMS && sliding[MSFP_GAP_G] < 0.0)
+        rim_energy(p->surface[j], dp->surface[j], sliding[MSFP_GAP_G], gap[MSFP_GAP_G], row[MSFP_ROW_RIM_STORED]);
+}
+
+MSFP_WIDE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                         const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
+                         msfp_columns *row)
+{
+    memset(row, 0, MSFP_ROW_SIZE * sizeof *row);
+    memcpy(row + MSFP_ROW_Q, dat->q, sizeof dat->q);
+    memcpy(row + MSFP_ROW_V, dat->v, sizeof dat->v);
+    memcpy(row + MSFP_ROW_A, dat->a, sizeof dat->a);
+    for (int j = 0; j < NB; ++j) {
+        memcpy(row[MSFP_ROW_F + 2 * j], d->contact[j] + MSFP_CONTACT_Y * C, sizeof *row);
+#if !MSFP_PLANAR
+        memcpy(row[MSFP_ROW_F + 2 * j + 1], d->contact[j] + MSFP_CONTACT_Z * C, sizeof *row);
+#endif
+        surface(p, dp, w, d, j, row);
+    }
+    memcpy(row + MSFP_ROW_BASE, dat->base[0], 3 * sizeof *row);
+    get_polar(d->body[NB] + MSFP_BODY_CX * C, row + MSFP_ROW_TOP);
+    if (MSFP_PLANAR)
+        memcpy(row[MSFP_ROW_TOP + 1], dat->base[0][1], sizeof *row);
+    get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
+    for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
+        memcpy(row[MSFP_ROW_TOP_MOMENT + (MSFP_PLANAR ? 1 : i)], d->moment[NB] + i * C, sizeof *row);
+    restraint(p, dp, at, w, d, row);
+    mechanical(p, dp, at, dat, w, d, row);
+}
+#endif

@@ -1,0 +1,122 @@
+/* recording.c: the derivatives of rows and events that a run keeps. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
+
+enum { EVENT = 7 }; /* numbers of an event: time, displacement, top force */
+
+/* `*items` with room for `wanted` items of `size` doubles for each parameter. */
+static int reserve(const struct msfp_gradients *g, double **items, size_t wanted, size_t *capacity, size_t size)
+{
+    if (wanted <= *capacity)
+        return MSFP_OK;
+    const size_t room = wanted > 2 * *capacity ? wanted + 256 : 2 * *capacity;
+    double *grown = realloc(*items, room * (size_t)g->count * size * sizeof *grown);
+    if (!grown)
+        return MSFP_E_MEMORY;
+    *items = grown;
+    *capacity = room;
+    return MSFP_OK;
+}
+
+/* Put the columns of a group into item `index` of `items`, [item][parameter][size]. */
+static void store(const struct msfp_gradients *g, double *items, size_t index, int group, int size,
+                  const msfp_columns *d)
+{
+    for (int c = 0; c < C && group * C + c < g->count; ++c) {
+        double *to = items + (index * (size_t)g->count + (size_t)(group * C + c)) * (size_t)size;
+        for (int i = 0; i < size; ++i)
+            to[i] = d[i][c];
+    }
+}
+
+/* Columns of an event at the end of the step. In a quasi-static run the end of a step does not move with the
+ * parameters: the state at the event moves along the solution. */
+static void event_columns(msfp_run *run, msfp_group *group, int j, msfp_row_columns d, msfp_columns *event)
+{
+    const msfp_state *next = &run->next;
+    msfp_state_columns at = group->next;
+    msfp_row row;
+    if (msfp_is_quasistatic(run)) {
+        msfp_event_time_columns(run, group, j, at.t);
+        msfp_add_scaled(at.q[0], next->v[0], at.t, 1.0, NB * NQ);
+        msfp_add_scaled(at.v[0], next->a[0], at.t, 1.0, NB * NQ);
+        msfp_add_scaled(at.f[0], next->df[0], at.t, 1.0, NB * 2);
+    }
+    msfp_observe_columns(run, group, next, &at, &row, d);
+    memcpy(event[0], at.t, sizeof *event);
+    for (int axis = 0; axis < 3; ++axis)
+        for (int c = 0; c < C; ++c)
+            event[1 + axis][c] = d[MSFP_ROW_BASE + axis][c] - d[MSFP_ROW_TOP + axis][c] - group->start[axis][c];
+    memcpy(event + 4, d + MSFP_ROW_TOP_FORCE, 3 * sizeof *event);
+}
+
+int msfp_record_present_columns(msfp_run *run, int first)
+{
+    struct msfp_gradients *g = run->gradients;
+    msfp_recording *s = malloc(sizeof *s);
+    if (!s || reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) {
+        free(s);
+        return MSFP_E_MEMORY;
+    }
+    for (int i = 0; i < g->groups; ++i) {
+        msfp_group *group = &g->group[i];
+        msfp_row row;
+        msfp_observe_columns(run, group, &run->now, &group->now, &row, s->row);
+        for (size_t r = g->row_count; r < run->row_count; ++r)
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)s->row);
+        if (first)
+            msfp_extremes_of_first_row(run, group, &row, (const msfp_columns *)s->row);
+    }
+    g->row_count = run->row_count;
+    free(s);
+    return MSFP_OK;
+}
+
+/* Columns of a row that the step recorded, at a fixed time: the end of the step, where it is fixed, or inside it. */
+static void row_columns(msfp_run *run, msfp_group *group, double time, msfp_recording *s)
+{
+    if (msfp_is_quasistatic(run) || (run->options.output_step <= 0.0 && !msfp_any_column(group->next.t))) {
+        msfp_row_reached_columns(run, group, s->row);
+        return;
+    }
+    if (!s->observed)
+        msfp_observe_node_columns(run, group, &s->rows);
+    s->observed = 1;
+    const double share = (time - run->now.t) / (run->next.t - run->now.t);
+    msfp_row_between_columns(run, group, &s->rows, fmin(1.0, share), 1, s->row);
+}
+
+int msfp_record_step_columns(msfp_run *run)
+{
+    struct msfp_gradients *g = run->gradients;
+    msfp_recording *s = malloc(sizeof *s);
+    if (!s || reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE) ||
+        reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT)) {
+        free(s);
+        return MSFP_E_MEMORY;
+    }
+    for (int i = 0; i < g->groups; ++i) {
+        msfp_group *group = &g->group[i];
+        msfp_columns event[EVENT];
+        s->observed = 0;
+        for (size_t e = g->event_count; e < run->event_count; ++e) {
+            event_columns(run, group, run->events[e].surface - 1, s->row, event);
+            store(g, g->events, e, i, EVENT, (const msfp_columns *)event);
+        }
+        for (size_t r = g->row_count; r < run->row_count; ++r) {
+            row_columns(run, group, run->rows[r].time, s);
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)s->row);
+        }
+        msfp_extremes_of_step(run, group, s);
+    }
+    g->row_count = run->row_count;
+    g->event_count = run->event_count;
+    free(s);
+    return MSFP_OK;
+}
+#endif

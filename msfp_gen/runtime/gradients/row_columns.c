@@ -1,0 +1,199 @@
+/* row_columns.c: derivatives of rows: of a state, at the end of a step, and inside it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
+
+void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds, msfp_row *row,
+                    msfp_row_columns d)
+{
+    const msfp_parameters *p = &run->parameters;
+    msfp_point at;
+    msfp_work w;
+    msfp_slopes slopes;
+    msfp_work_columns *dw = malloc(sizeof *dw);
+    msfp_point_columns dat;
+    msfp_seed seed = { 0 };
+    double g[NB][2];
+    msfp_observe_state(run, s, row);
+    if (!dw)
+        return;
+    msfp_to_point(run, s, &at);
+    memcpy(seed.fp, at.f, sizeof seed.fp);
+    memcpy(g, at.f, sizeof g);
+#if MSFP_LAW
+    memset(w.coefficient, 0, sizeof w.coefficient);
+#endif
+    double residual[MSFP_DOF];
+    msfp_condensed(p, &at, &seed, &w, g, residual, NULL);
+    msfp_contact_slopes(p, &seed, &w, (const double(*)[2])g, &slopes);
+    memset(&dat, 0, sizeof dat);
+    msfp_inputs_columns(run, group, s->t, ds->t, &dat);
+    memcpy(dat.q, ds->q, sizeof dat.q);
+    memcpy(dat.v, ds->v, sizeof dat.v);
+    memcpy(dat.a, ds->a, sizeof dat.a);
+    memcpy(dat.f, ds->f, sizeof dat.f);
+    memcpy(dat.foot, ds->foot, sizeof dat.foot);
+    msfp_condensed_columns(p, &group->parameters, &at, &dat, &seed, &w, &slopes, (const double(*)[2])g, dw);
+    msfp_record_columns(p, &group->parameters, &at, &dat, &w, dw, d);
+    free(dw);
+}
+
+void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows *rows)
+{
+    msfp_state s;
+    const int last = run->node_count + 1;
+    msfp_observe_columns(run, group, &run->now, &group->now, &rows->value[0], rows->d[0]);
+    for (int i = 1; i < last; ++i) {
+        const double share = run->node[i - 1].share;
+        msfp_state_columns *node = &group->node[i - 1];
+        msfp_interpolate(run, share, &s);
+        for (int c = 0; c < C; ++c) {
+            node->t[c] = group->now.t[c] + share * group->h[c];
+            node->foot[MSFP_FOOT_Y2][c] =
+                (1.0 - share) * group->now.foot[MSFP_FOOT_Y2][c] + share * group->next.foot[MSFP_FOOT_Y2][c];
+        }
+        for (int k = 0; k < NB; ++k)
+            for (int d = 0; d < NQ; ++d)
+                for (int c = 0; c < C; ++c)
+                    node->a[k][d][c] = (1.0 - share) * group->now.a[k][d][c] + share * group->next.a[k][d][c];
+        msfp_observe_columns(run, group, &s, node, &rows->value[i], rows->d[i]);
+    }
+    msfp_observe_columns(run, group, &run->next, &group->next, &rows->value[last], rows->d[last]);
+}
+
+/* Derivatives of the weights of msfp_weights_at with respect to the share. */
+static void weight_slopes(const msfp_run *run, double share, double *slopes)
+{
+    double nodes[MSFP_NODES + 2] = { 0.0 };
+    const int count = run->node_count + 2;
+    for (int i = 0; i < run->node_count; ++i)
+        nodes[i + 1] = run->node[i].share;
+    nodes[count - 1] = 1.0;
+    for (int i = 0; i < count; ++i) {
+        slopes[i] = 0.0;
+        for (int m = 0; m < count; ++m) {
+            double product = m == i ? 0.0 : 1.0 / (nodes[i] - nodes[m]);
+            for (int j = 0; j < count && m != i; ++j)
+                product *= j == i || j == m ? 1.0 : (share - nodes[j]) / (nodes[i] - nodes[j]);
+            slopes[i] += product;
+        }
+    }
+}
+
+/* The bound of limit_friction in output.c: |(Y, Z)| no larger than in the rows that a row is interpolated from. */
+static void limit_friction(const msfp_node_rows *rows, int count, const msfp_row *row, msfp_row_columns d)
+{
+    for (int j = 0; j < NB; ++j) {
+        double most = 1.0;
+        const double size = hypot(row->f[j][0], row->f[j][1]);
+        int at = -1;
+        for (int r = 0; r < count; ++r)
+            if (hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]) > most) {
+                most = hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]);
+                at = r;
+            }
+        for (int c = 0; c < C && size > most; ++c) {
+            double *const columns[2] = { d[MSFP_ROW_F + 2 * j], d[MSFP_ROW_F + 2 * j + 1] };
+            double dsize = 0.0, dmost = 0.0;
+            for (int i = 0; i < 2; ++i) {
+                dsize += row->f[j][i] * columns[i][c] / size;
+                dmost += at < 0 ? 0.0
+                                : rows->value[at].f[j][i] * rows->d[at][MSFP_ROW_F + 2 * j + i][c] / most;
+            }
+            for (int i = 0; i < 2; ++i)
+                columns[i][c] = columns[i][c] * most / size + row->f[j][i] * (dmost - most * dsize / size) / size;
+        }
+    }
+}
+
+static void clear(msfp_columns *columns, int count) { memset(columns, 0, count * sizeof *columns); }
+
+/* As restore_bounds of output.c. row: the row before its bounds are restored. */
+static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row, msfp_row_columns d)
+{
+    msfp_columns gaps[NB][MSFP_GAP_SIZE];
+    double sliding[NB][MSFP_GAP_SIZE];
+    msfp_gaps(&run->parameters, row->q, sliding);
+    msfp_gaps_columns(&run->parameters, &group->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), gaps);
+    if (row->kinetic < 0.0)
+        clear(&d[MSFP_ROW_KINETIC], 1);
+    if (row->rim_stored < 0.0)
+        clear(&d[MSFP_ROW_RIM_STORED], 1);
+    for (int j = 0; j < NB; ++j) {
+        if (row->normal[j] < 0.0) {
+            clear(&d[MSFP_ROW_NORMAL + j], 1);
+            clear(&d[MSFP_ROW_FORCE + 3 * j], 3);
+        }
+        memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
+        memcpy(d[MSFP_ROW_GAP + j], gaps[j][MSFP_GAP_G], sizeof *d);
+        if (sliding[j][MSFP_GAP_G] > 0.0 || row->rim[j] < 0.0)
+            clear(&d[MSFP_ROW_RIM + j], 1);
+    }
+}
+
+void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_rows *rows, double share, int moving,
+                        msfp_row_columns d)
+{
+    const msfp_weights w = msfp_weights_at(run, share);
+    const double h = run->next.t - run->now.t;
+    double slopes[MSFP_NODES + 2], *value;
+    msfp_row blended;
+    weight_slopes(run, share, slopes);
+    value = (double *)&blended;
+    for (int i = 0; i < MSFP_ROW_SIZE; ++i) {
+        double slope = 0.0;
+        value[i] = 0.0;
+        memset(d[i], 0, sizeof *d);
+        for (int r = 0; r < w.count; ++r) {
+            const double one = ((const double *)&rows->value[r])[i];
+            value[i] += w.of[r] * one;
+            slope += slopes[r] * one;
+            for (int c = 0; c < C; ++c)
+                d[i][c] += w.of[r] * rows->d[r][i][c];
+        }
+        for (int c = 0; c < C && moving; ++c)
+            d[i][c] -= slope * (group->now.t[c] + share * group->h[c]) / h;
+    }
+    limit_friction(rows, w.count, &blended, d);
+    restore_bounds(run, group, &blended, d);
+}
+
+void msfp_row_reached_columns(const msfp_run *run, const msfp_group *group, msfp_row_columns d)
+{
+    const msfp_trail *trail = &run->gradients->trail;
+    const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    msfp_record_columns(&run->parameters, &group->parameters, &trail->stage[last].at, &group->point,
+                        &trail->work[last], &group->work, d);
+}
+
+/* The cubic through values and rates at the ends of the step, of a quasi-static step: columns at a share of it. */
+static void hermite(const msfp_columns *y0, const msfp_columns *d0, const msfp_columns *y1, const msfp_columns *d1,
+                    double h, double s, int count, msfp_columns *out)
+{
+    const double r = 1.0 - s, w0 = r * r * (1.0 + 2.0 * s), w1 = s * s * (3.0 - 2.0 * s), d = s * r * h;
+    for (int i = 0; i < count; ++i)
+        for (int c = 0; c < C; ++c)
+            out[i][c] = w0 * y0[i][c] + w1 * y1[i][c] + d * (r * d0[i][c] - s * d1[i][c]);
+}
+
+void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d)
+{
+    const msfp_state_columns *a = &group->now, *b = &group->next;
+    msfp_state_columns *ds = &group->node[0];
+    const double h = run->next.t - run->now.t;
+    msfp_state s;
+    msfp_interpolate(run, share, &s);
+    *ds = *a;
+    hermite(a->q[0], a->v[0], b->q[0], b->v[0], h, share, NB * NQ, ds->q[0]);
+    hermite(a->v[0], a->a[0], b->v[0], b->a[0], h, share, NB * NQ, ds->v[0]);
+    hermite(a->f[0], a->df[0], b->f[0], b->df[0], h, share, NB * 2, ds->f[0]);
+    for (int i = 0; i < NB * NQ; ++i)
+        for (int c = 0; c < C; ++c)
+            ds->a[0][i][c] = (1.0 - share) * a->a[0][i][c] + share * b->a[0][i][c];
+    msfp_observe_columns(run, group, &s, ds, row, d);
+}
+#endif

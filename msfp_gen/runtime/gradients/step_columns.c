@@ -1,0 +1,224 @@
+/* step_columns.c: derivatives of the states of a run, step by step: the stage formula of the method is differentiated,
+ * with the tangent of each stage as it was solved ("staggered direct": Feehery, Tolsma and Barton 1997).
+ */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises loops over columns */
+#endif
+#include <math.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, C = MSFP_COLUMNS, STAGES = MSFP_STAGES };
+static const int unknown[ND] = MSFP_FREE;
+
+/* As msfp_lu_solve for all columns at once. */
+MSFP_WIDE void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns)
+{
+    for (int k = 0; k < DOF; ++k)
+        for (int c = 0; c < C; ++c) {
+            const double swap = columns[pivots[k]][c];
+            columns[pivots[k]][c] = columns[k][c];
+            columns[k][c] = swap;
+        }
+    for (int j = 0; j < DOF; ++j)
+        for (int i = j + 1; i < DOF; ++i)
+            for (int c = 0; c < C; ++c)
+                columns[i][c] -= factors[i * DOF + j] * columns[j][c];
+    for (int i = DOF - 1; i >= 0; --i) {
+        for (int j = i + 1; j < DOF; ++j)
+            for (int c = 0; c < C; ++c)
+                columns[i][c] -= factors[i * DOF + j] * columns[j][c];
+        for (int c = 0; c < C; ++c)
+            columns[i][c] *= factors[i * DOF + i];
+    }
+}
+
+MSFP_WIDE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
+{
+    for (int j = 0; j < NB; ++j)
+        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {
+            memcpy(df[j][i], d->contact[j] + (MSFP_CONTACT_DY + i) * C, sizeof df[j][i]);
+            if (f)
+                memcpy(f[j][i], d->contact[j] + (MSFP_CONTACT_Y + i) * C, sizeof f[j][i]);
+        }
+}
+
+/* Rates of all stages, in columns and as values. */
+typedef struct {
+    msfp_columns v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], foot[STAGES][2];
+    double rates[STAGES][NB][2]; /* of Y, Z */
+} stage_columns;
+
+/* Values of the rates of stage j. */
+static const double *rates_v(const msfp_run *run, int j)
+{
+    return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
+}
+
+static const double *rates_a(const msfp_run *run, int j)
+{
+    return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
+}
+
+static const double *rates_foot(const msfp_run *run, int j)
+{
+    return (j ? run->gradients->trail.work[j].foot : run->now.foot) + MSFP_FOOT_Y1;
+}
+
+/* Columns of Q, V, fp and the foot of stage i, as `prepare` of implicit.c forms them. */
+MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const stage_columns *s, const msfp_tableau *method,
+                    int i, double h, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ], msfp_point_columns *dat)
+{
+    const msfp_state_columns *now = &group->now;
+    const msfp_stage *stage = &run->gradients->trail.stage[i];
+    memcpy(Q, now->q, sizeof now->q);
+    memcpy(V, now->v, sizeof now->v);
+    memcpy(dat->f, now->f, sizeof dat->f);
+    memcpy(dat->foot, now->foot, sizeof dat->foot);
+    for (int j = 0; j < i; ++j) {
+        const double weight = method->a[i][j];
+        msfp_add_columns(&Q[0][0], &s->v[j][0][0], h * weight, NB * NQ);
+        msfp_add_columns(&V[0][0], &s->a[j][0][0], h * weight, NB * NQ);
+        msfp_add_columns(&dat->f[0][0], &s->df[j][0][0], h * weight, 2 * NB);
+        msfp_add_columns(dat->foot, s->foot[j], h * weight, 2);
+        if (msfp_any_column(group->h)) {
+            msfp_add_scaled(&Q[0][0], rates_v(run, j), group->h, weight, NB * NQ);
+            msfp_add_scaled(&V[0][0], rates_a(run, j), group->h, weight, NB * NQ);
+            msfp_add_scaled(&dat->f[0][0], &s->rates[j][0][0], group->h, weight, 2 * NB);
+            msfp_add_scaled(dat->foot, rates_foot(run, j), group->h, weight, 2);
+        }
+    }
+    for (int c = 0; c < C; ++c) {
+        dat->beta[c] = dat->foot_beta[c] = method->gamma * group->h[c];
+        dat->foot[0][c] += stage->beta * dat->foot[1][c] + dat->beta[c] * stage->at.foot[1];
+    }
+}
+
+/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. */
+MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
+                        msfp_point_columns *dat)
+{
+    const double beta = stage->beta;
+    for (int k = 0; k < NB; ++k) {
+        for (int d = 0; d < NQ; ++d)
+            for (int c = 0; c < C; ++c)
+                dat->q[k][d][c] = Q[k][d][c] + beta * dat->v[k][d][c] + dat->beta[c] * stage->at.v[k][d];
+        for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
+            for (int c = 0; c < C; ++c) {
+                const int d = unknown[i];
+                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) / beta;
+            }
+    }
+}
+
+/* Solve stage i for the columns of its rates, and evaluate it: group->point and group->work. */
+MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ])
+{
+    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage *stage = &trail->stage[i];
+    msfp_point_columns *dat = &group->point;
+    msfp_columns *x = group->work.residual;
+    memcpy(dat->v, group->now.v, sizeof dat->v); /* of a locked spin */
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < ND; ++d)
+            memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
+    for (int pass = 0; pass < 2; ++pass) {
+        stage_point(stage, Q, V, dat);
+        msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
+                               &trail->slopes[i], stage->g, &group->work);
+        if (pass)
+            break;
+        msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
+        for (int k = 0; k < NB; ++k)
+            for (int d = 0; d < ND; ++d)
+                msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
+    }
+}
+
+static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
+{
+    const msfp_tableau *method = msfp_tableau_of(run->options.method);
+    const msfp_trail *trail = &run->gradients->trail;
+    const double h = trail->stage[1].beta / method->gamma;
+    const msfp_state_columns *now = &group->now;
+    msfp_state_columns *next = &group->next;
+    msfp_point_columns *dat = &group->point;
+    msfp_columns Q[NB][NQ], V[NB][NQ], dt;
+    stage_columns s;
+    int node = 0;
+    memset(&s, 0, sizeof s);
+    memcpy(s.v[0], now->v, sizeof s.v[0]);
+    memcpy(s.a[0], now->a, sizeof s.a[0]);
+    memcpy(s.df[0], now->df, sizeof s.df[0]);
+    memcpy(s.foot[0], now->foot + MSFP_FOOT_Y1, sizeof s.foot[0]);
+    memcpy(s.rates[0], run->now.df, sizeof s.rates[0]);
+    memset(dat, 0, sizeof *dat);
+    for (int i = 1; i < method->stages; ++i) {
+        msfp_friction_rates(&trail->work[i], s.rates[i]);
+        prepare(run, group, &s, method, i, h, Q, V, dat);
+        for (int c = 0; c < C; ++c)
+            dt[c] = now->t[c] + method->c[i] * group->h[c];
+        msfp_inputs_columns(run, group, run->now.t + method->c[i] * h, dt, dat);
+        solve_stage(run, group, i, Q, V);
+        memcpy(s.v[i], dat->v, sizeof s.v[i]);
+        memcpy(s.a[i], dat->a, sizeof s.a[i]);
+        memcpy(s.foot[i], group->work.foot + MSFP_FOOT_Y1 * C, sizeof s.foot[i]);
+        msfp_friction_columns(&group->work, s.df[i], next->f);
+        memcpy(next->q, dat->q, sizeof next->q);
+        memcpy(next->v, dat->v, sizeof next->v);
+        memcpy(next->a, dat->a, sizeof next->a);
+        memcpy(next->df, s.df[i], sizeof next->df);
+        memcpy(next->foot, group->work.foot, sizeof next->foot);
+        if (node < run->node_count && i == method->nodes[node])
+            group->node[node++] = *next;
+    }
+}
+
+#if MSFP_CLOSED_FORM
+enum { ANGLE = 1 };
+
+/* A quasi-static step: the parabola through the last two states, at whose end forces balance (quasistatic.c). */
+static MSFP_WIDE void quasistatic_step(msfp_run *run, msfp_group *group)
+{
+    const msfp_stage *stage = &run->gradients->trail.stage[1];
+    const msfp_state_columns *now = &group->now;
+    msfp_state_columns *next = &group->next;
+    msfp_point_columns *dat = &group->point;
+    msfp_columns Q[NB][NQ], V[NB][NQ] = { 0 };
+    const double h = run->next.t - run->now.t, last = run->step_history.h, r = last > 0.0 ? h / last : 0.0;
+    memset(dat, 0, sizeof *dat);
+    memcpy(Q, now->q, sizeof Q);
+    for (int k = 0; k < NB; ++k)
+        for (int c = 0; c < C; ++c) {
+            const double q = now->q[k][ANGLE][c];
+            Q[k][ANGLE][c] = q + r * r / (1.0 + 2.0 * r) * (q - group->before[k][c]);
+            dat->turn[k][c] = Q[k][ANGLE][c] - q;
+            dat->f[k][0][c] = now->f[k][0][c];
+            group->before[k][c] = q;
+        }
+    memcpy(dat->foot, now->foot, sizeof dat->foot);
+    msfp_inputs_columns(run, group, run->next.t, now->t, dat);
+    solve_stage(run, group, 1, Q, V);
+    *next = *now;
+    memcpy(next->q, dat->q, sizeof next->q);
+    memcpy(next->v, dat->v, sizeof next->v);
+    msfp_friction_columns(&group->work, next->df, next->f);
+    for (int k = 0; k < NB; ++k)
+        for (int c = 0; c < C; ++c)
+            next->a[k][ANGLE][c] =
+                2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
+}
+#endif
+
+void msfp_step_columns(msfp_run *run, msfp_group *group)
+{
+#if MSFP_CLOSED_FORM
+    if (msfp_is_quasistatic(run)) {
+        quasistatic_step(run, group);
+        return;
+    }
+#endif
+    implicit_step(run, group);
+}
+#endif

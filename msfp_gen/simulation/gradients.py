@@ -1,0 +1,108 @@
+"""Gradients of a run: which runs have them, and what the compiled run computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.note import Note
+from msfp_gen.scene.effect_selection import slider_period
+from msfp_gen.scene.parameters import Parameter, parameters_of
+from msfp_gen.scene.top import is_sprung
+from msfp_gen.simulation.settling import needs_settling
+from msfp_gen.specification.layout import ModelSpec
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.segment import Segment
+    from msfp_gen.specification.layout import Effects
+
+ADVICE = "leave out the gradients"
+RESOLVED_SHARE = 0.5  # of the period of a stuck slider: shorter mean steps resolve its ringing
+DAMPING = "give contact_damping = 1e-4 to the surfaces"
+RINGING = (
+    "the run resolves the undamped ringing of stuck sliders, so that the response is chaotic and has no derivative; "
+    f"{DAMPING}, or longer steps (a larger solver.rtol)"
+)
+UNDAMPED = f"surface {{surface}} has no contact damping, and ringing of its slider disturbs the gradients; {DAMPING}"
+
+
+class RunParts(Protocol):
+    """What is needed of a run that has ended: its scene, parameters and segments."""
+
+    given: Scene
+    parameters: tuple[Parameter, ...]
+    segments: list[Segment]
+
+
+def gradient_parameters(
+    scene: Scene, paths: Sequence[str], checkpoint: object = None, stream: object = None
+) -> tuple[Parameter, ...]:
+    """The parameters at some paths. Raises InputError for an unknown one, and for a run that has no gradients."""
+    parameters = parameters_of(scene, paths)
+    if not parameters:
+        return ()
+    if scene.solver.method == "dopri5":
+        raise InputError(
+            "solver.method = 'dopri5': gradients differentiate implicit steps; give 'implicit' or 'esdirk4', or "
+            + ADVICE
+        )
+    if scene.stop is not None:
+        raise InputError(f"stop: gradients need a run of fixed duration; give a duration instead, or {ADVICE}")
+    if needs_settling(scene):
+        raise InputError(
+            "motion.rotation: the initial state of tilted plates depends on the parameters; give an initial_state, or "
+            + ADVICE
+        )
+    if checkpoint is not None:
+        raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")
+    if stream is not None:
+        raise InputError(f"stream = {str(stream)!r}: gradients are kept in memory; leave out one of them")
+    ModelSpec(scene.bearing.layout, scene.modelled, gradients=True)  # checks the effects
+    return parameters
+
+
+def switching_error(segment: Segment, notes: Sequence[Note]) -> InputError:
+    """The error of a run with gradients that would continue with other effects. notes: of the segment."""
+    action = next((note.action for note in notes if note.action), "other effects")
+    return InputError(
+        f"effects: at {segment.run.time:.6g} s the run continues with {action}, and gradients need one model for the "
+        f"whole run; give these effects in the scene, or {ADVICE}"
+    )
+
+
+def run_gradients(sequence: RunParts, rows: int) -> Gradients | None:
+    """The derivatives that a run computed; None without parameters. rows: number of its rows that are kept.
+
+    Raises InputError where undamped ringing was resolved: the response is chaotic, and a derivative has no meaning.
+    """
+    if not sequence.parameters:
+        return None
+    scene, segment = sequence.given, sequence.segments[-1]
+    azimuth, sprung = segment.azimuth, is_sprung(scene.top)
+    found = Gradients.of_run(sequence.parameters, segment.model, segment.run, rows, azimuth, sprung)
+    steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, segment.model.effects)
+    resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
+    for parameter, size in zip(found.parameters, found.largest_numbers(), strict=True):
+        if resolved or not np.isfinite(size):
+            raise InputError(f"gradients = {parameter.path!r}: {RINGING}")
+    return found
+
+
+def undamped_surfaces(scene: Scene, effects: Effects) -> list[int]:
+    """Surfaces (1..n-1) whose slider rings undamped while it is stuck."""
+    if effects.sliders == "massless":
+        return []
+    return [i for i, surface in enumerate(scene.bearing.surfaces, 1) if surface.contact_damping == 0]
+
+
+def gradient_notes(sequence: RunParts) -> tuple[Note, ...]:
+    """A note where sliders of a run with gradients ring undamped."""
+    if not sequence.parameters:
+        return ()
+    found = undamped_surfaces(sequence.given, sequence.segments[-1].model.effects)[:1]
+    return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in found)

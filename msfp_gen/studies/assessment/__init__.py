@@ -1,0 +1,1 @@
+"""Evaluation of studies: IDA curves, fragility, sensitivity, Pareto fronts, with figures (docs/studies.md)."""

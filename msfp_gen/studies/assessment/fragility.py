@@ -1,0 +1,299 @@
+"""Fragility: the probability that a demand exceeds a threshold, by intensity, as a lognormal distribution.
+
+The maximum likelihood estimate of J. W. Baker, "Efficient analytical fragility function fitting using dynamic
+structural analysis", Earthquake Spectra 31 (2015), 579-599: stripes, IDA runs and single runs alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.studies.assessment.probit import Fit, fitted
+from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
+
+EARLY = {
+    "leave-out": "left out, and counted",
+    "exceed": "count as runs above the threshold",
+    "refuse": "an error",
+}
+LEAST_BOOTSTRAPS = 100
+POINTS = 200  # of a curve that is written
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class DamageState:
+    """The fragility of one damage state.
+
+    Attributes:
+        threshold: of the demand [its unit].
+        median: intensity at which the probability is one half.
+        dispersion: standard deviation of the logarithm of the intensity.
+        median_interval, dispersion_interval: their confidence intervals.
+        runs, exceeded: numbers of runs that were used, and of those above the threshold.
+        left_out: runs that ended early below the threshold.
+        intensity, runs_at, exceeded_at: by intensity: its value and the numbers of runs.
+        fit: the underlying fit, for curves and bands.
+        samples: pairs (intercept, slope) of the bootstrap, ndarray, shape (bootstraps, 2); None without it.
+        level: of confidence.
+        case: value of the column `by`; "" without it.
+    """
+
+    threshold: float
+    median: float
+    dispersion: float
+    median_interval: Interval
+    dispersion_interval: Interval
+    runs: int
+    exceeded: int
+    left_out: int
+    intensity: Array
+    runs_at: Array
+    exceeded_at: Array
+    fit: Fit
+    samples: Array | None
+    level: float
+    case: str = ""
+
+    def probability(self, intensity: Array) -> Array:
+        """Probability of exceedance, ndarray of the shape of `intensity`."""
+        return self.fit.probability(np.log(intensity))
+
+    def band(self, intensity: Array) -> tuple[Array, Array]:
+        """Lower and upper bound of the probability at each intensity, each at `level` of confidence."""
+        if self.samples is None:
+            return self.fit.band(np.log(intensity), self.level)
+        from scipy.special import ndtr
+
+        curves = ndtr(self.samples[:, :1] + self.samples[:, 1:] * np.log(intensity))
+        low, high = np.quantile(curves, [(1 - self.level) / 2, (1 + self.level) / 2], axis=0)
+        return low, high
+
+
+@dataclass(frozen=True)
+class Fragility:
+    """Result of `fragility`: names and units of the columns, and the damage states by rising threshold."""
+
+    measure: str
+    demand: str
+    measure_unit: str
+    unit: str
+    states: tuple[DamageState, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        names = [
+            "case", "threshold", "median", "dispersion", "median_interval", "dispersion_interval", "runs", "exceeded",
+            "left_out", "level",
+        ]  # fmt: skip
+        states = [{name: asdict(state)[name] for name in names} for state in self.states]
+        return {
+            "measure": self.measure,
+            "demand": self.demand,
+            "measure_unit": self.measure_unit,
+            "unit": self.unit,
+            "states": states,
+        }
+
+
+def fragility(
+    rows: Any,
+    measure: str,
+    demand: str,
+    thresholds: Sequence[float],
+    *,
+    early: str = "leave-out",
+    level: float = 0.95,
+    bootstrap: int = 0,
+    cluster: str = "record",
+    seed: int = 0,
+    by: str | None = None,
+) -> Fragility:
+    """Fragility curves by maximum likelihood, one for each threshold of the demand.
+
+    A run exceeds a threshold where its demand is not below it. A run that ended early has a demand of at least what it
+    reached: it exceeds the thresholds that it reached, and `early` says what it is for the others.
+
+    Parameters
+    ----------
+    rows
+        DataFrame of `read_study`, or a part of it.
+    measure, demand
+        Columns of the intensity measure, such as `scale`, and of the demand.
+    thresholds
+        Damage states.
+    early
+        "leave-out", "exceed" or "refuse".
+    level
+        Of confidence of intervals and bands.
+    bootstrap
+        Number of bootstrap samples; 0: intervals from the Fisher information, which takes all runs for independent.
+    cluster
+        Column whose values are drawn as a whole by the bootstrap: the runs of one record depend on each other.
+    seed
+        Of the bootstrap.
+    by
+        Column for each of whose values the curves are fitted apart, such as `bounds`.
+
+    Raises
+    ------
+    InputError
+        Unknown columns, or runs that determine no curve: none or all exceed, or the two kinds do not overlap.
+
+    """
+    if not thresholds or len(set(thresholds)) < len(thresholds):
+        raise InputError(f"thresholds = {list(thresholds)}: give one or more different values of {demand}")
+    if not 0 < level < 1:
+        raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
+    if early not in EARLY:
+        raise InputError(f"early = {early!r}: give one of {', '.join(map(repr, EARLY))}")
+    states: list[DamageState] = []
+    for case, chosen in _cases(rows, by):
+        x, y, ended = intensities(chosen, measure), demands(chosen, demand), complete(chosen)
+        groups = _groups(chosen, cluster, bootstrap)
+        for threshold in sorted(thresholds):
+            exceeded, known = _exceedance(y, ended, threshold, early, demand)
+            drawn = None if groups is None else (groups[known], bootstrap, seed)
+            where = f"threshold {threshold:g} of {demand}" + (f", {by} = {case}" if by else "")
+            state = _state(x[known], exceeded[known], threshold, int((~known).sum()), level, drawn, where)
+            states.append(replace(state, case=case))
+    return Fragility(measure, demand, unit_of(rows, measure), unit_of(rows, demand), tuple(states))
+
+
+def _cases(rows: Any, by: str | None) -> list[tuple[str, Any]]:
+    """Each value of a column, in the order in which they occur, and its rows; all rows without a column."""
+    if by is None:
+        return [("", rows)]
+    if by not in rows.columns:
+        raise unknown_column(by, list(rows.columns))
+    return [(str(value), rows[rows[by] == value]) for value in rows[by].unique()]
+
+
+def _groups(rows: Any, cluster: str, bootstrap: int) -> Any:
+    """The number of the cluster of each run; None without a bootstrap."""
+    import pandas as pd
+
+    if not bootstrap:
+        return None
+    if bootstrap < LEAST_BOOTSTRAPS:
+        raise InputError(f"bootstrap = {bootstrap}: give at least {LEAST_BOOTSTRAPS} samples, or 0")
+    if cluster not in rows.columns:
+        raise unknown_column(cluster, list(rows.columns))
+    groups = pd.factorize(rows[cluster])[0]
+    if groups.max(initial=0) < 1:
+        raise InputError(f"cluster = {cluster!r}: all runs have the same; give another column")
+    return groups
+
+
+def _exceedance(y: Array, ended: Any, threshold: float, early: str, demand: str) -> tuple[Any, Any]:
+    """Whether each run exceeds, and whether that is known."""
+    exceeded = y >= threshold
+    unknown = ~ended & ~exceeded
+    if early == "refuse" and unknown.any():
+        raise InputError(
+            f"{int(unknown.sum())} runs ended early below {demand} = {threshold:g}; see their status and message, and "
+            "give early = 'leave-out' or 'exceed'"
+        )
+    if early == "exceed":
+        return exceeded | unknown, np.ones_like(unknown)
+    return exceeded, ~unknown
+
+
+def _state(
+    x: Array, exceeded: Any, threshold: float, left_out: int, level: float, drawn: Any, where: str
+) -> DamageState:
+    from scipy.special import ndtri
+
+    log_levels, place = np.unique(np.log(x), return_inverse=True)
+    runs = np.asarray(np.bincount(place), dtype=float)
+    over = np.asarray(np.bincount(place, weights=exceeded), dtype=float)
+    fit = fitted(log_levels, runs, over, where)
+    z = float(ndtri((1 + level) / 2))
+    samples = None if drawn is None else _bootstrap(log_levels, place, exceeded, fit, *drawn)
+    if samples is None:
+        error_median, error_dispersion = fit.errors()
+        median_interval = _spread(fit.median, z * error_median)
+        dispersion_interval = _spread(fit.dispersion, z * error_dispersion)
+    else:
+        ends = [(1 - level) / 2, (1 + level) / 2]
+        median_interval = _pair(np.quantile(np.exp(-samples[:, 0] / samples[:, 1]), ends))
+        dispersion_interval = _pair(np.quantile(1 / samples[:, 1], ends))
+    return DamageState(
+        threshold, fit.median, fit.dispersion, median_interval, dispersion_interval, len(x), int(over.sum()), left_out,
+        np.exp(log_levels), runs, over, fit, samples, level,
+    )  # fmt: skip
+
+
+def _spread(value: float, log_error: float) -> Interval:
+    return float(value * np.exp(-log_error)), float(value * np.exp(log_error))
+
+
+def _pair(values: Array) -> Interval:
+    return float(values[0]), float(values[1])
+
+
+def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, count: int, seed: int) -> Array:
+    """Fits to clusters drawn with replacement; draws that determine no curve are drawn again."""
+    clusters, group = np.unique(groups, return_inverse=True)
+    shape = (len(clusters), len(levels))
+    runs, over = np.zeros(shape), np.zeros(shape)
+    np.add.at(runs, (group, place), 1)
+    np.add.at(over, (group, place), exceeded)
+    rng, failed = np.random.default_rng(seed), 0
+    found: list[Array] = []
+    while len(found) < count:
+        times = np.bincount(rng.integers(len(clusters), size=len(clusters)), minlength=len(clusters))
+        try:
+            found.append(fitted(levels, times @ runs, times @ over, "bootstrap", fit).coefficients)
+        except InputError:
+            failed += 1
+            if failed > 10 * count:
+                raise InputError("bootstrap: most draws of clusters determine no curve; give more records") from None
+    return np.array(found)
+
+
+def fragility_frame(found: Fragility) -> Any:
+    """Points of the curves with their bands, as a DataFrame: case, threshold, intensity, probability, low, high."""
+    import pandas as pd
+
+    frames = []
+    for state in found.states:
+        x = np.geomspace(state.intensity.min(), state.intensity.max(), POINTS)
+        low, high = state.band(x)
+        columns = {
+            "case": state.case,
+            "threshold": state.threshold,
+            found.measure: x,
+            "probability": state.probability(x),
+        }
+        frames.append(pd.DataFrame({**columns, "low": low, "high": high}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def fragility_table(found: Fragility) -> Table:
+    """The damage states for a terminal."""
+    unit = f" [{found.unit}]" if found.unit else ""
+    columns = (f"{found.demand}{unit}", "median", "interval", "dispersion", "interval", "runs", "exceeded", "left out")
+    rows = [
+        (
+            f"{state.case} {state.threshold:g}".strip(),
+            f"{state.median:.4g}",
+            "{:.4g} to {:.4g}".format(*state.median_interval),
+            f"{state.dispersion:.3g}",
+            "{:.3g} to {:.3g}".format(*state.dispersion_interval),
+            str(state.runs),
+            str(state.exceeded),
+            str(state.left_out),
+        )
+        for state in found.states
+    ]
+    level = f"{100 * found.states[0].level:g} %"
+    measure = f" [{found.measure_unit}]" if found.measure_unit else ""
+    return Table(f"fragility by {found.measure}{measure}, lognormal, intervals of {level}", columns, rows)

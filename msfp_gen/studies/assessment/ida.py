@@ -1,0 +1,138 @@
+"""Incremental dynamic analysis: curves of demand over intensity, and their fractiles (Vamvatsikos and Cornell 2002)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
+from msfp_gen.studies.study.recipe import INTENSITY
+
+FRACTILES = (0.16, 0.5, 0.84)
+POINTS = 50  # of the fractiles of curves with different intensities
+SCALE = "scale"  # the axis by which [records] scales them
+Curve = tuple[Array, Array, Any]  # intensities, demands, and which runs reached their end
+
+
+@dataclass(frozen=True)
+class Ida:
+    """Result of `ida`.
+
+    Attributes:
+        measure, demand: names of the columns.
+        measure_unit, unit: of intensity and demand.
+        curves: DataFrame with one row for each run, sorted: the column `curve`, the measure, the demand, and `ended`,
+            false where the run ended early, so that its demand is a lower bound.
+        fractiles: DataFrame with a row for each intensity: the measure, `curves`, `ended_early`, and a column for each
+            fractile, such as `p50`; infinite where so many runs ended early that the fractile lies among them.
+    """
+
+    measure: str
+    demand: str
+    measure_unit: str
+    unit: str
+    curves: Any
+    fractiles: Any
+
+
+def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACTILES) -> Ida:
+    """IDA curves, and the fractiles of the demand at each intensity.
+
+    A curve is made of the runs that differ in their intensity only: one for each record, sample and bound. A run that
+    ended early counts as a demand above all others, and so does a larger intensity of its curve. The fractile of share
+    p of n curves is the smallest demand that at least p n of them do not exceed. Where the curves have different
+    intensities, such as spectral accelerations, their demands are interpolated, from zero at zero.
+
+    Parameters
+    ----------
+    rows
+        DataFrame of `read_study`, or a part of it.
+    measure
+        Column of the intensity measure, such as `scale` or `intensity`.
+    demand
+        Column of the demand, such as `peak_displacement`.
+    fractiles
+        Shares between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        Unknown columns, intensities that are not positive, curves of a single intensity, or invalid fractiles.
+
+    """
+    import pandas as pd
+
+    if not fractiles or not all(0 < share < 1 for share in fractiles):
+        raise InputError(f"fractiles = {list(fractiles)}: give shares between 0 and 1, such as 0.16")
+    columns = {measure: intensities(rows, measure), demand: demands(rows, demand), "ended": complete(rows)}
+    curves = pd.DataFrame({"curve": _curve_numbers(rows, measure), **columns})
+    curves = curves.sort_values(["curve", measure], ignore_index=True)
+    sizes = curves.groupby("curve")[measure].nunique()
+    if sizes.min() < 2:
+        raise InputError(f"{measure}: an IDA needs several intensities of each record; curve {sizes.idxmin()} has one")
+    each = [(c[measure].to_numpy(), c[demand].to_numpy(), c["ended"].to_numpy()) for _, c in curves.groupby("curve")]
+    levels = _levels(each)
+    values = np.sort([_interpolated(levels, *curve) for curve in each], axis=0)
+    table = {measure: levels, "curves": len(each), "ended_early": np.isinf(values).sum(axis=0)}
+    for share in fractiles:
+        # The share of a number of curves may miss a whole number by roundoff.
+        table[f"p{100 * share:g}"] = values[max(ceil(share * len(each) - 1e-9), 1) - 1]
+    return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), curves, pd.DataFrame(table))
+
+
+def _levels(curves: list[Curve]) -> Array:
+    """The intensities that all curves have, or a grid up to where all of them are known."""
+    first = np.unique(curves[0][0])
+    if all(np.array_equal(np.unique(x), first) for x, _, _ in curves):
+        return first
+    limit = min((x[-1] for x, _, ended in curves if ended.all()), default=max(x[-1] for x, _, _ in curves))
+    return np.linspace(0, limit, POINTS + 1)[1:]
+
+
+def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
+    """The demand of a curve at each level, linear between its runs; infinite beyond the last before one ended early."""
+    beyond = x[~ended].min(initial=np.inf)
+    known = ended & (x < beyond)
+    found = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
+    last = x[known].max(initial=0.0)
+    return np.where((levels > last) & np.isfinite(beyond), np.inf, found)
+
+
+def _curve_numbers(rows: Any, measure: str) -> Any:
+    """The number of the curve of each run, from 1: runs that have all axes but the intensity in common."""
+    import pandas as pd
+
+    changing = {measure, SCALE} if measure == INTENSITY else {measure}
+    others = [name for name in axes_of(rows) if name not in changing]
+    if not others:
+        return np.ones(len(rows), dtype=int)
+    return pd.MultiIndex.from_frame(rows[others]).factorize()[0] + 1
+
+
+def axes_of(rows: Any) -> list[str]:
+    """The columns of the axes: those between `run` and `status`. Raises InputError where these are not there."""
+    names = list(rows.columns)
+    for name in ("run", "status"):
+        if name not in names:
+            raise unknown_column(name, names)
+    return names[names.index("run") + 1 : names.index("status")]
+
+
+def ida_table(found: Ida) -> Table:
+    """The fractiles for a terminal."""
+    shares = [name for name in found.fractiles.columns if name.startswith("p")]
+    rows = [
+        [f"{row[found.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
+        + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in shares]
+        for _, row in found.fractiles.iterrows()
+    ]
+    unit = f" [{found.unit}]" if found.unit else ""
+    title = f"fractiles of {found.demand}{unit} by {found.measure}"
+    return Table(title, (found.measure, "curves", "ended early", *shares), rows)

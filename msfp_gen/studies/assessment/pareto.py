@@ -1,0 +1,240 @@
+"""Search for designs: the Pareto front of quantities over the random axes of a study, by NSGA-II of pymoo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.studies.assessment.rows import complete, numbers, read_study, unknown_column, write_frame
+from msfp_gen.studies.assessment.samples import STATISTICS
+from msfp_gen.studies.study.definition import Study
+from msfp_gen.studies.study.engines import Engine, engine_from, require
+from msfp_gen.studies.study.loader import load_study
+from msfp_gen.studies.study.run import run_on
+from msfp_gen.studies.study.sampling import Sampling
+
+LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
+DESIGNS = "designs.parquet"
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Goals:
+    """What a search is for.
+
+    Attributes:
+        minimise, maximise: quantities of the study.
+        at_most: quantity -> the largest value that a design may have.
+        statistic: of a quantity over the runs of a design: a key of STATISTICS.
+    """
+
+    minimise: tuple[str, ...]
+    maximise: tuple[str, ...] = ()
+    at_most: Mapping[str, float] | None = None
+    statistic: str = "max"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The objectives."""
+        return (*self.minimise, *self.maximise)
+
+    @property
+    def signs(self) -> Array:
+        """1 for an objective to be minimised, -1 for one to be maximised."""
+        return np.array([1.0] * len(self.minimise) + [-1.0] * len(self.maximise))
+
+
+@dataclass(frozen=True)
+class Front:
+    """Result of `pareto`.
+
+    Attributes:
+        goals: as given.
+        units: column -> unit.
+        designs: DataFrame with one row for each design: `generation`, the axes, the statistics of objectives and
+            limits, `feasible`, and `front`, true for feasible designs that no other one dominates.
+    """
+
+    goals: Goals
+    units: dict[str, str]
+    designs: Any
+
+
+def pareto(
+    source: str | Path | Mapping[str, Any],
+    output: str | Path,
+    goals: Goals,
+    *,
+    population: int = 32,
+    generations: int = 20,
+    seed: int = 0,
+    progress: Progress | None = None,
+    **engine: Any,
+) -> Front:
+    """Search the random axes of a study for the Pareto front of its quantities.
+
+    Each generation is a study of its own in `output`, so that the same call continues a search that was interrupted.
+    A design with a run that ended early is not feasible.
+
+    Parameters
+    ----------
+    source
+        A study file, or a table; its random axes are the design variables, its other axes, such as records, the runs of
+        each design. `[sampling]` is not used.
+    output
+        Folder of the search: `designs.parquet`, and a folder for each generation.
+    goals
+        Objectives and limits.
+    population, generations, seed
+        Of NSGA-II; designs are population x generations.
+    progress
+        Called with the generations that are done, and all.
+    engine
+        `workers`, `threads`, `executor`, `dask` or `mpi`, as of `study`.
+
+    Raises
+    ------
+    InputError
+        Invalid input; nothing was computed.
+    RunError
+        Workers died; the same call continues.
+
+    """
+    require("pymoo", "pymoo", "a Pareto search")
+    require("pyarrow", "parquet", "a Pareto search")
+    study = _search_study(source)
+    _check(study, goals, population, generations)
+    folder = Path(output)
+    with engine_from(**engine) as started:
+        search = _search(study, goals, population, generations, seed)
+        number, shares = next(search)
+        found = [_evaluated(study, number, shares, goals, started, folder)]
+        while number < generations:
+            if progress is not None:
+                progress(number, generations)
+            number, shares = search.send(_objectives(found[-1], goals))
+            found.append(_evaluated(study, number, shares, goals, started, folder))
+    return _front(found, goals, folder)
+
+
+def _search_study(source: str | Path | Mapping[str, Any]) -> Study:
+    """The study with one design, at the medians of the axes."""
+    if not isinstance(source, Mapping):
+        found = load_study(source, design=True)
+    else:
+        found = load_study(dict(source), design=True)
+    if not any(axis.random for axis in found.axes):
+        raise InputError(
+            "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
+        )
+    return found
+
+
+def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
+    """Raise InputError for goals that the study does not have."""
+    known = [column.name for column in study.keep.columns() if not column.text]
+    if len(goals.names) < 2 or len(set(goals.names)) < len(goals.names):
+        raise InputError("pareto: give two or more different quantities to minimise or maximise")
+    for name in (*goals.names, *(goals.at_most or {})):
+        if name not in known:
+            raise unknown_column(name, known)
+    if goals.statistic not in STATISTICS:
+        raise InputError(f"statistic = {goals.statistic!r}: give one of {', '.join(STATISTICS)}")
+    for word, value, least in (("population", population, 4), ("generations", generations, 1)):
+        if value < least:
+            raise InputError(f"{word} = {value}: give {least} or more")
+
+
+def _search(
+    study: Study, goals: Goals, population: int, generations: int, seed: int
+) -> Generator[tuple[int, Array], tuple[Array, Array], None]:
+    """Yields the number of a generation and its shares of the distributions; is sent objectives and limits."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.evaluator import Evaluator
+    from pymoo.core.problem import Problem
+    from pymoo.problems.static import StaticProblem
+
+    count = sum(axis.random for axis in study.axes)
+    limits = 1 + len(goals.at_most or {})
+    problem = Problem(n_var=count, n_obj=len(goals.names), n_ieq_constr=limits, xl=0.0, xu=1.0)
+    algorithm = NSGA2(pop_size=population)
+    algorithm.setup(problem, termination=("n_gen", generations), seed=seed, verbose=False)
+    for number in range(1, generations + 1):
+        asked = algorithm.ask()
+        objectives, violated = yield number, np.asarray(asked.get("X"), dtype=float)
+        Evaluator().eval(StaticProblem(problem, F=objectives, G=violated), asked)
+        algorithm.tell(infills=asked)
+
+
+def _evaluated(study: Study, number: int, shares: Array, goals: Goals, engine: Engine, folder: Path) -> Any:
+    """The designs of a generation with their statistics, as a DataFrame."""
+    import pandas as pd
+
+    drawn = [axis.distribution for axis in study.axes if axis.distribution is not None]
+    clipped = np.clip(shares, 2.0**-53, 1 - 2.0**-53)
+    values = np.column_stack([each.values(clipped[:, index]) for index, each in enumerate(drawn)])
+    sampling = Sampling("listed", values=tuple(map(tuple, values.tolist())))
+    table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
+    place = folder / f"generation-{number:03d}"
+    run_on(engine, replace(study, sampling=sampling, table=table), place)
+    wanted = list(dict.fromkeys((*goals.names, *(goals.at_most or {}))))
+    rows = read_study(place, wanted)
+    axes = [axis.name for axis in study.axes if axis.random]
+    shape = (-1, len(values))
+    reduce = STATISTICS[goals.statistic]
+    statistics = {name: reduce(numbers(rows, name).reshape(shape), axis=0) for name in wanted}
+    feasible = complete(rows).reshape(shape).all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
+    for name, bound in (goals.at_most or {}).items():
+        feasible &= statistics[name] <= bound
+    found = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
+    found["ended"] = complete(rows).reshape(shape).mean(axis=0)
+    found["feasible"] = feasible
+    found.attrs["units"] = rows.attrs["units"]
+    return found
+
+
+def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
+    """Objectives to be minimised, and limits that are violated above zero, of the designs of a generation."""
+    values = designs[list(goals.names)].to_numpy() * goals.signs
+    unknown = (designs.ended < 1).to_numpy() | np.isnan(values).any(axis=1)
+    violated = [1.0 - designs.ended.to_numpy()]
+    for name, bound in (goals.at_most or {}).items():
+        excess = (designs[name].to_numpy() - bound) / (abs(bound) or 1.0)
+        violated.append(np.where(np.isnan(excess), LARGEST, excess))
+    return np.where(unknown[:, None], LARGEST, values), np.column_stack(violated)
+
+
+def _front(found: Sequence[Any], goals: Goals, folder: Path) -> Front:
+    import pandas as pd
+
+    designs = pd.concat([each.drop(columns="ended") for each in found], ignore_index=True)
+    designs["front"] = designs.feasible.to_numpy() & not_dominated(
+        np.where(designs.feasible.to_numpy()[:, None], designs[list(goals.names)].to_numpy() * goals.signs, np.inf)
+    )
+    write_frame(designs, folder / DESIGNS)
+    return Front(goals, dict(found[0].attrs["units"]), designs)
+
+
+def not_dominated(values: Array) -> Any:
+    """Of each row whether no other is at most equal in all columns and less in one, ndarray of bool."""
+    better = np.zeros(len(values), dtype=bool)
+    for index, row in enumerate(values):
+        better[index] = ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()
+    return ~better
+
+
+def front_table(found: Front) -> Table:
+    """The front for a terminal, sorted by its first objective."""
+    chosen = found.designs[found.designs.front].sort_values(found.goals.names[0])
+    columns = [name for name in chosen.columns if name not in ("generation", "feasible", "front")]
+    rows = [[f"{value:.4g}" for value in row] for row in chosen[columns].to_numpy()]
+    count, feasible = len(found.designs), int(found.designs.feasible.sum())
+    title = f"{len(chosen)} designs on the Pareto front, of {feasible} feasible ones among {count}"
+    return Table(title, columns, rows)

@@ -1,0 +1,126 @@
+"""The rows of a study as a table of pandas, and the columns that evaluations take from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import check_output, replacing
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.studies.study.chunks import parts_in, study_table
+from msfp_gen.studies.study.engines import require
+
+COMPLETE = "ok"  # the status of a run that reached its end
+
+
+def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
+    """The rows of a study as a pandas.DataFrame, sorted by run; those that are not computed yet are not in it.
+
+    columns: only these, and `run` and `status`; None: all. Units are in `DataFrame.attrs["units"]`. Raises InputError:
+    no study there, no rows yet, or an unknown column.
+    """
+    require("pyarrow", "parquet", "reading a study")
+    import pyarrow.dataset as ds
+
+    folder = Path(folder)
+    study_table(folder)
+    parts = [str(folder / name) for name in sorted(parts_in(folder))]
+    if not parts:
+        raise InputError(f"{str(folder)!r}: the study has no rows yet; run it")
+    found = ds.dataset(parts, format="parquet")
+    for name in columns or ():
+        if name not in found.schema.names:
+            raise unknown_column(name, found.schema.names)
+    wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
+    rows = found.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
+    rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in found.schema}
+    return rows
+
+
+def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
+    """The rows in which columns have the values of all conditions, such as `bounds=upper`. Raises InputError."""
+    for text in conditions:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"{text!r}: give a column and a value, such as bounds=upper")
+        if name not in rows.columns:
+            raise unknown_column(name, list(rows.columns))
+        column = rows[name]
+        if column.dtype.kind == "f":
+            try:
+                found = np.isclose(column, float(value), rtol=1e-9, atol=0.0)
+            except ValueError:
+                raise InputError(f"{text!r}: {name} holds numbers; give one") from None
+        else:
+            found = np.asarray(column.astype(str) == value)
+        if not found.any():
+            raise InputError(f"{text!r}: no run has this value")
+        rows = rows[found]
+    return rows.reset_index(drop=True)
+
+
+def write_frame(frame: Any, path: str | Path, name: str = "output") -> Path:
+    """Write a DataFrame as CSV or Parquet, by the suffix, completely or not at all. Raises InputError."""
+    target = check_output(path, (".csv", ".parquet"), name)
+    with replacing(target) as temporary:
+        if target.suffix.lower() == ".csv":
+            frame.to_csv(temporary, index=False)
+        else:
+            frame.to_parquet(temporary, index=False)
+    return target
+
+
+def unknown_column(name: str, known: Sequence[str]) -> InputError:
+    """The error about a column that a study does not have."""
+    hint = suggestion(name, list(known)) or f"; the columns are {', '.join(known)}"
+    return InputError(f"{name}: no column of this study{hint}")
+
+
+def numbers(rows: Any, name: str) -> Array:
+    """A column as floats, NaN where a run has no value. Raises InputError: no such column, or one of texts."""
+    if name not in rows.columns:
+        raise unknown_column(name, list(rows.columns))
+    try:
+        return np.asarray(rows[name], dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: this column holds texts; give one of numbers") from None
+
+
+def intensities(rows: Any, name: str) -> Array:
+    """A column of positive numbers: an intensity measure. Raises InputError."""
+    found = numbers(rows, name)
+    if not (found > 0).all():
+        raise InputError(f"{name}: an intensity measure is above 0 in every run; give another column")
+    return found
+
+
+def demands(rows: Any, name: str) -> Array:
+    """A column as demands: of runs that ended early a lower bound, zero where they have none.
+
+    Raises InputError where a run that reached its end has no value.
+    """
+    found, ended = numbers(rows, name), complete(rows)
+    if np.isnan(found[ended]).any():
+        count = int(np.isnan(found[ended]).sum())
+        raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")
+    return np.where(np.isnan(found), 0.0, found)
+
+
+def complete(rows: Any) -> Any:
+    """Whether each run reached its end, ndarray of bool."""
+    return np.asarray(rows["status"] == COMPLETE)
+
+
+def unit_of(rows: Any, name: str) -> str:
+    """The SI unit of a column, "" for a plain number."""
+    return str(rows.attrs.get("units", {}).get(name, ""))
+
+
+def labelled(name: str, unit: str) -> str:
+    """A label of an axis or a column: words, and the unit in brackets."""
+    return name.replace("_", " ") + (f" [{unit}]" if unit else "")

@@ -1,0 +1,155 @@
+"""The axes of a study: what each of them changes in the base scene, and its values."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.studies.study.sampling import Distribution, distribution_from, number_of
+
+Table = dict[str, Any]
+KEYS = ("sets", "multiplies", "factors", "surfaces", "values", "labels", "range", "points", "spacing", "distribution")
+RESERVED = ("run", "status", "message")
+SPACINGS = ("linear", "log")
+MOST_VALUES = 10_000  # of one axis; workers receive them all
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a study.
+
+    Attributes:
+        name: of its column in the table.
+        change: what a value does to the scene: "sets" fields, "multiplies" fields, selects the case of a table of
+            lambda "factors", selects a "record", scales it ("scale"), or nothing ("free").
+        paths: the fields, such as `bearing.friction`; for "factors" the table of factors.
+        surfaces: of these surfaces only (1..n-1); None: of all.
+        values: of a grid; None for a random axis.
+        labels: the values in the column of the table, all numbers or all texts.
+        distribution: of a random axis; None for a grid.
+    """
+
+    name: str
+    change: str
+    paths: tuple[str, ...] = ()
+    surfaces: tuple[int, ...] | None = None
+    values: tuple[Any, ...] | None = None
+    labels: tuple[Any, ...] = ()
+    distribution: Distribution | None = None
+
+    @property
+    def random(self) -> bool:
+        """Whether the values are drawn from a distribution."""
+        return self.distribution is not None
+
+    @property
+    def numeric(self) -> bool:
+        """Whether the column of the axis holds numbers."""
+        return self.random or all(isinstance(label, float) for label in self.labels)
+
+
+def axis_from(name: str, table: Any) -> Axis:
+    """The axis of a table `[axes.NAME]`. Raises InputError of one line that starts with `axes.NAME`."""
+    path = f"axes.{name}"
+    if not isinstance(table, Mapping):
+        raise InputError(f"{path} = {table!r}: give a table, such as sets = 'bearing.friction', values = [0.05, 0.08]")
+    if not re.fullmatch(r"[^\W\d]\w*", name) or name in RESERVED:
+        why = "the table has such a column" if name in RESERVED else "a name has letters, digits and _ only"
+        raise InputError(f"{path}: {why}; give another name")
+    try:
+        change, paths = _change(table)
+        axis = Axis(name, change, paths, _surfaces(table))
+        made, used = _with_values(axis, table)
+    except InputError as error:
+        raise InputError(f"{path}.{error}") from None
+    known = {*used, "sets", "multiplies", "factors", "surfaces"}
+    if extra := [key for key in table if key not in known]:
+        everything = {*KEYS, "between", "low", "mode", "high", "mean", "deviation", "median", "dispersion"}
+        if extra[0] in everything:
+            raise InputError(f"{path}.{extra[0]}: not together with {', '.join(sorted(used))}; leave one out")
+        hint = suggestion(extra[0], sorted(everything)) or f"; the keys here are {', '.join(KEYS)}"
+        raise InputError(f"{path}.{extra[0]}: unknown key{hint}")
+    return made
+
+
+def _change(table: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    given = [key for key in ("sets", "multiplies", "factors") if key in table]
+    if len(given) > 1:
+        raise InputError(f"{given[1]}: not together with {given[0]}; use one axis for each")
+    if not given:
+        return "free", ()
+    value = table[given[0]]
+    paths = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else ()
+    if not paths or not all(isinstance(each, str) and all(each.split(".")) for each in paths):
+        raise InputError(f"{given[0]} = {value!r}: give a field of the scene in quotes, such as 'bearing.friction'")
+    return given[0], paths
+
+
+def _surfaces(table: Mapping[str, Any]) -> tuple[int, ...] | None:
+    if "surfaces" not in table:
+        return None
+    value = table["surfaces"]
+    if not isinstance(value, list) or not value or not all(type(item) is int and item > 0 for item in value):
+        raise InputError(f"surfaces = {value!r}: give a list of surfaces, 1 for the lowest")
+    return tuple(value)
+
+
+def _with_values(axis: Axis, table: Mapping[str, Any]) -> tuple[Axis, set[str]]:
+    """The axis with its values or its distribution, and the keys of the table that give them."""
+    if "distribution" in table:
+        distribution, used = distribution_from(table)
+        return replace(axis, distribution=distribution), used
+    if axis.change == "factors":
+        return grid(axis, table.get("values", ["lower", "nominal", "upper"])), {"values"}
+    if "values" in table:
+        return grid(axis, table["values"], table.get("labels")), {"values", "labels"}
+    if "range" in table:
+        return grid(axis, _range(table)), {"range", "points", "spacing"}
+    raise InputError("values is missing: give values = [...], range = [low, high] with points, or a distribution")
+
+
+def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
+    """The axis with these values. Raises InputError."""
+    if not isinstance(values, list) or not values or len(values) > MOST_VALUES:
+        raise InputError(f"values = {_short(values)}: give a list of 1 to {MOST_VALUES} values")
+    if len({json.dumps(value, default=str) for value in values}) < len(values):
+        raise InputError(f"values = {_short(values)}: a value occurs twice; give each once")
+    if labels is not None and (not isinstance(labels, list) or len(labels) != len(values)):
+        raise InputError(f"labels = {_short(labels)}: give one for each of the {len(values)} values")
+    shown = [_label(value) for value in (values if labels is None else labels)]
+    if not all(isinstance(label, float) for label in shown):
+        shown = [
+            str(value) if isinstance(value, str | int | float) else json.dumps(value) for value in labels or values
+        ]
+    return replace(axis, values=tuple(values), labels=tuple(shown))
+
+
+def _range(table: Mapping[str, Any]) -> list[float]:
+    value, points, spacing = table["range"], table.get("points"), table.get("spacing", "linear")
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"range = {value!r}: give the first and the last value")
+    low, high = (number_of({"range": each}, "range") for each in value)
+    if type(points) is not int or not 2 <= points <= MOST_VALUES:
+        raise InputError(f"points = {points!r}: give a whole number of values, 2 or more")
+    if spacing not in SPACINGS or (spacing == "log" and not 0 < low < high):
+        raise InputError(f"spacing = {spacing!r}: give 'linear', or 'log' with a range above 0")
+    if not low < high:
+        raise InputError(f"range = {value!r}: give two numbers, the smaller first")
+    spaced = np.linspace(low, high, points) if spacing == "linear" else np.geomspace(low, high, points)
+    return [float(each) for each in spaced]
+
+
+def _label(value: Any) -> Any:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,221 @@
+"""`Study`: the definition of a study, checked, with the values of its axes for every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import prod
+from typing import Annotated, Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.loader import scene_from_table
+from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.effect_switching import check
+from msfp_gen.studies.study.axes import Axis
+from msfp_gen.studies.study.quantities import Keep
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, rule_of, surface_values
+from msfp_gen.studies.study.sampling import Sampling
+
+MOST_RUNS = 100_000_000
+TRIED = 1000  # values of one axis that are tried before the first run, at least
+PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
+LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a study.
+
+    run_seconds: wall time of one run, after which it ends with status `limit` [s]. failures: runs that may fail; with
+    more the study ends, which keeps what is done. None: no limit. Raises InputError.
+    """
+
+    run_seconds: Annotated[float | None, Quantity("s", above=0.0)] = None
+    failures: Annotated[int | None, Quantity("", least=0, whole=True)] = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, "limits")
+
+
+@dataclass(frozen=True)
+class Task:
+    """The runs of one chunk, as workers receive them.
+
+    Attributes:
+        number: of the chunk, from 0.
+        first: index of its first run, from 0.
+        codes: of each grid axis, ndarray, shape (runs,): the indices of its values.
+        drawn: values of the random axes, ndarray, shape (runs, random axes).
+    """
+
+    number: int
+    first: int
+    codes: tuple[np.ndarray[Any, np.dtype[np.intp]], ...]
+    drawn: Array
+
+    def __len__(self) -> int:
+        return len(self.drawn)
+
+    def rows(self, axes: Sequence[Axis]) -> list[tuple[tuple[Any, ...], tuple[Any, ...]]]:
+        """Of every run the values of the axes, and what the table shows for them."""
+        codes, drawn = iter(self.codes), iter(self.drawn.T)
+        values: list[Sequence[Any]] = []
+        labels: list[Sequence[Any]] = []
+        for axis in axes:
+            if axis.values is None:
+                values.append(next(drawn).tolist())
+                labels.append(values[-1])
+            else:
+                chosen = next(codes).tolist()
+                values.append([axis.values[code] for code in chosen])
+                labels.append([axis.labels[code] for code in chosen])
+        if not axes:
+            return [((), ())] * len(self)
+        return list(zip(zip(*values, strict=True), zip(*labels, strict=True), strict=True))
+
+
+@dataclass(frozen=True)
+class Study:
+    """The definition of a study.
+
+    Attributes:
+        name: a label.
+        recipe: base scene, axes and records.
+        sampling: how the random axes are drawn; None without random axes.
+        keep: the quantities of each run.
+        limits: of a run, and of the study.
+        given_chunk: runs of a chunk; None: from the number of runs.
+        table: the study as a plain table, complete: scene and records are in it.
+        contents: sha256 of every file that the scenes read, by its path.
+    """
+
+    name: str
+    recipe: Recipe
+    sampling: Sampling | None
+    keep: Keep
+    limits: Limits
+    given_chunk: int | None
+    table: dict[str, Any]
+    contents: dict[str, str]
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes, in the order of the columns of the table."""
+        return self.recipe.axes
+
+    @cached_property
+    def samples(self) -> Array:
+        """Values of the random axes, ndarray, shape (samples, random axes); one row without random axes."""
+        drawn = [axis.distribution for axis in self.axes if axis.distribution is not None]
+        if self.sampling is None:
+            return np.zeros((1, 0))
+        return self.sampling.drawn(drawn)
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the grid of runs, slowest first: one for each axis with values, then the samples."""
+        return (*(len(axis.values) for axis in self.axes if axis.values is not None), len(self.samples))
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return prod(self.shape)
+
+    @property
+    def chunk(self) -> int:
+        """Runs of a chunk."""
+        if self.given_chunk is not None:
+            return self.given_chunk
+        wanted = max(self.runs // PARTS, 1)
+        return min(max(1 << (wanted.bit_length() - 1), LEAST), MOST)
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return -(-self.runs // self.chunk)
+
+    def task(self, number: int) -> Task:
+        """The runs of a chunk, numbered from 0."""
+        first = number * self.chunk
+        *codes, sample = np.unravel_index(np.arange(first, min(first + self.chunk, self.runs)), self.shape)
+        return Task(number, first, tuple(codes), self.samples[sample])
+
+    def scene(self, run: int) -> Scene:
+        """The scene of a run, numbered from 1 as in the table, to look at it alone. Raises InputError."""
+        if not 1 <= run <= self.runs:
+            raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
+        number, row = divmod(run - 1, self.chunk)
+        values, _ = self.task(number).rows(self.axes)[row]
+        made = SceneMaker(self.recipe).scene(values)
+        return replace(made, name=f"{self.name or 'study'}, run {run}")
+
+
+def check_study(study: Study) -> Study:
+    """The study with its quantities fitted to its bearings. Raises InputError: a value that a scene does not accept,
+    names that occur twice, or too many runs.
+
+    Every value of a grid, and the least and the largest of a random axis, is tried in the base scene.
+    """
+    if study.runs > MOST_RUNS:
+        raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
+    try:
+        plain = scene_from_table(study.recipe.scene)
+    except InputError as error:
+        raise InputError(f"scene: {error}") from None
+    for axis in study.axes:
+        try:
+            _check_axis(axis, plain, bool(study.recipe.records))
+        except InputError as error:
+            raise InputError(f"axes.{axis.name}.{error}") from None
+    surfaces = max(len(scene.bearing.surfaces) for scene in _tried(study, SceneMaker(study.recipe)))
+    found = replace(study, keep=replace(study.keep, surfaces=surfaces))
+    reserved = [INTENSITY] if study.recipe.intensities else []
+    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
+    return found
+
+
+def _check_axis(axis: Axis, scene: Scene, has_records: bool) -> None:
+    """Raise InputError where an axis cannot change this scene."""
+    for path in axis.paths if axis.change in ("sets", "multiplies") else ():
+        if path.partition(".")[0] == "motion" and has_records:
+            raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
+        if axis.change == "multiplies" and rule_of(scene, path) is None:
+            raise InputError(f"multiplies = {path!r}: give a number of bearing, top or solver, or set the field")
+        if axis.surfaces is not None:
+            surface_values(scene, path)
+    count = len(scene.bearing.surfaces)
+    for surface in axis.surfaces or ():
+        if surface > count:
+            raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
+
+
+def _tried(study: Study, maker: SceneMaker) -> Iterator[Scene]:
+    """The scenes of the first run, and of every value of each axis with the first values of the others."""
+    (base, _), *_ = study.task(0).rows(study.axes)
+    named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
+    yield _made(maker, base, f"run 1 ({named})")
+    drawn = iter(study.samples.T)
+    for index, axis in enumerate(study.axes):
+        if axis.values is None:
+            column = next(drawn)
+            tried: Sequence[Any] = sorted({float(column.min()), float(column.max())})
+        else:
+            tried = axis.values[:: max(1, len(axis.values) // TRIED)]
+        for value in tried:
+            yield _made(maker, (*base[:index], value, *base[index + 1 :]), f"axes.{axis.name}: value {value!r}")
+
+
+def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> Scene:
+    try:
+        scene = maker.scene(values)
+        check(scene, scene.modelled)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return scene

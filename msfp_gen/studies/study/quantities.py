@@ -1,0 +1,244 @@
+"""What is kept of each run: columns of its summary and characterisation, peaks of any history, and formulas of them."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from msfp_gen.errors import InputError
+from msfp_gen.results.history import LABELS, STACK, quantities
+from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.specification import formula
+from msfp_gen.studies.bounding.runs import Measure, measures
+from msfp_gen.studies.sweep import COLUMNS, plain_cell, summary_value
+
+if TYPE_CHECKING:
+    from msfp_gen.analysis.characterise import Characterisation
+    from msfp_gen.result import Result
+
+# Word in a formula -> what it takes of a column of the history.
+EXTREMES: dict[str, Callable[[Any], Any]] = {
+    "peak": lambda values: np.abs(values).max(),
+    "least": np.min,
+    "most": np.max,
+    "last": lambda values: values[-1],
+}
+_EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*(\w+)\s*\)")
+# Quantities of the summary beside the columns of a sweep: name -> (unit, path).
+_MORE = {
+    "axial_load": ("N", "axial_load"),
+    "dissipated_share": ("", "energy.dissipated_share"),
+    "peak_temperature": ("degC", "peak_temperature.*"),
+    "least_friction": ("", "least_friction.*"),
+    "most_friction": ("", "most_friction.*"),
+}
+CAPACITY_USED = "capacity_used"  # 1 - least gap / capacity: 1 where a slider meets its rim
+TEXTS = ("rims_met",)
+_LEFT_OUT = ("status", "message")  # every row has them
+_OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}
+
+
+class Column(NamedTuple):
+    """A column of the table of a study: name, unit, and whether it holds texts."""
+
+    name: str
+    unit: str
+    text: bool = False
+
+
+class Source(NamedTuple):
+    """Where a quantity comes from: unit, path in the summary, index of the surface; or a measure of cycles."""
+
+    unit: str
+    path: str = ""
+    surface: int | None = None
+    measure: Measure | None = None
+
+
+@dataclass(frozen=True)
+class Keep:
+    """What is kept of each run.
+
+    Attributes:
+        names: quantities, as in the study file.
+        formulas: pairs of a name and a formula of quantities, axes, and `peak(...)`, `least(...)`, `most(...)`,
+            `last(...)` of a column of the history.
+        surfaces: the most surfaces of any bearing of the study.
+        axes: names of the axes that hold numbers.
+    """
+
+    names: tuple[str, ...]
+    formulas: tuple[tuple[str, str], ...]
+    surfaces: int
+    axes: tuple[str, ...]
+
+    def columns(self) -> tuple[Column, ...]:
+        """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
+        return _columns(self)
+
+    def values(self, result: Result, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
+        """Column -> value, None where it is not defined; and a line about a characterisation that is not possible.
+
+        at: the values of the axes that hold numbers.
+        """
+        reader = _Reader(result, self.surfaces)
+        formulas = dict(self.formulas)
+        found = {
+            column.name: self._evaluated(column.name, formulas[column.name], reader, at)
+            if column.name in formulas
+            else reader.value(column.name)
+            for column in self.columns()
+        }
+        return found, reader.problem
+
+    def _evaluated(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
+        tree, extremes = _tree(self, name, text)
+        values: dict[str, float] = {}
+        for symbol in formula.names_in(tree):
+            value = reader.extreme(*extremes[symbol]) if symbol in extremes else at.get(symbol)
+            value = reader.value(symbol) if value is None and symbol not in extremes else value
+            if value is None:
+                return None
+            values[symbol] = value
+        try:
+            return _finite(formula.fold(tree, values, _OPERATIONS))
+        except (ArithmeticError, ValueError):  # such as a division by zero
+            return None
+
+
+@lru_cache(maxsize=16)
+def _columns(keep: Keep) -> tuple[Column, ...]:
+    known, found = catalogue(keep.surfaces), []
+    for name in keep.names:
+        each = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
+        if not each:
+            words = sorted({re.sub(r"_\d+$", "", key) for key in known})
+            hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
+            raise InputError(f"keep: {name!r} is no quantity{hint}")
+        found += [Column(key, known[key].unit, key in TEXTS) for key in each]
+    for name, text in keep.formulas:
+        _tree(keep, name, text)
+        found.append(Column(name, ""))
+    return tuple(dict.fromkeys(found))
+
+
+@lru_cache(maxsize=64)
+def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[str, str]]]:
+    """Syntax tree of a formula, and the extremes in it: symbol -> (word, column of the history)."""
+    extremes = {f"{word}_of_{column}": (word, column) for word, column in _EXTREME.findall(text)}
+    columns = history_columns(keep.surfaces)
+    for _, column in extremes.values():
+        if column not in columns:
+            hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
+            raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
+    numbers = [key for key in catalogue(keep.surfaces) if key not in TEXTS]
+    try:
+        return formula.parse(_EXTREME.sub(r"\1_of_\2", text), [*numbers, *keep.axes, *extremes]), extremes
+    except ValueError as error:
+        word, named, _ = str(error).partition(" is no name of a law")
+        why = f"{word} is no quantity and no axis that holds numbers; see docs/studies.md" if named else str(error)
+        raise InputError(f"quantities.{name} = {text!r}: {why}") from None
+
+
+@lru_cache(maxsize=16)
+def catalogue(surfaces: int) -> dict[str, Source]:
+    """Column -> where it comes from, for bearings of up to so many surfaces; those of the summary come first."""
+    found: dict[str, Source] = {}
+    for name, (unit, path) in {**COLUMNS, **_MORE}.items():
+        key, each, _ = path.partition(".*")
+        if name in _LEFT_OUT:
+            continue
+        if not each:
+            found[name] = Source(unit, key)
+        for index in range(surfaces) if each else ():
+            found[f"{name}_{index + 1}"] = Source(unit, key, index)
+    for index in range(surfaces):
+        found[f"{CAPACITY_USED}_{index + 1}"] = Source("", CAPACITY_USED, index)
+    for name, measure in measures(surfaces).items():
+        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
+    return found
+
+
+@lru_cache(maxsize=16)
+def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Column of a history, named as in an exported file -> field of `History`, and index after time."""
+    numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
+    labels: dict[str, Any] = {**LABELS, **numbers}
+    found = {}
+    for field, rows in quantities().items():
+        several = len(rows.names) > 1
+        for index in np.ndindex(*(len(labels[dim]) for dim in rows.dims)):
+            name = rows.names[index[-1] if several else 0] if rows.names else field
+            shown = list(zip(rows.dims, index, strict=True))[: -1 if several else None]
+            found["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
+    return found
+
+
+def _finite(value: Any) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
+class _Reader:
+    """Reads quantities of one run; its summary and its characterisation are made when they are first needed."""
+
+    def __init__(self, result: Result, surfaces: int) -> None:
+        self.result = result
+        self.problem = ""
+        self._known = catalogue(surfaces)
+        self._columns = history_columns(surfaces)
+        self._found: Characterisation | None = None
+
+    def value(self, name: str) -> Any:
+        """The value of a quantity; None where the run has none."""
+        source = self._known[name]
+        if source.measure is not None:
+            return self._of_characterisation(source)
+        if source.path == CAPACITY_USED:
+            return self._capacity_used(source.surface or 0)
+        try:
+            value = summary_value(self.result.summary, source.path)
+            value = value if source.surface is None else value[source.surface]
+        except (KeyError, IndexError):  # a model without the quantity, or a bearing with fewer surfaces
+            return None
+        if name in TEXTS:
+            return plain_cell(value)
+        return None if value is None else _finite(value)
+
+    def extreme(self, word: str, column: str) -> float | None:
+        """An extreme of a column of the history; None where the run has no such column."""
+        field, index = self._columns[column]
+        values = self.result.history.arrays().get(field)
+        if values is None or any(place >= length for place, length in zip(index, values.shape[1:], strict=True)):
+            return None
+        return _finite(
+            EXTREMES[word](values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])])
+        )
+
+    def _capacity_used(self, surface: int) -> float | None:
+        surfaces = self.result.scene.bearing.surfaces
+        if surface >= len(surfaces):
+            return None
+        return 1.0 - float(self.result.summary["minimum_gap"][surface]) / surfaces[surface].capacity
+
+    def _of_characterisation(self, source: Source) -> float | None:
+        assert source.measure is not None
+        if self._found is None and not self.problem:
+            try:
+                self._found = self.result.characterise()
+            except InputError as error:
+                self.problem = f"not characterised: {error}"
+        if self._found is None:
+            return None
+        try:
+            value = source.measure.read(self._found)
+        except IndexError:
+            return None
+        return None if value is None else _finite(value)

@@ -1,0 +1,166 @@
+"""`study`: runs what is missing of a study, on any engine, and keeps every chunk as it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from msfp_gen.common.output import make_folder, write_bytes
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
+from msfp_gen.studies.study.definition import Study, Task
+from msfp_gen.studies.study.engines import Engine, engine_from, require
+from msfp_gen.studies.study.loader import load_study
+from msfp_gen.studies.study.recipe import SceneMaker
+from msfp_gen.studies.study.status import failures
+from msfp_gen.studies.study.worker import Order, build_models, run_chunk
+
+Progress = Callable[[int, int], None]
+
+
+class Outcome(NamedTuple):
+    """What a call of `study` did: runs (of the shard), done before, done now, and failed in all."""
+
+    runs: int
+    before: int
+    done: int
+    failed: int
+
+
+def study(
+    source: Study | str | Path | Mapping[str, Any],
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    threads: bool = False,
+    executor: Executor | None = None,
+    dask: str | None = None,
+    mpi: bool = False,
+    shard: tuple[int, int] = (1, 1),
+    progress: Progress | None = None,
+) -> Outcome:
+    """Run a study: what is missing in its folder is computed, and each chunk is one Parquet file there.
+
+    The same call continues a study that was interrupted, at any time and by anything; a chunk per worker is lost at
+    most. A run that fails is a row with its status and message. With processes, a script must make this call under
+    `if __name__ == "__main__":`.
+
+    Parameters
+    ----------
+    source
+        A study file (docs/studies.md), a table of the same keys, or a `Study`.
+    output
+        The folder of the study: `part-*.parquet` and `study.toml`. It is made if it does not exist.
+    workers
+        Runs at the same time; None: one for each core.
+    threads
+        Threads instead of processes: they start at once, and suit few and long runs.
+    executor
+        An executor (`concurrent.futures`) to run on, such as that of Parsl; it stays open.
+    dask
+        Address or scheduler file of a Dask cluster to run on.
+    mpi
+        Run on the other processes of `mpiexec ... -m mpi4py.futures`.
+    shard
+        (i, n): only every n-th chunk, from the i-th; for job arrays that share `output`.
+    progress
+        Called with the runs that are done, earlier ones included, and all (of the shard).
+
+    Returns
+    -------
+    Outcome
+        Numbers of runs: all, done before, done now, and failed, in this call and before.
+
+    Raises
+    ------
+    InputError
+        Invalid input, or a folder with another study; nothing was computed.
+    RunError
+        Workers died, or more runs failed than `limits.failures` permits. What is done is kept.
+
+    """
+    _check_shard(shard)
+    require("pyarrow", "parquet", "study")
+    found = source if isinstance(source, Study) else load_study(source)
+    with engine_from(workers, threads, executor, dask, mpi) as engine:
+        return run_on(engine, found, Path(output), shard, progress)
+
+
+def run_on(
+    engine: Engine, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+) -> Outcome:
+    """Compute what is missing of a study on an engine. Arguments and errors are those of `study`."""
+    make_folder(folder, "output")
+    chunks = chunks_in(study, folder)
+    chunks.open()
+    return _run(chunks, engine, shard, progress)
+
+
+def parsed_shard(text: str) -> tuple[int, int]:
+    """(i, n) of a text i/n. Raises InputError."""
+    first, _, count = text.partition("/")
+    try:
+        shard = int(first), int(count)
+    except ValueError:
+        raise InputError(f"--shard = {text!r}: give i/n, such as 3/16 for the third of 16 jobs") from None
+    _check_shard(shard)
+    return shard
+
+
+def _check_shard(shard: tuple[int, int]) -> None:
+    if not 1 <= shard[0] <= shard[1]:
+        raise InputError(f"shard = {shard[0]}/{shard[1]}: give i/n with i from 1 to n")
+
+
+def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progress | None) -> Outcome:
+    study, present = chunks.study, set(parts_in(chunks.folder))
+    numbers = range(shard[0] - 1, study.chunks, shard[1])
+    total = sum(_length(study, number) for number in numbers)
+    missing, before, failed = [], 0, 0
+    for task in map(study.task, numbers):
+        if (path := chunks.path(task)).name in present:
+            before, failed = before + len(task), failed + failures(path)
+        else:
+            missing.append(task.number)
+    _check_failures(study, failed, before, chunks.folder)
+    if missing:
+        _build(study)
+    if progress is not None:
+        progress(before, total)
+    done = 0
+    order = Order(chunks.digest, study.recipe, study.keep, study.limits.run_seconds)
+    for task, (part, bad) in engine.results(run_chunk, _calls(study, missing, order)):
+        write_bytes(chunks.path(task), [part], tidy=False)
+        done, failed = done + len(task), failed + bad
+        if progress is not None:
+            progress(before + done, total)
+        _check_failures(study, failed, before + done, chunks.folder)
+    return Outcome(total, before, done, failed)
+
+
+def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
+    """Raise RunError where more runs have failed than the study permits."""
+    limit = study.limits.failures
+    if limit is not None and failed > limit:
+        raise RunError(
+            f"{failed} of {done} runs failed, more than limits.failures = {limit}; see the column message in {folder}, "
+            "where they are kept"
+        )
+
+
+def _calls(study: Study, numbers: list[int], order: Order) -> Iterator[tuple[Task, tuple[Order, Task]]]:
+    for number in numbers:
+        task = study.task(number)
+        yield task, (order, task)
+
+
+def _length(study: Study, number: int) -> int:
+    return min(study.chunk, study.runs - number * study.chunk)
+
+
+def _build(study: Study) -> None:
+    """Build the model of the first run, so that local workers find it in the cache; other hosts build their own."""
+    (values, _), *_ = study.task(0).rows(study.axes)
+    build_models([SceneMaker(study.recipe).scene(values)])

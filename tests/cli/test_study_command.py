@@ -1,0 +1,113 @@
+"""`msfp-gen study`: runs, continues after `kill -9` and Ctrl-C, and says how far it is."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from support import hearing
+from support.study_tables import cheap_study, rows_of
+
+from msfp_gen.cli import main
+from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.studies import load_study
+
+
+def written(folder: Path, **changes: Any) -> Path:
+    path = folder / "study.toml"
+    path.write_text(dumps(cheap_study(**changes)), encoding="utf-8")
+    return path
+
+
+def started(*arguments: str | Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "msfp_gen", "study", *map(str, arguments)]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hearing, start_new_session=True
+    )
+
+
+def await_parts(folder: Path, count: int) -> None:
+    limit = time.monotonic() + 60
+    while len(list(folder.glob("part-*.parquet"))) < count:
+        assert time.monotonic() < limit, "no parts appear"
+        time.sleep(0.01)
+
+
+def test_a_study_runs_continues_and_says_how_far_it_is(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = written(tmp_path), tmp_path / "out"
+    assert main(["study", str(path), "-o", str(out), "--threads", "--shard", "1/2"]) == 0
+    assert capsys.readouterr().out == f"8 of 8 runs are in {out}; 0 failed\n"
+    assert main(["study", "status", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert "8 of 12 done (66.7 %)" in shown and "parts   2 of 3" in shown
+    assert main(["study", str(path), "-o", str(out), "--threads", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"runs": 12, "before": 8, "done": 4, "failed": 0}
+    assert main(["study", "status", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["done"], found["failed"], found["running"], found["chunks"]) == (12, 0, False, 3)
+
+
+def test_the_example_can_be_loaded(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "--example"]) == 0
+    path = tmp_path / "example.toml"
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert load_study(path).runs == 256
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "out"], "no FILE is given"),
+        (["study.toml"], "--output is missing"),
+        (["none.toml", "-o", "out"], "none.toml.*no such file"),
+        (["study.toml", "-o", "out", "--shard", "3/2"], "shard = 3/2: give i/n"),
+        (["study.toml", "-o", "out", "--shard", "x"], "--shard = 'x': give i/n"),
+        (["study.toml", "-o", "out", "--threads", "--mpi"], "mpi and threads: give one engine"),
+        (["study.toml", "-o", "out", "--workers", "0"], "workers = 0"),
+        (["status", "out"], "no study.toml here"),
+    ],
+)
+def test_bad_input_writes_nothing(
+    arguments: list[str], message: str, tmp_path: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
+) -> None:
+    written(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert main(["study", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert re.search(message, error) and error.count("\n") == 1 and not Path("out").exists()
+
+
+def test_killed_studies_continue_to_the_same_table(tmp_path: Any) -> None:
+    """`kill -9` of the main process: its workers end too, and nothing is lost but the chunks at hand."""
+    sampling = {"samples": 30, "seed": 3}
+    path, out, whole = written(tmp_path, sampling=sampling, chunk=2), tmp_path / "out", tmp_path / "whole"
+    process = started(path, "-o", out, "--workers", "2")
+    await_parts(out, 2)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=30)  # ends only when no worker holds its pipes
+    before = len(list(out.glob("part-*.parquet")))
+    assert 2 <= before < 30 and (out / "study.toml").is_file()
+    assert main(["study", str(path), "-o", str(out), "--threads"]) == 0
+    assert main(["study", str(path), "-o", str(whole), "--threads"]) == 0
+    pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
+
+
+def test_ctrl_c_keeps_what_is_done(tmp_path: Any) -> None:
+    path, out = written(tmp_path, sampling={"samples": 300, "seed": 3}, chunk=2), tmp_path / "out"
+    process = started(path, "-o", out, "--threads", "--workers", "1")
+    await_parts(out, 3)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert process.returncode == 130 and f"what is done is kept in {out}; the same command continues" in error
+    rows = rows_of(out)
+    assert 6 <= len(rows) < 600 and (rows.status == "ok").all() and len(rows) % 2 == 0
+    assert not [path for path in out.iterdir() if path.name.startswith(".")]

@@ -1,0 +1,104 @@
+"""The documentation site: every page has its place, and it is built without a warning and without the network."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from support import ROOT
+
+SITE = ROOT / "docs" / "site"
+NEEDED = ("sphinx", "myst_parser", "pydata_sphinx_theme", "sphinx_gallery", "latex2mathml")
+MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+needs_sphinx = pytest.mark.skipif(bool(MISSING), reason=f"the extra 'docs' is not installed ({', '.join(MISSING)})")
+
+
+def tree() -> list[str]:
+    """Documents that the section pages list, as they are named there."""
+    found = []
+    for page in sorted(SITE.glob("*.md")):
+        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            lines = [line.strip() for line in block.splitlines() if line.strip() and not line.startswith(":")]
+            found += [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
+    return found
+
+
+def test_every_page_stands_in_one_section() -> None:
+    listed = tree()
+    pages = {f"docs/{path.stem}" for path in ROOT.glob("docs/*.md")}
+    assert {name for name in listed if name.startswith("docs/")} == pages
+    assert len(listed) == len(set(listed))
+
+
+def test_the_python_interface_is_complete() -> None:
+    import msfp_gen
+
+    page = (SITE / "api.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"auto(?:class|function|exception):: (\w+)$", page, re.MULTILINE))
+    assert named == set(msfp_gen.__all__) - {"__version__", "presets"}
+    assert "msfp_gen.scene.file.presets" in page
+
+
+class Loaded(HTMLParser):
+    """Addresses that a page loads by itself: scripts, styles, pictures, frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        name = {"script": "src", "img": "src", "iframe": "src", "source": "src", "link": "href"}.get(tag)
+        if name and given.get(name) and given.get("rel") not in ("canonical", "index", "search", "next", "prev"):
+            self.found.append(str(given[name]))
+
+
+def check_site(folder: Path) -> None:
+    pages = [path for path in sorted(folder.rglob("*.html")) if "_static" not in path.parts]  # templates of the theme
+    assert {f"{name}.html" for name in tree() if "gallery" not in name} <= {
+        path.relative_to(folder).as_posix() for path in pages
+    }
+    for path in pages:
+        loaded = Loaded()
+        loaded.feed(path.read_text(encoding="utf-8"))
+        for address in loaded.found:
+            assert not re.match(r"(https?:)?//", address), f"{path.name} loads {address}"
+            if not address.startswith("data:"):
+                assert (path.parent / re.sub(r"[?#].*", "", address)).exists(), f"{path.name}: {address}"
+    for style in folder.rglob("*.css"):
+        assert not re.search(r"(@import|url\()\s*['\"]?(https?:)?//", style.read_text(encoding="utf-8")), style.name
+    api = (folder / "api.html").read_text(encoding="utf-8")
+    assert all(f'id="msfp_gen.{name}"' in api for name in ("simulate", "load_scene", "Bearing", "Scene", "RunError"))
+    assert "msfp-gen explain" in (folder / "cli.html").read_text(encoding="utf-8")
+    model = (folder / "docs" / "model.html").read_text(encoding="utf-8")
+    assert "<math" in model and "$" not in re.sub(
+        r"<(code|pre).*?</\1>", "", model.partition("<article")[2].partition("</article")[0], flags=re.DOTALL
+    )
+
+
+def build(folder: Path, *options: str) -> None:
+    command = [sys.executable, str(SITE / "make_site.py"), "-o", str(folder), *options]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert not run.stderr
+
+
+@needs_sphinx
+def test_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    build(tmp_path / "site", "--no-gallery")
+    check_site(tmp_path / "site")
+
+
+@needs_sphinx
+@pytest.mark.slow
+def test_gallery_runs_every_example(tmp_path: Path) -> None:
+    build(tmp_path / "site")
+    check_site(tmp_path / "site")
+    examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
+    shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
+    assert examples == shown

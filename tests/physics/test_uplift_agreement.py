@@ -1,0 +1,76 @@
+"""Models with and without uplift agree where both are valid, and a run says where one is not (docs/uplift.md)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.flights import shaken
+
+from msfp_gen import Auto, Effects, Motion, RunError, Scene, Top, load_scene, presets, simulate
+from msfp_gen.results.geometry.shape import contact_offsets
+
+
+def swayed(effects):
+    """A rigid mass on the rigid contacts of a stack, swayed until its sliders meet their rims."""
+    time = np.linspace(0.0, 5.0, 1001)
+    start = np.clip(time / 2.5, 0.0, 1.0)
+    path = np.zeros((len(time), 3))
+    path[:, 0] = 0.2 * start**3 * (10 - 15 * start + 6 * start**2) * np.sin(0.8 * np.pi * time)
+    top = Top.mass(11428.0, 300.0, 0.5, rotational_stiffness=1e7, rotational_damping=1e4)
+    return Scene(presets.bearing("fenz-tfp"), Motion.from_arrays(time, path), top, effects=effects)
+
+
+def test_at_the_rims_uplift_gives_the_same_loop():
+    """The rim carries its own force beside the contact: with a closed stack the two models are one."""
+    scene = load_scene("triple-push")
+    plain = simulate(replace(scene, effects=replace(scene.modelled, uplift=False, sliders="inertial")))
+    seated = simulate(replace(scene, effects=replace(scene.modelled, uplift=True, sliders="inertial")))
+    assert plain.history.rim_force.max() > 1e3 and (seated.history.rim_force.max(axis=0) > 0).sum() == 2
+    time = np.linspace(0.0, plain.history.time[-1], 2001)
+    force = [np.interp(time, r.history.time, r.history.top_force[:, 0]) for r in (plain, seated)]
+    assert np.abs(force[1] - force[0]).max() < 3e-3 * np.abs(force[0]).max()
+
+
+def test_a_contact_outside_the_face_is_noted():
+    scene = load_scene("triple-push")
+    narrow = replace(scene, bearing=scene.bearing.replace(rim_radius=[0.010, 0.0255, 0.0255, 0.010]))
+    whole, tipping = simulate(scene), simulate(narrow)
+    assert not [note for note in whole.notes if note.kind == "footprint"]
+    note = next(note for note in tipping.notes if note.kind == "footprint")
+    offset = contact_offsets(narrow.bearing, tipping.history)
+    assert note.value == pytest.approx(offset[:, note.surface - 1].max()) and 0.010 < note.value < 0.020
+    assert "uplift" in note.text
+
+
+def test_auto_opens_the_contacts_before_a_rigid_mass_jams_them():
+    """Taken in at the first peak, uplift gives the forces of a run that has it from the start."""
+    chosen = simulate(swayed(Auto(dimension="planar", sliders="inertial")))
+    full = simulate(swayed(Effects(dimension="planar", uplift=True)))
+    assert [note.action for note in chosen.notes if note.kind == "uplift"] == ["uplift = True"]
+    for quantity in ("top_force", "displacement"):
+        peaks = [np.abs(getattr(r.history, quantity)[:, 0]).max() for r in (chosen, full)]
+        assert peaks[0] == pytest.approx(peaks[1], rel=0.01)
+    assert chosen.history.normal_force.max() < 2.0 * full.history.normal_force[0].max()
+
+
+def test_peaks_of_a_rigid_mass_are_noted_where_the_effects_are_given():
+    with pytest.raises(RunError) as caught:
+        simulate(swayed(Effects(dimension="planar")))
+    note = next(note for note in caught.value.result.notes if note.kind == "peak")
+    assert "vertical_stiffness" in note.text and note.value > 1.5 * 11428.0 * 9.8
+
+
+def test_a_surface_that_rattles_is_noted():
+    loose, seated = simulate(shaken(1.4, sideways=0.03, duration=0.9)), simulate(shaken(0.5, duration=0.6))
+    notes = [note for note in loose.notes if note.kind == "rattle"]
+    landings = [event.surface for event in loose.events if event.kind == "landing"]
+    assert notes and all(note.value == landings.count(note.surface) > 20 for note in notes)
+    assert not [note for note in seated.notes if note.kind == "rattle"]
+
+
+def test_a_small_bounce_has_one_answer():
+    """Landings dissipate enough that the path of the top hardly depends on the tolerance."""
+    histories = [simulate(shaken(1.05, sideways=0.03, rtol=rtol)).history for rtol in (1e-3, 1e-4, 3e-5, 1e-5)]
+    assert all(2e-4 < history.lift.max() < 5e-4 for history in histories)
+    peaks = [np.abs(history.displacement[:, 0]).max() for history in histories]
+    assert max(peaks) < 1.01 * min(peaks)

@@ -1,0 +1,134 @@
+"""Gradients of a run as users get them: dataset, summary, refusals and notes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from support import scene_of
+
+from msfp_gen import Auto, InputError, Motion, Result, Rotation, Scene, Stop, simulate, simulate_batch
+
+PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
+
+
+def triple(duration: float = 2.0) -> Scene:
+    scene = scene_of("fenz-test2", duration=duration, output_step=0.1)
+    return replace(scene, bearing=scene.bearing.replace(contact_damping=1e-3))
+
+
+@cache
+def result() -> Result:
+    return simulate(triple(), gradients=PATHS)
+
+
+def test_a_run_with_gradients_is_the_same_run() -> None:
+    plain = simulate(triple())
+    for name in plain.dataset.data_vars:
+        assert np.array_equal(plain.dataset[name].values, result().dataset[name].values), name
+    assert plain.summary["counters"] == result().summary["counters"]
+
+
+def test_the_dataset_has_the_variables_that_vary_by_parameter() -> None:
+    gradient, rows = result().gradient, result().dataset
+    assert gradient.parameter.values.tolist()[4:] == ["top.axial_load", "motion.scale"]
+    assert gradient.parameter_unit.values.tolist() == [""] * 4 + ["N", ""]
+    for name, variable in gradient.data_vars.items():
+        assert variable.dims == ("parameter", *rows[name].dims)
+        assert variable.attrs["units"] == f"{rows[name].attrs['units']}/parameter_unit"
+    left_out = set(rows.data_vars) - set(gradient.data_vars)
+    works = {"input", "friction_stored", "numerical", "seat_stored"} | {
+        f"{name}_dissipated" for name in ("friction", "contact", "rim", "top", "seat")
+    }
+    assert left_out == {"separation", "lift", "event_surface", "event_kind"} | {f"energy_{name}" for name in works}
+
+
+def test_the_top_support_carries_the_load() -> None:
+    assert np.allclose(result().gradient.top_force.sel(parameter="top.axial_load", axis="E3"), 1.0, rtol=1e-6)
+
+
+def test_the_summary_has_derivatives_by_parameter() -> None:
+    summary = result().gradient_summary
+    assert list(summary) == result().gradient.parameter.values.tolist()
+    load = summary["top.axial_load"]
+    assert set(load) <= set(result().summary)
+    force, peak = load["peak_top_force"]["radial"], result().summary["peak_top_force"]["radial"]
+    weight = result().summary["axial_load"]
+    assert load["peak_force_ratio"] == pytest.approx(force / weight - peak / weight**2)
+    for key in ("rims_met", "counters", "energy"):
+        with pytest.raises(InputError, match=f"gradient_summary: '{key}' has no derivative: .*; give one of peak_"):
+            load[key]
+
+
+def test_without_gradients_there_is_none() -> None:
+    plain = simulate(triple(0.5))
+    for name in ("gradient", "gradient_summary"):
+        with pytest.raises(InputError, match=r"call simulate\(scene, gradients="):
+            getattr(plain, name)
+
+
+def stopping() -> Scene:
+    return replace(triple(), stop=Stop(displacement=0.01))
+
+
+def tilted() -> Scene:
+    return replace(triple(), motion=Motion.ramp(0.1, 3.0).rocking(Rotation.constant(0.01)), motion_table=None)
+
+
+def planar() -> Scene:
+    return scene_of("fenz-test2", {"dimension": "planar", "sliders": "massless", "rims": False}, duration=1.0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "paths", "part"),
+    [
+        (scene_of("fenz-test2", solver={"method": "dopri5"}), PATHS, r"solver.method = 'dopri5': .*give 'implicit'"),
+        (scene_of("fenz-test2", {"uplift": True}), PATHS, r"effects.uplift = True: .*give uplift = false"),
+        (stopping(), PATHS, "stop: .*give a duration"),
+        (tilted(), PATHS, "motion.rotation: .*give an initial_state"),
+        (triple(), ["bearing.surfaces[7].friction"], r"gradients = 'bearing.surfaces\[7\].friction'"),
+    ],
+)
+def test_runs_without_gradients_are_refused_before_they_start(scene: Scene, paths: Any, part: str) -> None:
+    with pytest.raises(InputError, match=part) as error:
+        simulate(scene, gradients=paths)
+    assert "\n" not in str(error.value)
+
+
+def test_a_checkpoint_holds_no_gradients(tmp_path: Any) -> None:
+    with pytest.raises(InputError, match=r"checkpoint = .*holds no gradients"):
+        simulate(triple(), gradients=PATHS, checkpoint=tmp_path / "run.ck")
+
+
+@pytest.mark.slow
+def test_a_run_that_switches_effects_is_refused_by_name() -> None:
+    first, second = (Motion.harmonic(0.01, 1.0, direction=angle, cycles=1.0) for angle in (0.0, np.pi / 2))
+    later = Motion(np.append(0.0, 3.0 + second.knots), np.concatenate([np.zeros((1, 6, 6)), second.coefficients]))
+    motion = first.held(later.duration - first.duration) + later
+    effects = Auto(sliders="massless", rims=False, uplift=False)
+    scene = replace(triple(), motion=motion, motion_table=None, duration=None, effects=effects)
+    with pytest.raises(InputError, match=r"effects: at .* s the run continues with dimension = spatial, and gradients"):
+        simulate(scene, gradients=["motion.scale"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", ["motion.direction", "initial_state.q[0][0]", "initial_state.h[0][1]"])
+def test_a_parameter_that_leaves_the_plane_is_refused(path: str) -> None:
+    with pytest.raises(InputError, match=r"leads out of the vertical plane .*give effects.dimension = 'spatial'"):
+        simulate(planar(), gradients=[path])
+
+
+def test_undamped_ringing_is_noted_and_refused_where_it_is_resolved() -> None:
+    scene = scene_of("fenz-test2", duration=0.5)
+    (note,) = simulate(scene, gradients=PATHS).notes
+    assert note.kind == "ringing"
+    assert "give contact_damping = 1e-4" in note.text
+    with pytest.raises(InputError, match=r"resolves the undamped ringing .*give contact_damping = 1e-4"):
+        simulate(replace(scene, solver=replace(scene.solver, max_step=2e-4)), gradients=PATHS)
+
+
+def test_batches_are_as_before() -> None:
+    assert simulate_batch([triple(0.2)])[0].gradients is None

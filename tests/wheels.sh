@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# The wheel with compiled models: built, checked, and installed in an empty environment of each Python that there is. A
+# preset runs there without a compiler, without a cache and without SymPy.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bin=$PWD/.venv/bin
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+
+"$bin/uv" venv -q --python "$bin/python" "$folder/tools"
+"$bin/uv" pip install -q --python "$folder/tools" "$PWD[wheels]"
+"$folder/tools/bin/python" -m build --wheel --outdir "$folder" . >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
+rm -rf dist/prebuilt
+(cd "$folder" && tools/bin/python "$OLDPWD/tools/prebuilt_wheel.py" msfp_gen-*-any.whl -o "$OLDPWD/dist/prebuilt")
+"$bin/python" -m twine check --strict dist/prebuilt/*
+tested=0
+for version in 3.11 3.12 3.13 3.14; do
+    place=$folder/$version
+    "$bin/uv" venv -q --no-python-downloads --python "$version" "$place" 2>/dev/null || continue
+    "$bin/uv" pip install -q --python "$place" dist/prebuilt/*.whl
+    env -i HOME="$folder" PATH="$place/bin" MSFP_GEN_CACHE="$place/models" msfp-gen run fenz-test1 --json >"$place/summary.json"
+    "$place/bin/python" - "$place" <<'PYTHON'
+import json, pathlib, sys
+place = pathlib.Path(sys.argv[1])
+assert not (place / "models").exists(), "a model was built"
+assert json.loads((place / "summary.json").read_text())["status"] == "ok"
+PYTHON
+    echo "Python $version: a preset runs without a compiler"
+    tested=$((tested + 1))
+done
+[ "$tested" -gt 0 ] || { echo "no Python to test the wheel with" >&2; exit 1; }

@@ -1,0 +1,79 @@
+"""Adds compiled models to a pure wheel of this checkout: `python tools/prebuilt_wheel.py dist/msfp_gen-*.whl`.
+
+Needs the extra "wheels". The models are compiled by ziglang for Linux on x86-64 with glibc 2.17 or newer, against the
+limited API of Python 3.11, so that the wheel serves that version and all later ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from msfp_gen.jit.build import prepare
+from msfp_gen.jit.cache import digest_sources
+from msfp_gen.jit.compiler import zig_program
+from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
+
+TAGS = ("cp311-abi3-manylinux_2_17_x86_64", "cp311-abi3-manylinux2014_x86_64")
+OPTIONS = (
+    "cc", "-target", "x86_64-linux-gnu.2.17", "-fno-sanitize=undefined", "-s", "-DPy_LIMITED_API=0x030B0000",
+)  # fmt: skip
+PROCESSORS = {1: "x86_64", 3: "x86_64_v3"}
+
+
+def main() -> None:
+    """Write the wheel with models into the folder of -o."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheel", type=Path, help="pure wheel, such as `python -m build --wheel` writes")
+    parser.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
+    given = parser.parse_args()
+    zig = zig_program()
+    if zig is None:
+        raise SystemExit("error: ziglang is not installed: pip install 'msfp-gen[wheels]'")
+    given.output.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as folder:
+        tool = [sys.executable, "-m", "wheel"]
+        subprocess.run([*tool, "unpack", given.wheel.absolute(), "-d", folder], check=True)
+        (unpacked,) = Path(folder).iterdir()
+        check_sources(unpacked)
+        with TemporaryDirectory() as cache:
+            add_models(unpacked / "msfp_gen" / "prebuilt", zig, Path(cache))
+        change_tags(unpacked)
+        subprocess.run([*tool, "pack", unpacked, "-d", given.output.absolute()], check=True)
+
+
+def check_sources(unpacked: Path) -> None:
+    """Models are found by the sources of the wheel: refuse a wheel of other ones."""
+    code = "from msfp_gen.jit.cache import digest_sources; print(digest_sources())"
+    found = subprocess.run([sys.executable, "-c", code], cwd=unpacked, env={**os.environ, "PYTHONPATH": str(unpacked)},
+                           text=True, capture_output=True, check=True)  # fmt: skip
+    if found.stdout.strip() != digest_sources():
+        raise SystemExit("error: the wheel has other sources than this checkout: build it again")
+
+
+def add_models(root: Path, zig: Path, cache: Path) -> None:
+    """Build every model for every level of the processor and copy it to `root`."""
+    os.environ.pop("MSFP_GEN_CFLAGS", None)
+    for level in LEVELS:
+        os.environ["CC"] = shlex.join([str(zig), *OPTIONS, f"-mcpu={PROCESSORS[level]}"])
+        os.environ["MSFP_GEN_CACHE"] = str(cache / str(level))
+        for spec in prebuilt_specs():
+            folder = add_prebuilt(spec, level, prepare(spec, portable=True).folder, root)
+            print(folder.name, spec.key, flush=True)
+
+
+def change_tags(unpacked: Path) -> None:
+    """State in the metadata of the wheel that it has compiled files."""
+    (path,) = unpacked.glob("*.dist-info/WHEEL")
+    kept = [line for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("Tag:")]
+    lines = [line.replace("Root-Is-Purelib: true", "Root-Is-Purelib: false") for line in kept]
+    path.write_text("\n".join([*lines, *(f"Tag: {tag}" for tag in TAGS)]) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
