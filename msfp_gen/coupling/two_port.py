@@ -255,8 +255,6 @@ def _compiled(scene: Scene, model: Model, axial_load: float) -> Port:
         model.stack(scene.bearing, scene.top),
         axial_load,
         q,
-        np.zeros_like(q),
-        np.zeros((count, 2)),
         method=solver.method,
         rtol=solver.rtol,
         atol_angle=solver.angle_tolerance,

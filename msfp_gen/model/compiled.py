@@ -156,7 +156,7 @@ class Port(Protocol):
         """Status, and derivatives of the wrenches along displacements, rates and accelerations of the ends."""
 
     def commit(self) -> None:
-        """Accept the last trial."""
+        """Accept the last trial. Raises ValueError."""
 
     def revert(self) -> None:
         """Return to the committed state."""

@@ -128,7 +128,7 @@ def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
 def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """A note for each surface whose contact point (3.14) leaves the face of its slider, which then would tip.
 
-    With uplift the slider stands on its edge instead (docs/uplift.md).
+    With uplift the slider stands on its edge instead (docs/uplift.md). Without a `rim_radius` no face is known.
     """
     if effects.uplift:
         return ()
@@ -136,7 +136,7 @@ def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
     loaded = history.normal_force > FOOTPRINT_LOAD * np.median(history.normal_force, axis=0)
     offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
     faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
-    for j in np.flatnonzero(offsets.max(axis=0) > faces):
+    for j in np.flatnonzero((offsets.max(axis=0) > faces) & (faces > 0)):
         row, surface = int(offsets[:, j].argmax()), int(j) + 1
         text = TEXTS["footprint"].format(surface=surface, value=offsets[row, j])
         notes.append(Note(float(history.time[row]), "footprint", surface, float(offsets[row, j]), text))

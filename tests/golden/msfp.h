@@ -361,32 +361,38 @@ typedef struct msfp_api {
     /* A run of no scene in the state of a snapshot, to read its state from; it takes no steps. */
     int (*snapshot_open)(const void *snapshot, size_t size, msfp_run **run);
 
-    /* ---- the two-port: a bearing between two ends that another program moves ---- */
-    /* End 0 holds the base, end 1 the far side of the interface: springs and dampers of the top on the top plate. Motion
-     * of the ends [2][3][6]: u_1..3 since the start [m] and rotation vector [rad], rates, accelerations. A wrench is force
-     * [N] and moment [N m] that an end exerts on the bearing, about the present position of that end. Spatial models with
-     * locked spin and rotation of the top have it.
-     * scene: bearing, state q, v, f, start_time and the solver; the rest is not read. axial_load: compression at rest [N].
-     * Returns a status; *port is NULL only after MSFP_E_ARGUMENT or MSFP_E_MEMORY. */
+    /* ---- the two-port: a bearing between two ends that your program moves; motions in, wrenches out ---- */
+    /* End 0 holds the base, end 1 the far side of the interface: the springs and dampers of the top. The motion of the ends
+     * at one time is ends [end][order][6]: displacements along E1..E3 since the start [m] and rotation vector [rad], then
+     * their rates, then their accelerations. A wrench [end][6] is the force [N] and the moment [N m] that the end exerts on
+     * the bearing, about the present position of that end. The model is in space, with locked spin and top rotation. */
+    /* A bearing that is centred and at rest at start_time, under the compression axial_load [N]. Of the scene: bearing,
+     * whose top is the interface, start_time, q (separations alone), method, rtol, atol_angle, max_step, first_step, and
+     * max_steps, the limit of one trial; end_time is not read, the rest is as of scene_default. The bearing need not outlive
+     * this call. Status, *port and message: as of run_new. */
     int (*port_new)(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
     void (*port_free)(msfp_port *port);
-    /* Go from the committed state to `time` [s], at which the ends are at `ends`; on the way each number of a motion is the
-     * polynomial of degree five through both. It depends on nothing else. MSFP_E_ARGUMENT: `time` is not after that of the
-     * committed state, nor that time with its ends. The committed state remains whatever the status. */
-    int (*port_trial)(msfp_port *port, double time, const double *ends);
-    /* Of the last trial if it succeeded, else of the committed state: wrenches [2][6]; the row [row_size]. */
+    /* Integrate from the committed state to `time` [s], with steps of its own, the ends following the polynomials of degree
+     * five from the committed motion to `ends`. The result is a function of committed state, time and ends alone, bit by
+     * bit. At the committed time give the committed motion. After MSFP_E_ARGUMENT nothing has changed; after another status
+     * there is no trial, and the committed state remains. message: as of bearing_new. */
+    int (*port_trial)(msfp_port *port, double time, const double *ends, const char **message);
+    /* Of the last trial, or of the committed state where there is none: wrench [2][6] [N], [N m]; the row [row_size]. */
     int (*port_wrench)(const msfp_port *port, double *wrench);
-    /* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends, its steps held.
-     * direction [3]: how displacements, rates and accelerations change together, (1, 0, 0) gives the tangent.
-     * MSFP_E_ARGUMENT: no trial over some time has succeeded, or the direction is zero. */
+    /* Derivatives [12][12] of the wrenches of the last trial, its steps held, with respect to the motion of the ends at its
+     * end. direction [3]: how displacements, rates [1/s] and accelerations [1/s^2] change together; 1, 0, 0 gives the
+     * tangent; 1, gamma/(beta h), 1/(beta h^2) the matrix of an iteration of Newmark's method. MSFP_E_ARGUMENT: there is no
+     * trial, it has no duration, or the direction is zero. After a status other than MSFP_OK nothing was written. */
     int (*port_derivative)(msfp_port *port, const double *direction, double *derivative);
     int (*port_row)(const msfp_port *port, double *row);
     void (*port_progress)(const msfp_port *port, msfp_progress *trial); /* how the last trial ended */
     void (*port_counts)(const msfp_port *port, int64_t *counts);        /* [MSFP_COUNTS] of the last trial */
     double (*port_time)(const msfp_port *port);                         /* of the committed state [s] */
-    void (*port_commit)(msfp_port *port);                               /* accept the last trial, if it succeeded */
-    void (*port_revert)(msfp_port *port);                               /* forget it */
-    /* The committed state as bytes without pointers, for a port of the same values and build. */
+    /* Accept the last trial. MSFP_E_ARGUMENT: none has succeeded since the last commit or revert. */
+    int (*port_commit)(msfp_port *port);
+    void (*port_revert)(msfp_port *port); /* return to the committed state */
+    /* The committed state as bytes [port_snapshot_size] without pointers; in a port of the same values and build, what
+     * follows is bit by bit what followed there. Nothing has changed after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
     size_t (*port_snapshot_size)(const msfp_port *port);
     void (*port_snapshot_write)(const msfp_port *port, void *snapshot);
     int (*port_snapshot_read)(msfp_port *port, const void *snapshot, size_t size);

@@ -17,6 +17,9 @@ struct msfp_bearing {
 int msfp_check_bearing(double gravity, const double *bodies, const double *surfaces, const double *top,
                        const char **message);
 int msfp_check_scene(const msfp_scene *scene, const char **message);
+int msfp_check_port(const msfp_scene *scene, double axial_load, const char **message);
+/* Also the status of a two-port that has failed at its start. */
+int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message);
 /* Sets *message and returns MSFP_E_ARGUMENT; message: NULL where nothing is asked. */
 int msfp_refuse(const char **message, const char *text);
 
@@ -64,13 +67,14 @@ int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
 /* ---- two_port.c ---- */
 
 int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
-int msfp_api_port_trial(msfp_port *port, double time, const double *ends);
+int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const char **message);
 int msfp_api_port_wrench(const msfp_port *port, double *wrench);
 int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
 int msfp_api_port_row(const msfp_port *port, double *row);
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
 void msfp_api_port_counts(const msfp_port *port, int64_t *counts);
 double msfp_api_port_time(const msfp_port *port);
+int msfp_api_port_commit(msfp_port *port);
 int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
 
 #endif

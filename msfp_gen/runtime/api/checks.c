@@ -171,3 +171,67 @@ int msfp_check_scene(const msfp_scene *s, const char **message)
             "heat, monitor_heat: give finite numbers");
     return MSFP_OK;
 }
+
+/* ---- the two-port ---- */
+
+static int check_interface(const double *top, const char **message)
+{
+    REQUIRE(top[MSFP_TOP_PARAMETERS_K] > 0.0 && top[MSFP_TOP_PARAMETERS_KV] > 0.0 && top[MSFP_TOP_PARAMETERS_KR] > 0.0,
+            "bearing: top: give stiffness, vertical_stiffness and rotational_stiffness of the interface above 0");
+    REQUIRE(top[MSFP_TOP_PARAMETERS_M] == 0.0, "bearing: top: a two-port supports no mass; give mass = 0");
+#if !MSFP_PLANAR /* others were refused */
+    REQUIRE(top[MSFP_TOP_PARAMETERS_X0X] == 0.0 && top[MSFP_TOP_PARAMETERS_X0Y] == 0.0,
+            "bearing: top: the upper end is the anchor of a two-port; give anchor_x = anchor_y = 0");
+#endif
+    return MSFP_OK;
+}
+
+/* Coordinates of a bearing that is centred: separations alone. */
+static int centred(const double *q)
+{
+    for (int i = 0; q && i < NB * MSFP_NQ; ++i)
+        if (!(fabs(q[i]) < INFINITY) || (i % MSFP_NQ < 3 && q[i] != 0.0))
+            return 0;
+    return 1;
+}
+
+int msfp_check_port(const msfp_scene *s, double axial_load, const char **message)
+{
+    if (message)
+        *message = NULL;
+    REQUIRE(s, "scene: give a scene");
+    REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
+    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && MSFP_TOP_ROTATION,
+            "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin");
+    REQUIRE(natural(axial_load, 0), "axial_load: give a finite number of at least 0 [N]");
+    REQUIRE(fabs(s->start_time) < INFINITY, "start_time: give a finite time [s]");
+    REQUIRE(s->method != MSFP_METHOD_DOPRI5, "method: give MSFP_METHOD_IMPLICIT or MSFP_METHOD_ESDIRK4");
+    REQUIRE(!s->motion.pieces && !s->load.pieces && !s->support.pieces && !s->jump_count,
+            "motion, load, support, jumps: leave them out; the ends of a two-port move as its trials say");
+    REQUIRE(!s->stop_count && !s->span_count && s->output_step == 0.0 && s->stop_displacement == 0.0 && !s->stop_all_rims
+                && !s->monitors && !s->monitor_stop && !s->sampled && !s->quasistatic,
+            "stops, span_ends, output_step, stop_displacement, stop_all_rims, monitors, sampled, quasistatic: leave them as "
+            "scene_default does");
+    REQUIRE(!s->v && !s->f && !s->foot && !s->heat && !s->origin && !s->monitor_heat,
+            "v, f, foot, heat, origin, monitor_heat: leave them out; a two-port starts at rest");
+    REQUIRE(centred(s->q), "q: give zero angles and finite separations; a two-port starts centred");
+    const int status = check_solver(s, message);
+    return status ? status : check_interface(s->bearing->parameters.top, message);
+}
+
+int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message)
+{
+    static const double shortest = 1e-8; /* time of a trial [s], or its share of the time: a shorter one holds no step */
+    if (message)
+        *message = NULL;
+    REQUIRE(port, "port: give a two-port of port_new");
+    if (port->committed.status)
+        return port->committed.status;
+    REQUIRE(ends && msfp_valid_ends(ends), "ends: give finite numbers [2][3][6], rotations of at most 1.5 rad");
+    const double start = port->committed.now.t, *from = &port->from.of[0][0][0];
+    REQUIRE(time == start || (time < INFINITY && time - start >= shortest * fmax(1.0, fabs(start))),
+            "time: give a finite time after that of the committed state [s]");
+    for (int i = 0; time == start && i < MSFP_PORT_FREEDOMS * MSFP_ORDERS; ++i)
+        REQUIRE(ends[i] == from[i], "time: give a later one; at that of the committed state the ends are elsewhere");
+    return MSFP_OK;
+}

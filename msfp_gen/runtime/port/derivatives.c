@@ -72,7 +72,7 @@ static int differentiate(msfp_port *port, msfp_run *run, const double direction[
 int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative)
 {
     msfp_run run = port->run; /* with rows and events that no step of this file writes */
-    double column[FREEDOMS];
+    double column[FREEDOMS], found[FREEDOMS * FREEDOMS];
     for (int j = 0; j < FREEDOMS; ++j) {
         int status = MSFP_E_NEWTON;
         for (size_t i = 0; status && i < sizeof precisions / sizeof *precisions; ++i)
@@ -80,7 +80,10 @@ int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], d
         if (status)
             return status;
         for (int i = 0; i < FREEDOMS; ++i)
-            derivative[i * FREEDOMS + j] = column[i];
+            found[i * FREEDOMS + j] = column[i];
     }
+    if (!msfp_all_finite(found, FREEDOMS * FREEDOMS))
+        return MSFP_E_FINITE;
+    memcpy(derivative, found, sizeof found);
     return MSFP_OK;
 }

@@ -1,5 +1,6 @@
 /* port.c: trials of a two-port, their wrenches, and its snapshots. */
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "port.h"
@@ -31,9 +32,9 @@ static void copy_state(msfp_run *to, const msfp_run *from)
            MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN);
 }
 
-static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
-                 const double *v, const double *f)
+static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q)
 {
+    static const double v[NB * MSFP_NQ] = { 0.0 }, f[NB * 2] = { 0.0 };
     msfp_history motion, load;
     attach(&motion, port->knots, &port->motion);
     attach(&load, port->knots, &port->load);
@@ -46,8 +47,7 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 #endif
 }
 
-msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
-                         const double *v, const double *f)
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q)
 {
     msfp_port *port = calloc(1, sizeof *port);
     if (!port)
@@ -56,7 +56,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->knots[0] = options->start_time;
     port->knots[1] = options->start_time + 1.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
-    const int status = start(port, p, options, q, v, f);
+    const int status = start(port, p, options, q);
     port->run = port->committed;
     port->run.rows = NULL;
     port->run.events = NULL;
@@ -131,10 +131,11 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
 {
     msfp_run *run = &port->run;
     memcpy(&port->to, to, sizeof port->to);
-    port->tried = 0;
+    port->tried = port->ready = 0;
     port->time_count = 0;
     if (t == port->committed.now.t) {
         copy_state(run, &port->committed);
+        port->ready = 1;
         return MSFP_OK;
     }
     msfp_port_prepare(port, run, t, &port->to);
@@ -144,7 +145,7 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
         if (run->counts[MSFP_COUNT_STEPS] > before && run->status == MSFP_OK)
             run->status = record_time(port);
     }
-    port->tried = run->status == MSFP_OK;
+    port->tried = port->ready = run->status == MSFP_OK;
     return run->status;
 }
 
@@ -207,46 +208,74 @@ void msfp_port_wrench(const msfp_port *port, double *wrench)
     msfp_port_wrench_of(port, current(port), port->tried ? &port->to : &port->from, wrench);
 }
 
-void msfp_port_commit(msfp_port *port)
+int msfp_port_commit(msfp_port *port)
 {
-    if (!port->tried)
-        return;
-    port->committed.rows[0] = *msfp_port_row(port);
-    copy_state(&port->committed, &port->run);
-    port->from = port->to;
-    port->tried = 0;
+    if (!port->ready)
+        return MSFP_E_ARGUMENT;
+    if (port->tried) {
+        port->committed.rows[0] = *msfp_port_row(port);
+        copy_state(&port->committed, &port->run);
+        port->from = port->to;
+    }
+    port->tried = port->ready = 0;
+    return MSFP_OK;
 }
 
 void msfp_port_revert(msfp_port *port)
 {
-    port->tried = 0;
+    port->tried = port->ready = 0;
     port->time_count = 0;
+    copy_state(&port->run, &port->committed);
 }
 
-size_t msfp_port_snapshot_size(const msfp_port *port)
+/* ---- snapshots: motion of the ends, its checksum, and the snapshot of the committed run with one row ---- */
+
+int msfp_valid_ends(const double *ends)
 {
-    return sizeof port->from + msfp_snapshot_size(&port->committed, 1);
+    if (!msfp_all_finite(ends, sizeof(msfp_ends) / sizeof *ends))
+        return 0;
+    for (int end = 0; end < MSFP_ENDS; ++end) {
+        const double *turn = ends + end * MSFP_ORDERS * MSFP_END_FREEDOMS + 3;
+        if (!(sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]) <= MSFP_LARGEST_TURN))
+            return 0;
+    }
+    return 1;
 }
+
+enum { HEAD = sizeof(msfp_ends) + sizeof(uint64_t) };
+
+size_t msfp_port_snapshot_size(const msfp_port *port) { return HEAD + msfp_snapshot_size(&port->committed, 1); }
 
 void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
 {
+    const uint64_t sum = msfp_checksum(&port->from, sizeof port->from);
     memcpy(snapshot, &port->from, sizeof port->from);
-    msfp_snapshot_write(&port->committed, 1, (char *)snapshot + sizeof port->from);
+    memcpy((char *)snapshot + sizeof port->from, &sum, sizeof sum);
+    msfp_snapshot_write(&port->committed, 1, (char *)snapshot + HEAD);
 }
 
 int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
 {
     msfp_ends from;
-    if (size < sizeof from)
-        return MSFP_E_FINITE;
+    uint64_t sum;
+    if (size != msfp_port_snapshot_size(port)) /* one row, no events */
+        return MSFP_E_SNAPSHOT;
     memcpy(&from, snapshot, sizeof from);
-    const double *values = &from.of[0][0][0];
-    for (size_t i = 0; i < sizeof from / sizeof *values; ++i)
-        if (!(fabs(values[i]) < INFINITY))
-            return MSFP_E_FINITE;
-    const int status = msfp_snapshot_read(&port->committed, (const char *)snapshot + sizeof from, size - sizeof from);
+    memcpy(&sum, (const char *)snapshot + sizeof from, sizeof sum);
+    if (sum != msfp_checksum(&from, sizeof from) || !msfp_valid_ends(&from.of[0][0][0]))
+        return MSFP_E_SNAPSHOT;
+    msfp_run found = port->committed;
+    found.rows = NULL; /* those of `committed` stay until the snapshot is accepted */
+    found.events = NULL;
+    int status = msfp_snapshot_read(&found, (const char *)snapshot + HEAD, size - HEAD);
     if (status)
-        return status;
+        return status == MSFP_E_MEMORY ? status : MSFP_E_SNAPSHOT;
+    if (found.status != MSFP_OK) {
+        msfp_run_free(&found);
+        return MSFP_E_SNAPSHOT;
+    }
+    msfp_run_free(&port->committed);
+    port->committed = found;
     port->from = from;
     msfp_port_revert(port);
     return MSFP_OK;

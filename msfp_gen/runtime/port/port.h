@@ -13,6 +13,9 @@
 
 enum { MSFP_ENDS = 2, MSFP_ORDERS = 3, MSFP_END_FREEDOMS = 6, MSFP_PORT_FREEDOMS = MSFP_ENDS * MSFP_END_FREEDOMS };
 
+/* Of an end [rad]: a run ends at this tilt, next to the singularity of the Euler angles. */
+#define MSFP_LARGEST_TURN 1.5
+
 /* Motion of both ends at one time. */
 typedef struct {
     double of[MSFP_ENDS][MSFP_ORDERS][MSFP_END_FREEDOMS];
@@ -37,14 +40,15 @@ struct msfp_port {
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
     size_t time_count, time_capacity;
     int tried; /* a trial has succeeded since the last commit, revert or failure */
+    int ready; /* it may be committed: the same, or a trial of no duration */
 };
 
 /* ---- port.c ---- */
 
-/* A bearing at rest under the axial load [N], both ends at u = 0. The tops's springs of `p` are the interface. q, v, f:
- * state as in msfp_run_start. The port is released by msfp_port_free, also after a failure; NULL: no memory. */
-msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
-                         const double *v, const double *f);
+/* A bearing at rest under the axial load [N], both ends at u = 0. The top's springs of `p` are the interface. q: as in
+ * msfp_run_start, without tilts. The status is that of `committed`. The port is released by msfp_port_free, also after a
+ * failure; NULL: no memory. */
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q);
 void msfp_port_free(msfp_port *port);
 /* Go from the committed state to the time `t` [s], not before it, at which the ends are at `to` [end][order][6]. At the
  * committed time `to` is the committed motion. Returns MSFP_OK, or a status: see port->run. */
@@ -53,15 +57,17 @@ int msfp_port_trial(msfp_port *port, double t, const double *to);
 void msfp_port_wrench(const msfp_port *port, double *wrench);
 /* The row of that state. */
 const msfp_row *msfp_port_row(const msfp_port *port);
-/* Accept the last trial. */
-void msfp_port_commit(msfp_port *port);
+/* Accept the last trial. Returns MSFP_OK, or MSFP_E_ARGUMENT where none has succeeded. */
+int msfp_port_commit(msfp_port *port);
 /* Return to the committed state. */
 void msfp_port_revert(msfp_port *port);
 /* A snapshot of the committed state: bytes without pointers, for a port of the same values and build. */
 size_t msfp_port_snapshot_size(const msfp_port *port);
 void msfp_port_snapshot_write(const msfp_port *port, void *snapshot);
-/* Returns MSFP_OK, MSFP_E_MEMORY or MSFP_E_FINITE, after which nothing has changed. */
+/* Returns MSFP_OK, or MSFP_E_MEMORY or MSFP_E_SNAPSHOT, after which nothing has changed. */
 int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
+/* Whether the motion of the ends [end][order][6] is finite and no end is turned by more than MSFP_LARGEST_TURN. */
+int msfp_valid_ends(const double *ends);
 /* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
@@ -86,7 +92,7 @@ void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msf
 
 /* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends at its end, its steps
  * held. direction: how displacements, rates and accelerations change together; (1, 0, 0) gives the tangent. Returns
- * MSFP_OK or a status. */
+ * MSFP_OK or a status, after which `derivative` is as it was. */
 int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative);
 
 #endif

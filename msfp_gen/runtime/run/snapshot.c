@@ -24,8 +24,9 @@ typedef struct {
 static size_t state_size(void) { return MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN; }
 
 /* FNV-1a over words of eight bytes, then over the bytes that are left. */
-static uint64_t checksum(const unsigned char *bytes, size_t size)
+uint64_t msfp_checksum(const void *data, size_t size)
 {
+    const unsigned char *bytes = data;
     uint64_t sum = 14695981039346656037u, word;
     size_t i = 0;
     for (; i + sizeof word <= size; i += sizeof word) {
@@ -70,7 +71,7 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot)
     to += h.row_count * sizeof(msfp_row);
     if (h.event_count)
         memcpy(to, run->events, h.event_count * sizeof(msfp_event));
-    h.checksum = checksum(body, body_size(h.row_count, h.event_count));
+    h.checksum = msfp_checksum(body, body_size(h.row_count, h.event_count));
     memcpy(snapshot, &h, sizeof h);
 }
 
@@ -156,7 +157,7 @@ static int valid_header(const header *h, const unsigned char *body, size_t size)
         return 0;
     if (h->row_count > size / sizeof(msfp_row) || h->event_count > size / sizeof(msfp_event)) /* no sum overflows */
         return 0;
-    return size == body_size(h->row_count, h->event_count) && checksum(body, size) == h->checksum;
+    return size == body_size(h->row_count, h->event_count) && msfp_checksum(body, size) == h->checksum;
 }
 
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size)

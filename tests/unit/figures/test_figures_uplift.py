@@ -28,7 +28,7 @@ SMOOTH = 1e-3  # friction so small that the footprint of the seat is the slider'
 def hop():
     """A load on nearly frictionless sliders that lifts off and lands."""
     scene = shaken(1.4, sideways=0.02, duration=0.85)
-    return simulate(replace(scene, bearing=scene.bearing.replace(friction=SMOOTH)))
+    return simulate(replace(scene, bearing=scene.bearing.replace(friction=SMOOTH, seat_damping=1.0)))
 
 
 def highest():

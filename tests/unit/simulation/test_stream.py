@@ -39,9 +39,9 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streamed_rows, "blocks", lambda count, rows: thinning.blocks(count, rows, PIECE))
 
 
-def falling() -> Scene:
-    """A planar run whose load falls: it starts without the mass of the sliders and continues with it, at even rows."""
-    load = Load.from_arrays([0, 1, 3, 40], np.outer([0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 111.95e3]))
+def leaving() -> Scene:
+    """A planar run that continues in space, at even rows, when a load across its plane begins."""
+    load = Load.from_arrays([0, 3, 3.5, 40], np.outer([0.0, 0.0, 1.0, 1.0], [-2e3, 2e3, 0.0]))
     top = Top.rig(112e3, stiffness=1e6, damping=5.0, rotational_stiffness=1e5, rotational_damping=5.0)
     motion = Motion.harmonic(0.05, 1.0, cycles=4, direction=0.3)
     return Scene(presets.bearing("fenz-tfp"), motion, top, load=load, output_step=0.007, effects=Auto(uplift=False))
@@ -88,7 +88,7 @@ def test_the_file_is_that_of_an_unstreamed_run(case: str, tmp_path: Path) -> Non
     assert sorted(file.name for file in tmp_path.iterdir()) == ["run.nc", "whole.nc"]
 
 
-@pytest.mark.parametrize("scene", [falling, heating])
+@pytest.mark.parametrize("scene", [leaving, heating])
 def test_several_models_are_one_file(scene: Any, tmp_path: Path) -> None:
     whole = simulate(scene())
     assert ", then " in whole.provenance["model"]
@@ -176,7 +176,7 @@ def test_a_run_without_a_row_writes_no_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("scene", [SCENES["even rows"], falling()], ids=["one model", "two models"])
+@pytest.mark.parametrize("scene", [SCENES["even rows"], leaving()], ids=["one model", "two models"])
 def test_a_checkpoint_and_its_rows_continue_to_the_same_file(scene: Scene, tmp_path: Path) -> None:
     path, file = tmp_path / "run.ck", tmp_path / "run.nc"
     end = scene.end
