@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 CONFIDENCE = 0.95
-TOLERANCE = 1e-6  # relative change of cost and values at which the fit ends; runs err by about 1e-4
+TOLERANCE = 1e-5  # relative change of cost and values at which the fit ends; errors of runs hide smaller ones
 AT_BOUND = 1e-3  # of the range: distance from a bound within which a value is at it
 GIVES_WAY = 0.02  # of the largest displacement: movement of the rig from which the fit has a note
 
