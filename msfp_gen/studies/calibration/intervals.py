@@ -65,13 +65,18 @@ def correlation_of(covariance: Array) -> Array:
 
 
 def weak(names: Sequence[str], values: Array, half: Array, correlation: Array) -> list[str]:
-    """Lines that name values of wide intervals, and pairs that are nearly one.
+    """Lines that name values of wide intervals, and sets of which each is nearly one with another.
 
     half: half width of the interval of each value.
     """
-    lines = []
-    for i, j in np.argwhere(np.triu(np.abs(correlation) > ALIKE, 1)):
-        lines.append(f"nearly one parameter to these tests: {names[i]} and {names[j]} ({correlation[i, j]:+.3f})")
+    from scipy.sparse.csgraph import connected_components
+
+    lines, (count, sets) = [], connected_components(np.abs(correlation) > ALIKE, directed=False)
+    for group in (np.flatnonzero(sets == number) for number in range(count)):
+        if len(group) > 1:
+            largest = np.abs(np.triu(correlation[np.ix_(group, group)], 1)).max()
+            members = " and ".join(names[int(i)] for i in group)
+            lines.append(f"nearly one parameter to these tests: {members} (correlation up to {largest:.3f})")
     for name, value, width in zip(names, values, half, strict=True):
         if np.isfinite(width) and width > UNCERTAIN * abs(value):
             lines.append(f"hardly determined: {name}, 95 % interval of ±{100 * width / abs(value):.0f} %")

@@ -106,6 +106,8 @@ class Residuals:
             assert self.progress is not None
             self.progress(self.count, (index + time / end) / len(self.tests), self.deviation)
 
+        if self.progress is not None:
+            show(0.0, 1.0)  # a short run does not report by itself
         result = simulate(scene, gradients=paths, progress=None if self.progress is None else show)
         assert result.gradients is not None
         time, at = result.history.time, test.time - test.time[0]

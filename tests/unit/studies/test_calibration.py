@@ -277,3 +277,11 @@ def test_a_value_at_its_bound_gets_a_note() -> None:
 def test_a_fit_that_does_not_converge_says_so() -> None:
     with pytest.raises(RunError, match="not converged after 2 evaluations"):
         fit(start(), [measured(0.12)], FRICTION, max_evaluations=2)
+
+
+def test_progress_counts_evaluations() -> None:
+    seen: list[tuple[int, float, float]] = []
+    found = fit(start(), [measured(0.12)], FRICTION[:1], progress=lambda *given: seen.append(given))
+    assert {count for count, _, _ in seen} == set(range(1, found.evaluations + 1))
+    assert all(0 <= share <= 1 for _, share, _ in seen)
+    assert seen[-1][2] > 0
