@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.simulation.simulate import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
     from msfp_gen.studies.bounding import bound
+    from msfp_gen.studies.calibration import Measurement, fit
     from msfp_gen.studies.study.run import study
 
 # Public name -> the module that defines it; `presets` is a module itself.
@@ -42,6 +43,7 @@ _MODULES = {
     "InputError": "errors",
     "Layout": "specification.layout",
     "Load": "motions.prescribed",
+    "Measurement": "studies.calibration",
     "Motion": "motions.motion",
     "MsfpError": "errors",
     "Result": "result",
@@ -57,6 +59,7 @@ _MODULES = {
     "build_model": "model.model",
     "changed_scene": "scene.file.loader",
     "characterise": "analysis.characterise",
+    "fit": "studies.calibration",
     "load_scene": "scene.file.loader",
     "presets": "scene.file.presets",
     "simulate": "simulation.simulate",
@@ -74,6 +77,7 @@ __all__ = [
     "InputError",
     "Layout",
     "Load",
+    "Measurement",
     "Motion",
     "MsfpError",
     "Result",
@@ -90,6 +94,7 @@ __all__ = [
     "build_model",
     "changed_scene",
     "characterise",
+    "fit",
     "load_scene",
     "presets",
     "simulate",

@@ -16,6 +16,7 @@ from msfp_gen.cli import (
     drawing,
     exploring,
     exporting,
+    fitting,
     records,
     reporting,
     running,
@@ -40,8 +41,8 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    running, batching, studying, exporting, drawing, assessment_commands, benching, reporting, exploring, records,
-    building, serving, cache_command,
+    running, batching, studying, exporting, drawing, assessment_commands, fitting, benching, reporting, exploring,
+    records, building, serving, cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)
 

@@ -23,12 +23,12 @@ def load_source(source: str) -> Result | Scene:
     return load_scene(source)
 
 
-def build(scene: Scene) -> None:
-    """Build the model of a scene, with progress, unless it is in the cache."""
+def build(scene: Scene, gradients: bool = False) -> None:
+    """Build the model of a scene, with progress, unless it is in the cache. gradients: one that has them."""
     from msfp_gen.model.model import build_model
 
     with building() as progress:
-        build_model(scene.bearing.layout, scene.modelled, progress=progress)
+        build_model(scene.bearing.layout, scene.modelled, gradients, progress=progress)
 
 
 def run_scene(scene: Scene, **options: Any) -> tuple[Result | None, RunError | None]:

@@ -1,0 +1,136 @@
+"""Command for calibration to tests: fit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.inputs import build
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.studies.calibration import Measurement
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n"
+    '  msfp-gen fit scene.toml test1.csv test2.csv --parameters "bearing.friction[*]" -o fitted\n'
+    '  msfp-gen fit scene.toml test.csv --parameters "friction[0],friction[1]=friction[2]" --offset\n'
+    '  msfp-gen fit scene.toml test.csv -p "friction[*]" --column "force=Load cell" --bounds "friction[*]=0.01:0.2"'
+)
+def fit(
+    scene: SceneName,
+    tests: Annotated[
+        list[Path],
+        typer.Argument(metavar="TEST.csv...", help="Tests: tables of time, displacement and force, with units."),
+    ],
+    parameters: Annotated[
+        list[str],
+        typer.Option("-p", "--parameters", metavar="PATHS", help="What to fit; A=B gives one value to both."),
+    ],
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH=LOW:HIGH", help="Range of a parameter [SI]; default: a tenth to ten times."),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=HEADER", help="Header of time, displacement or force, if it has another name."),
+    ] = None,
+    axial_load: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Axial load of each test [N], instead of the scene's.")
+    ] = None,
+    weights: Annotated[str | None, typer.Option(metavar="LIST", help="Weight of each test; default 1.")] = None,
+    offset: Annotated[bool, typer.Option("--offset", help="Fit an offset of the force of each test too.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Write the fitted scene, numbers, residuals and a figure."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
+) -> None:
+    """Fit friction and other values of a scene to laboratory tests, with 95 % intervals."""
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.studies.calibration import fit as run_fit
+    from msfp_gen.studies.calibration.fitting import start_fit
+    from msfp_gen.studies.calibration.tables import fit_tables
+
+    chosen = load_scene(scene)
+    read = _measurements(tests, column or (), axial_load, weights)
+    paths = [path for text in parameters for path in text.split(",")]
+    limits = dict(_limits(text) for text in bounds or ())
+    prepared = start_fit(chosen, read, paths, limits)  # refuses bad input before anything is built or written
+    if output is not None:
+        make_folder(output, "--output")
+    for each in prepared.scenes:
+        build(each, gradients=True)
+    line = Progress("fit")
+    with line as update:
+
+        def report(count: int, share: float, deviation: float) -> None:
+            assert update is not None
+            line.name = f"evaluation {count}" + (f", deviation {deviation:.4g} N" if deviation == deviation else "")
+            update(share, 1.0)
+
+        found = run_fit(chosen, read, paths, bounds=limits, offset=offset, progress=None if update is None else report)
+    if as_json:
+        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+    else:
+        show(fit_tables(found))
+    for path in found.save(output) if output is not None else []:
+        note(f"wrote {path}")
+
+
+def _measurements(
+    paths: Sequence[Path], columns: Sequence[str], loads: str | None, weights: str | None
+) -> list[Measurement]:
+    """The tests in some files, with the options of the command line."""
+    from msfp_gen.studies.calibration import read_measurement
+
+    names = {}
+    for text in columns:
+        name, equals, header = text.partition("=")
+        if not equals or not header.strip():
+            raise InputError(f"--column = {text!r}: give the column and its header: force=Load cell [kN]")
+        names[name.strip()] = header.strip()
+    read = [read_measurement(path, names) for path in paths]
+    given = {
+        "axial_load": _numbers("--axial-load", loads, len(read)),
+        "weight": _numbers("--weights", weights, len(read)),
+    }
+    for name, values in given.items():
+        if values is not None:
+            read = [replace(test, **{name: value}) for test, value in zip(read, values, strict=True)]  # type: ignore[arg-type]
+    return read
+
+
+def _numbers(option: str, text: str | None, count: int) -> list[float] | None:
+    """The numbers of a list separated by commas: one for each test."""
+    if text is None:
+        return None
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise InputError(f"{option} = {text!r}: give {count} numbers separated by commas, one for each test")
+    return values
+
+
+def _limits(text: str) -> tuple[str, tuple[float, float]]:
+    """Path and range of an option --bounds."""
+    path, _, limits = text.rpartition("=")
+    try:
+        low, high = (float(part) for part in limits.split(":"))
+    except ValueError:
+        path, low, high = "", 0.0, 0.0
+    if not path.strip():
+        raise InputError(f"--bounds = {text!r}: give a parameter and its range: bearing.friction[0]=0.01:0.2")
+    return path.strip(), (low, high)

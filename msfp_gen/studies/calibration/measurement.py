@@ -1,0 +1,178 @@
+"""`Measurement`: time, displacement and force of a laboratory test, from a table in a text file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.quantities import to_si
+from msfp_gen.errors import InputError
+from msfp_gen.motions.records.text import Lines, read_lines
+
+UNITS = {"time": "s", "displacement": "m", "force": "N"}
+LEAST_ROWS, MOST_ROWS = 20, 2000  # rows of a test; more are averaged in blocks
+_AT_CENTRE = 0.05  # permitted first displacement, as a share of the largest
+_CELL = re.compile(r"\s*(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))?\s*")
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One test: a displacement that was prescribed along E1, and the force that was measured.
+
+    Attributes:
+        name: in messages, tables and figures.
+        time: ndarray, shape (k,), [s], increasing.
+        displacement: across the bearing, base less top, ndarray, shape (k,), [m].
+        force: of the bearing on the support of the top plate, ndarray, shape (k,), [N]. It has the sign of the
+            displacement in a loop; where both have the opposite sign the fit is the same.
+        axial_load: [N]; None: that of the scene.
+        weight: of the residuals of this test; 2 counts as a standard deviation half as large.
+
+    Raises:
+        InputError: fewer than 20 rows, numbers that are not finite, times that do not increase, a test that begins away
+            from its centre, or whose loop gives energy.
+    """
+
+    name: str
+    time: Array
+    displacement: Array
+    force: Array
+    axial_load: float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in UNITS:
+            values = np.asarray(getattr(self, name), dtype=np.float64)
+            if values.ndim != 1 or len(values) != len(self.time):
+                raise InputError(f"{self.name}: {name} has shape {values.shape}; give one number for each time")
+            if not np.all(np.isfinite(values)):
+                row = int(np.flatnonzero(~np.isfinite(values))[0])
+                raise InputError(f"{self.name}, row {row + 1}: {name} is {values[row]}; repair or cut the data")
+            object.__setattr__(self, name, values)
+        for name in ("axial_load", "weight"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < np.inf:
+                raise InputError(f"{self.name}: {name} = {value}: give a positive number")
+        self._check_test()
+
+    def _check_test(self) -> None:
+        if len(self.time) < LEAST_ROWS:
+            raise InputError(f"{self.name}: {len(self.time)} rows; give at least {LEAST_ROWS}")
+        back = np.flatnonzero(np.diff(self.time) <= 0)
+        if len(back):
+            raise InputError(
+                f"{self.name}, row {back[0] + 2}: time = {self.time[back[0] + 1]:g} s does not increase; sort or cut it"
+            )
+        for name in ("displacement", "force"):
+            if not np.ptp(getattr(self, name)):
+                raise InputError(f"{self.name}: {name} is constant; give the column that was measured")
+        first, largest = abs(self.displacement[0]), np.abs(self.displacement).max()
+        if first > _AT_CENTRE * largest:
+            raise InputError(
+                f"{self.name}, row 1: displacement = {self.displacement[0]:g} m; a run starts at the centre of the "
+                "bearing, so cut the data to begin there, or subtract the offset of the gauge"
+            )
+        if np.trapezoid(self.force, self.displacement) <= 0:
+            raise InputError(
+                f"{self.name}: the loop gives energy, so force and displacement have opposite signs; change one of them"
+            )
+
+    def sampled(self) -> Measurement:
+        """The test with at most 2000 rows: means of blocks of rows, of which the first row stays as it is."""
+        size = -(-(len(self.time) - 1) // (MOST_ROWS - 1))
+        if size == 1:
+            return self
+        starts = np.r_[0, np.arange(1, len(self.time), size)]
+        counts = np.diff(np.r_[starts, len(self.time)])
+        changes: dict[str, Any] = {name: np.add.reduceat(getattr(self, name), starts) / counts for name in UNITS}
+        return replace(self, **changes)
+
+
+def read_measurement(
+    path: str | Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    axial_load: float | None = None,
+    weight: float = 1.0,
+) -> Measurement:
+    """Read a test from a text table with a header; columns are separated by commas, semicolons or tabs.
+
+    path: of the file; lines that begin with # are comments. columns: the name in the header of `time`, `displacement`
+    and `force`, with a unit in brackets where the header has none, such as {"force": "Load cell 1 [kN]"}; without an
+    entry the name is the same. axial_load, weight: of `Measurement`.
+
+    Raises InputError of one line that names file, row and column.
+    """
+    lines = read_lines(Path(path))
+    unknown = sorted(set(columns or {}) - set(UNITS))
+    if unknown:
+        raise InputError(f"columns: {unknown[0]!r} is no column of a test; give {', '.join(UNITS)}")
+    head = next((i for i, text in enumerate(lines.lines) if text.strip() and not text.lstrip().startswith("#")), None)
+    if head is None:
+        lines.fail(0, "no header; begin with: time [s], displacement [mm], force [kN]")
+    mark = next((mark for mark in ("\t", ";") if mark in lines[head]), ",")
+    header = [text.strip().strip('"') for text in lines[head].split(mark)]
+    places = {name: _place(lines, head, header, name, (columns or {}).get(name, name)) for name in UNITS}
+    rows = _rows(lines, head, mark, header, places)
+    if not rows:
+        lines.fail(head, "no rows of numbers after the header")
+    values = dict(zip(UNITS, np.array(rows).T * [[factor] for _, factor in places.values()], strict=True))
+    return Measurement(Path(path).name, **values, axial_load=axial_load, weight=weight)
+
+
+def _rows(
+    lines: Lines, head: int, mark: str, header: list[str], places: Mapping[str, tuple[int, float]]
+) -> list[list[float]]:
+    """The numbers of time, displacement and force of every row."""
+    rows = []
+    for index in range(head + 1, len(lines)):
+        if not lines[index].strip() or lines[index].lstrip().startswith("#"):
+            continue
+        cells = lines[index].split(mark)
+        if len(cells) != len(header):
+            lines.fail(index, f"{len(cells)} columns, the header names {len(header)}")
+        rows.append([_number(lines, index, header[at], cells[at]) for at, _ in places.values()])
+        if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
+            at = places["time"][0]
+            lines.fail(index, f"column {header[at]!r}: {cells[at].strip()} does not increase; sort or cut the data")
+    return rows
+
+
+def _number(lines: Lines, index: int, column: str, text: str) -> float:
+    try:
+        return lines.number(index, text)
+    except InputError:
+        lines.fail(index, f"column {column!r}: {text.strip()[:24]!r} is not a finite number; repair or cut the data")
+
+
+def _place(lines: Lines, head: int, header: list[str], name: str, given: str) -> tuple[int, float]:
+    """Index of a column and the factor of its unit to SI."""
+    wanted, unit = _split(given)
+    found = [i for i, text in enumerate(header) if text.lower() == given.strip().lower()]
+    found = found or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
+    if len(found) != 1:
+        what = "no column" if not found else f"{len(found)} columns"
+        names = ", ".join(repr(text[:24]) for text in header[:12])
+        lines.fail(head, f"{what} {given!r} among {names}; name the one with columns {name}=NAME")
+    unit = unit or _split(header[found[0]])[1]
+    if not unit:
+        lines.fail(
+            head, f"column {header[found[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
+        )
+    try:
+        return found[0], to_si(f"1 {unit}", UNITS[name])
+    except ValueError as error:
+        lines.fail(head, f"column {header[found[0]]!r}: {error}")
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Name and unit of a header cell such as `force [kN]`."""
+    match = _CELL.fullmatch(text)
+    assert match is not None  # the pattern matches every text of one line
+    return match[1], (match[2] or match[3] or "").strip()

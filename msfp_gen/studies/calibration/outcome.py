@@ -1,0 +1,141 @@
+"""`Fit`: values, intervals and correlations of a calibration, what it cannot identify, and its files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import make_folder, write_bytes
+from msfp_gen.studies.calibration.fitted_test import FittedTest
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.scene import Scene
+
+SHOWN, LINES = 4, 10  # parameters, and lines, in the text of a fit
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One fitted value.
+
+    Attributes:
+        name: path of the parameter, tied paths separated by `=`; `offset of FILE` for an offset of force.
+        unit: SI unit.
+        value, start: after and before the fit [unit].
+        deviation: standard deviation [unit]; infinite where the tests do not determine the value.
+        low, high: 95 % interval [unit].
+        at_bound: whether the value is at one of its bounds, where the interval has no meaning.
+    """
+
+    name: str
+    unit: str
+    value: float
+    start: float
+    deviation: float
+    low: float
+    high: float
+    at_bound: bool = False
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        spread = f"{self.low:.4g} ... {self.high:.4g}" if np.isfinite(self.deviation) else "not determined"
+        return f"{self.name} = {self.value:.5g}{unit} ({spread}){', at its bound' if self.at_bound else ''}"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Result of `fit`.
+
+    Attributes:
+        scene: the scene with the fitted values; its motion is that of the given scene.
+        estimates: of the parameters, then of the offsets.
+        correlation: of the estimates, ndarray, shape (k, k); NaN where one is not determined.
+        condition: largest over least singular value of the Jacobian of unit columns.
+        tests: measured and fitted forces.
+        unidentified: one line for each set of parameters that the tests do not tell apart, or do not see.
+        notes: lines on what limits the intervals.
+        evaluations: number of times that all tests were run.
+    """
+
+    scene: Scene
+    estimates: tuple[Estimate, ...]
+    correlation: Array
+    condition: float
+    tests: tuple[FittedTest, ...]
+    unidentified: tuple[str, ...]
+    notes: tuple[str, ...]
+    evaluations: int
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of a parameter, by its path. Raises KeyError."""
+        return {estimate.name: estimate for estimate in self.estimates}[name]
+
+    def __repr__(self) -> str:
+        """The fit in ten lines at most."""
+        rows = sum(len(test.force) for test in self.tests)
+        plural = "" if len(self.tests) == 1 else "s"
+        lines = [f"fit of {len(self.tests)} test{plural}, {rows} rows, {self.evaluations} evaluations"]
+        lines += [f"  {estimate}" for estimate in self.estimates[:SHOWN]]
+        if len(self.estimates) > SHOWN:
+            lines.append(f"  and {len(self.estimates) - SHOWN} more in .estimates")
+        shares = ", ".join(f"{test.measured.name} {100 * test.share:.2g} %" for test in self.tests[:3])
+        lines.append(f"  deviation of force over its peak: {shares}{', ...' if len(self.tests) > 3 else ''}")
+        lines.append(f"  condition {self.condition:.3g}; 95 % intervals in brackets")
+        extra = [f"  {text}" for text in (*self.unidentified, *self.notes)]
+        room = LINES - len(lines)
+        if len(extra) > room:
+            extra[room - 1 :] = [f"  and {len(extra) - room + 1} more in .unidentified and .notes"]
+        return "\n".join([*lines, *extra])
+
+    def as_dict(self) -> dict[str, Any]:
+        """All numbers in SI as plain values; None where a value is not determined."""
+        names = ("name", "unit", "value", "start", "deviation", "low", "high", "at_bound")
+        return {
+            "estimates": [{n: _plain(getattr(e, n)) for n in names} for e in self.estimates],
+            "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
+            "condition": _plain(self.condition),
+            "tests": [
+                {"name": t.measured.name, "deviation": t.deviation, "share": t.share, "weight": t.measured.weight}
+                for t in self.tests
+            ],
+            "unidentified": list(self.unidentified),
+            "notes": list(self.notes),
+            "evaluations": self.evaluations,
+        }
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the fitted scene (`scene.toml`), the numbers (`fit.json`), rows (`residuals.csv`) and `fit.png`.
+
+        Returns the paths. Raises InputError for a folder that cannot be written to.
+        """
+        from msfp_gen.scene.file.loader import scene_text
+        from msfp_gen.studies.calibration.figure import plot_fit
+
+        folder = Path(folder)
+        make_folder(folder, "output")
+        texts = {
+            "scene.toml": scene_text(self.scene),
+            "fit.json": json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n",
+            "residuals.csv": self._rows(),
+        }
+        for name, text in texts.items():
+            write_bytes(folder / name, [text.encode()])
+        plot_fit(self.tests, f"{self.scene.name or 'unnamed scene'}: fit", folder / "fit.png")
+        return [folder / name for name in (*texts, "fit.png")]
+
+    def _rows(self) -> str:
+        lines = ["test,time [s],displacement [m],measured force [N],fitted force [N],residual [N]"]
+        for test in self.tests:
+            name = '"' + test.measured.name.replace('"', '""') + '"'
+            columns = (test.measured.time, test.measured.displacement, test.measured.force, test.force, test.residual)
+            lines += [f"{name}," + ",".join(map(repr, row)) for row in np.column_stack(columns).tolist()]
+        return "\n".join(lines) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value

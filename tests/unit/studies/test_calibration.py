@@ -1,0 +1,287 @@
+"""Fits: known coefficients from synthetic tests, what cannot be identified, tests in files, and the command."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import Array, scene_of
+
+from msfp_gen import InputError, Measurement, Motion, RunError, Scene, fit, load_scene, simulate
+from msfp_gen.cli import main
+from msfp_gen.scene.file.loader import scene_text
+from msfp_gen.studies.calibration import read_measurement
+from msfp_gen.studies.calibration.fitting import start_fit
+from msfp_gen.studies.calibration.intervals import correlation_of, spread_of
+
+ROWS = 200
+NOISE = 0.005  # of the largest force
+FRICTION = ("friction[0]", "friction[1]=friction[2]", "friction[3]")
+PATHS = ("bearing.surfaces[0].friction", "bearing.surfaces[1].friction=bearing.surfaces[2].friction",
+         "bearing.surfaces[3].friction")  # fmt: skip
+TRUE = (0.03, 0.017, 0.107)
+HEADER = "time [s],displacement [mm],force [kN]"
+
+
+@cache
+def rig() -> Scene:
+    """The triple pendulum of PEER 2017/07 on its rig, with damped contacts."""
+    scene = scene_of("fenz-test2")
+    return replace(scene, bearing=scene.bearing.replace(contact_damping=1e-4))
+
+
+@cache
+def start() -> Scene:
+    """The same with other coefficients."""
+    return replace(rig(), bearing=rig().bearing.replace(friction=[0.039, 0.0136, 0.0136, 0.128]))
+
+
+@cache
+def near() -> Scene:
+    """The same with the coefficient of surface 4 as it was in the tests."""
+    return replace(rig(), bearing=rig().bearing.replace(friction=[0.039, 0.0136, 0.0136, 0.107]))
+
+
+@cache
+def loop(amplitude: float, axial_load: float | None = None) -> tuple[Array, Array, Array]:
+    """Time, displacement and force of one cycle, from a run."""
+    motion = Motion.harmonic(amplitude, 0.1, cycles=1.0)
+    top = rig().top if axial_load is None else replace(rig().top, axial_load=axial_load)  # type: ignore[call-arg]
+    step = motion.duration / (ROWS - 1)
+    scene = replace(rig(), motion=motion, motion_table=None, duration=None, output_step=step, top=top)
+    time, run = np.linspace(0, motion.duration, ROWS), simulate(scene).history
+    return time, motion.evaluate(time)[:, 0], np.interp(time, run.time, run.top_force[:, 0])
+
+
+def measured(amplitude: float, seed: int = 0, offset: float = 0.0, axial_load: float | None = None) -> Measurement:
+    """A synthetic test with noise."""
+    time, displacement, force = loop(amplitude, axial_load)
+    noise = NOISE * np.abs(force).max() * np.random.default_rng(seed).standard_normal(ROWS)
+    return Measurement(f"test {amplitude:g}", time, displacement, force + noise + offset, axial_load)
+
+
+def written(folder: Path, test: Measurement, name: str = "test.csv") -> Path:
+    """A test as a file in mm and kN."""
+    rows = np.column_stack([test.time, 1e3 * test.displacement, 1e-3 * test.force]).tolist()
+    path = folder / name
+    path.write_text("\n".join([HEADER, *(",".join(map(repr, row)) for row in rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_known_friction_is_recovered_from_two_amplitudes_with_noise_and_offset() -> None:
+    tests = [measured(0.03, 1, offset=150.0), measured(0.12, 2, offset=-100.0)]
+    found = fit(start(), tests, FRICTION, offset=True)
+    for path, true in zip(PATHS, TRUE, strict=True):
+        estimate = found[path]
+        assert abs(estimate.value - true) < 4 * estimate.deviation < 0.1 * true
+        assert estimate.low < estimate.value < estimate.high
+        assert estimate.high - estimate.low == pytest.approx(2 * 1.966 * estimate.deviation, rel=1e-3)  # Student's t
+    for test, true in zip(tests, (150.0, -100.0), strict=True):
+        estimate = found[f"offset of {test.name}"]
+        assert abs(estimate.value - true) < 4 * estimate.deviation < 40
+    for fitted in found.tests:
+        assert fitted.share == pytest.approx(NOISE, rel=0.3)
+    assert not found.unidentified and not found.notes
+    assert len(repr(found).splitlines()) <= 10
+    assert np.diag(found.correlation) == pytest.approx(np.ones(5))
+
+
+def test_a_test_with_another_axial_load_and_weight() -> None:
+    tests = [measured(0.05, 1), replace(measured(0.05, 2, axial_load=2e5), weight=3.0)]
+    found = fit(near(), tests, FRICTION[:2])
+    assert found[PATHS[0]].value == pytest.approx(TRUE[0], rel=0.02)
+    assert [s.top.axial_load for s in start_fit(start(), tests, FRICTION).scenes] == [112e3, 2e5]
+    with pytest.raises(InputError, match=r"axial_load.*its own load"):
+        fit(start(), tests, ["top.axial_load"])
+
+
+def test_a_small_amplitude_does_not_see_the_last_surface() -> None:
+    """Surface 4 does not slide in the test, and the inner surfaces act as one: all are named."""
+    found = fit(start(), [measured(0.02)], ["friction[*]"])
+    text = "\n".join(found.unidentified)
+    assert "surfaces[3].friction" in text + "\n".join(found.notes)
+    assert "surfaces[1].friction" in text and "surfaces[2].friction" in text
+    assert len(repr(found).splitlines()) <= 10
+
+
+def test_friction_and_lever_arm_from_one_amplitude_are_named() -> None:
+    """Both radii of a pair act together with the heights between them."""
+    paths = ["friction[0]", "surfaces[0].radius", "bodies[0].height"]
+    found = fit(rig(), [measured(0.05)], [f"bearing.{path}" for path in paths])
+    assert any("radius" in line and "height" in line for line in found.unidentified), found.unidentified
+
+
+def test_covariance_and_names_of_a_linear_fit() -> None:
+    x = np.linspace(-1, 1, 50)
+    jacobian = np.column_stack([x, x**2, 2 * x, np.zeros(50)])
+    found = spread_of(jacobian, 0.04, "abcd")
+    assert found.unidentified[0] == "not seen by the tests: d"
+    assert found.unidentified[1].startswith("cannot be told apart by these tests: a, c;")
+    assert np.isinf(found.condition)
+    assert found.covariance[1, 1] == pytest.approx(0.04 / (x**4).sum())
+    assert np.isinf(np.diag(found.covariance)[[0, 2, 3]]).all()
+    correlation = correlation_of(found.covariance)
+    assert correlation[1, 1] == pytest.approx(1.0) and np.isnan(correlation[0]).all()
+    whole = spread_of(jacobian[:, :2], 1.0, "ab")
+    assert whole.covariance == pytest.approx(np.linalg.inv(jacobian[:, :2].T @ jacobian[:, :2]))
+
+
+def test_the_jacobian_is_that_of_the_residuals() -> None:
+    scene = replace(rig(), solver=replace(rig().solver, rtol=1e-8))
+    residuals = start_fit(scene, [measured(0.05)], FRICTION, offset=True)
+    x = np.array([1.0, 1.0, 1.0, 0.01])
+    exact = residuals.at(x).jacobian
+    for column, step in enumerate(1e-3 * np.eye(4)):
+        difference = (residuals.at(x + step).residuals - residuals.at(x - step).residuals) / 2e-3
+        assert np.linalg.norm(difference - exact[:, column]) < 0.03 * max(np.linalg.norm(exact[:, column]), 1e-2)
+
+
+def test_long_records_are_averaged_in_blocks() -> None:
+    time = np.linspace(0, 10, 5001)
+    test = Measurement("long", time, np.sin(time), np.sin(time + 0.2)).sampled()
+    assert len(test.time) <= 2000
+    assert test.time[0] == 0 and test.time[1] == pytest.approx(time[1:4].mean())
+    assert test.displacement[5] == pytest.approx(np.sin(test.time[5]), abs=1e-5)
+
+
+def test_files_with_other_columns_and_units(tmp_path: Path) -> None:
+    test = measured(0.05)
+    path = tmp_path / "lab.txt"
+    rows = zip(test.time, test.force / 1e3, test.displacement, strict=True)
+    text = "\n".join(f"{t!r};{f!r};{u!r}" for t, f, u in ((float(a), float(b), float(c)) for a, b, c in rows))
+    path.write_text("# rig 3\nTime (s);Load cell;Stroke [m]\n" + text, encoding="utf-8")
+    read = read_measurement(path, {"force": "Load cell [kN]", "displacement": "stroke"})
+    assert read.force == pytest.approx(test.force) and read.displacement == pytest.approx(test.displacement)
+    with pytest.raises(InputError, match=r"^lab.txt, line 2: column 'Load cell' has no unit"):
+        read_measurement(path, {"force": "Load cell", "displacement": "stroke"})
+    with pytest.raises(InputError, match=r"^lab.txt, line 2: no column 'force' among 'Time \(s\)'"):
+        read_measurement(path, {"displacement": "stroke"})
+
+
+@pytest.mark.parametrize(
+    ("row", "text", "message"),
+    [
+        (4, "0.2,x,1", "line 5: column 'displacement [mm]': 'x' is not a finite number"),
+        (4, "0.2,1,nan", "line 5: column 'force [kN]': 'nan' is not a finite number"),
+        (4, "0.2,1", "line 5: 2 columns, the header names 3"),
+        (4, "0,1,1", "line 5: column 'time [s]': 0 does not increase"),
+        (0, "time [s],displacement [mm],force [mm]", "line 1: column 'force [mm]': the unit 'mm' is not a unit of [N]"),
+    ],
+)
+def test_bad_rows_are_named(tmp_path: Path, row: int, text: str, message: str) -> None:
+    path = written(tmp_path, measured(0.05))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines[row] = text
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_measurement(path)
+    assert str(caught.value).startswith(f"test.csv, {message}")
+
+
+def test_tests_that_cannot_be_fitted_are_refused() -> None:
+    test = measured(0.05)
+    for changes, message in (
+        ({"force": -test.force}, "opposite signs"),
+        ({"displacement": test.displacement + 0.02}, "row 1: displacement = 0.02 m; a run starts at the centre"),
+        ({"time": test.time[::-1]}, "row 2: time = .* does not increase"),
+        ({"force": 0 * test.force}, "force is constant"),
+        ({"weight": 0.0}, "weight = 0.0: give a positive number"),
+    ):
+        with pytest.raises(InputError, match=message):
+            replace(test, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("paths", "bounds", "message"),
+    [
+        (["motion.scale"], {}, "the tests give the motion"),
+        (["friction[9]"], {}, "there are 4 of them"),
+        (["friction[0]", "friction[0]=friction[1]"], {}, "given twice"),
+        (["friction[0]=radius[0]"], {}, "different quantities"),
+        (["friction[0]"], {"friction[1]": (0.0, 1.0)}, "no parameter of this fit"),
+        (["friction[0]"], {"friction[0]": (-1.0, 1.0)}, "this field is at least 0"),
+        (["friction[0]"], {"friction[0]": (0.1, 0.2)}, "the scene has 0.039"),
+        (["friction[0]"], {"friction[0]": (0.2, 0.1)}, "a lower bound below an upper one"),
+        ([], {}, "give a list of paths"),
+    ],
+)
+def test_wrong_parameters_and_bounds_are_named(paths: list[str], bounds: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        fit(start(), [measured(0.05)], paths, bounds=bounds)
+
+
+def test_scenes_that_are_no_test_are_refused() -> None:
+    with pytest.raises(InputError, match="no contact damping"):
+        fit(load_scene("fenz-test2"), [measured(0.05)], ["friction[0]"])
+    with pytest.raises(InputError, match=r'top\.kind = "mass"'):
+        fit(load_scene("ridgecrest-clc"), [measured(0.05)], ["friction[0]"])
+    with pytest.raises(InputError, match=r"tests = .*give a list"):
+        fit(start(), [], ["friction[0]"])
+
+
+def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, test = tmp_path / "scene.toml", written(tmp_path, measured(0.05))
+    scene.write_text(scene_text(near()), encoding="utf-8")
+    out = tmp_path / "out"
+    command = ["fit", str(scene), str(test), "-p", "friction[0],friction[1]=friction[2]"]
+    command += ["--bounds", "friction[0]=0.01:0.09", "--axial-load", "112e3", "--weights", "2", "--offset"]
+    assert main([*command, "--json", "-o", str(out)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["estimates"][0]["value"] == pytest.approx(TRUE[0], rel=0.02)
+    assert {path.name for path in out.iterdir()} == {"scene.toml", "fit.json", "residuals.csv", "fit.png"}
+    fitted = load_scene(out / "scene.toml")
+    assert fitted.bearing.surfaces[0].friction == found["estimates"][0]["value"]
+    assert fitted.motion == near().motion
+    assert len((out / "residuals.csv").read_text().splitlines()) == ROWS + 1
+    assert tomllib.loads((out / "scene.toml").read_text())["bearing"]["surfaces"][1]["friction"] != 0.0136
+    assert main(command) == 0
+    assert "95 % interval" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--axial-load", "1e5,2e5"], "--axial-load = '1e5,2e5': give 1 numbers"),
+        (["--bounds", "friction[0]"], "--bounds = 'friction[0]'"),
+        (["--column", "force"], "--column = 'force'"),
+        (["--column", "load=x"], "columns: 'load' is no column"),
+    ],
+)
+def test_wrong_options_write_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], message: str
+) -> None:
+    test = written(tmp_path, measured(0.05))
+    out = tmp_path / "out"
+    assert main(["fit", "fenz-test2", str(test), "-p", "friction[0]", "-o", str(out), *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_model_that_misses_part_of_the_test_gets_a_note() -> None:
+    found = fit(start(), [measured(0.05)], FRICTION[:2])
+    assert any("residuals are correlated" in note for note in found.notes)
+
+
+def test_a_value_at_its_bound_gets_a_note() -> None:
+    found = fit(start(), [measured(0.12)], FRICTION[:1], bounds={"friction[0]": (0.035, 0.05)})
+    assert found[PATHS[0]].at_bound and found[PATHS[0]].value == pytest.approx(0.035, rel=1e-2)
+    assert any("at its bound" in note for note in found.notes)
+
+
+def test_a_fit_that_does_not_converge_says_so() -> None:
+    with pytest.raises(RunError, match="not converged after 2 evaluations"):
+        fit(start(), [measured(0.12)], FRICTION, max_evaluations=2)
+
+
+def test_progress_counts_evaluations() -> None:
+    seen: list[tuple[int, float, float]] = []
+    found = fit(start(), [measured(0.12)], FRICTION[:1], progress=lambda *given: seen.append(given))
+    assert {count for count, _, _ in seen} == set(range(1, found.evaluations + 1))
+    assert all(0 <= share <= 1 for _, share, _ in seen)
+    assert seen[-1][2] > 0
