@@ -12,6 +12,8 @@ from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import characterise
+    from msfp_gen.buildings.building import Building
+    from msfp_gen.buildings.storey import BaseSlab, Storey
     from msfp_gen.coupling.two_port import TwoPort
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
     from msfp_gen.model.model import build_model
@@ -34,8 +36,10 @@ if TYPE_CHECKING:
 # Public name -> the module that defines it; `presets` is a module itself.
 _MODULES = {
     "Auto": "specification.layout",
+    "BaseSlab": "buildings.storey",
     "Bearing": "scene.bearing",
     "Body": "scene.bearing",
+    "Building": "buildings.building",
     "CompileError": "errors",
     "Effects": "specification.layout",
     "InitialState": "scene.parts",
@@ -50,6 +54,7 @@ _MODULES = {
     "Scene": "scene.scene",
     "Solver": "scene.solver",
     "Stop": "scene.parts",
+    "Storey": "buildings.storey",
     "Surface": "scene.bearing",
     "Top": "scene.top",
     "TwoPort": "coupling.two_port",
@@ -66,8 +71,10 @@ _MODULES = {
 
 __all__ = [
     "Auto",
+    "BaseSlab",
     "Bearing",
     "Body",
+    "Building",
     "CompileError",
     "Effects",
     "InitialState",
@@ -82,6 +89,7 @@ __all__ = [
     "Scene",
     "Solver",
     "Stop",
+    "Storey",
     "Surface",
     "Top",
     "TwoPort",
