@@ -13,6 +13,8 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import characterise
     from msfp_gen.buildings.building import Building
+    from msfp_gen.buildings.file import load_building
+    from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
     from msfp_gen.buildings.storey import BaseSlab, Storey
     from msfp_gen.coupling.two_port import TwoPort
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
     from msfp_gen.simulation.batch import simulate_batch
-    from msfp_gen.simulation.simulate import simulate
+    from msfp_gen.simulation.either import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
     from msfp_gen.studies.bounding import bound
     from msfp_gen.studies.study.run import study
@@ -40,6 +42,8 @@ _MODULES = {
     "Bearing": "scene.bearing",
     "Body": "scene.bearing",
     "Building": "buildings.building",
+    "BuildingBearing": "buildings.scene",
+    "BuildingScene": "buildings.scene",
     "CompileError": "errors",
     "Effects": "specification.layout",
     "InitialState": "scene.parts",
@@ -62,9 +66,10 @@ _MODULES = {
     "build_model": "model.model",
     "changed_scene": "scene.file.loader",
     "characterise": "analysis.characterise",
+    "load_building": "buildings.file",
     "load_scene": "scene.file.loader",
     "presets": "scene.file.presets",
-    "simulate": "simulation.simulate",
+    "simulate": "simulation.either",
     "simulate_batch": "simulation.batch",
     "study": "studies.study.run",
 }
@@ -75,6 +80,8 @@ __all__ = [
     "Bearing",
     "Body",
     "Building",
+    "BuildingBearing",
+    "BuildingScene",
     "CompileError",
     "Effects",
     "InitialState",
@@ -98,6 +105,7 @@ __all__ = [
     "build_model",
     "changed_scene",
     "characterise",
+    "load_building",
     "load_scene",
     "presets",
     "simulate",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.buildings.damping import FixedBase, fixed_base, modal_damping, rayleigh_damping
-from msfp_gen.buildings.matrices import Matrix, boundary_of, check_free, check_semidefinite, matrix_of
+from msfp_gen.buildings.matrices import Matrix, boundary_of, check_free, check_semidefinite, matrix_of, rigid_motions
 from msfp_gen.buildings.node import FREEDOMS, Node
 from msfp_gen.buildings.storey import BaseSlab, Columns, Storey, frame
 from msfp_gen.common.arrays import Array
@@ -103,6 +103,19 @@ class Building:
         """Natural frequencies on fixed attachments, ascending [Hz]; without damping."""
         return self.fixed.frequencies / (2 * np.pi)
 
+    @cached_property
+    def rigid_motions(self) -> Array:
+        """Coordinates of the six rigid motions of the whole about the origin: ndarray, shape (n, 6)."""
+        return rigid_motions(self.nodes, self._static(self.fixed), self.boundary)
+
+    def uniform_acceleration(self, acceleration: ArrayLike) -> Array:
+        """Forces on the coordinates under which the building accelerates as one, shape (n,); acceleration [m/s^2].
+
+        Gravity is the force of (0, 0, -g).
+        """
+        forces: Array = self.mass @ self.rigid_motions[:, :3] @ np.asarray(acceleration, dtype=float)
+        return forces
+
     def node(self, name: str) -> Node:
         """The node of that name. Raises InputError: there is none."""
         for node in self.nodes:
@@ -132,7 +145,7 @@ class Building:
     def _checked(self) -> Building:
         check_semidefinite(self.damping, "damping")
         for name in ("stiffness", "damping"):
-            check_free(getattr(self, name), name, self.nodes, self._static(self.fixed), self.boundary)
+            check_free(getattr(self, name), name, self.rigid_motions)
         return self
 
     def _static(self, fixed: FixedBase) -> Array:

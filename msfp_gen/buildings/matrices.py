@@ -89,17 +89,22 @@ def boundary_of(nodes: tuple[Node, ...]) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
-def check_free(matrix: Array, name: str, nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> None:
-    """Raise InputError where stiffness or damping resist a rigid motion of the building, which only bearings may do.
+def rigid_motions(nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> Array:
+    """Coordinates of the six rigid motions of the building, shape (n, 6).
 
-    follow: response of the other coordinates to the boundary, shape (n, boundary).
+    follow: static response of all coordinates to those of the boundary, shape (n, boundary).
     """
-    motions = np.zeros((len(matrix), FREEDOMS))
+    motions = np.zeros((len(follow), FREEDOMS))
     for node in nodes:
         if node.carries:
             own = np.flatnonzero(np.any(node.rows, axis=0))
             motions[own] = np.linalg.solve(node.rows[:, own], rigid(node.position))
-    motions = follow @ motions[list(boundary)]
+    moved: Array = follow @ motions[list(boundary)]
+    return moved
+
+
+def check_free(matrix: Array, name: str, motions: Array) -> None:
+    """Raise InputError where stiffness or damping resist a rigid motion of the building, which only bearings may do."""
     forces = np.abs(matrix @ motions)
     scale = np.abs(matrix) @ np.abs(motions)
     for index, motion in enumerate(MOTIONS):
