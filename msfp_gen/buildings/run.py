@@ -9,7 +9,7 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.step import Coupling, State, UnconvergedError
 from msfp_gen.errors import RunError
 
-HALVINGS = 8  # of a step at which Newton's method fails
+HALVINGS = 6  # of a step that fails
 
 
 def simulate_building(scene: BuildingScene) -> BuildingResult:
@@ -34,23 +34,17 @@ def simulate_building(scene: BuildingScene) -> BuildingResult:
 
 
 def _advance(coupling: Coupling, state: State, end: float) -> State:
-    """Steps until the time `end` [s]: one, or shorter ones where Newton's method fails."""
-    for halving in range(HALVINGS + 1):
-        parts = 2**halving
-        now = state
+    """Steps until the time `end` [s]: one, or shorter ones where a step fails. Raises RunError."""
+    h, shortest = end - state.time, (end - state.time) * 0.6 / 2**HALVINGS
+    while True:
+        last = state.time + 1.5 * h > end
         try:
-            for part in range(1, parts + 1):
-                # Parts of a step are committed one by one, so only the first may fail without loss.
-                h = (end - state.time) * part / parts + state.time - now.time
-                now = coupling.step(now, h)
-                coupling.commit()
-        except UnconvergedError:
-            if now is not state:
-                return _advance(coupling, now, end)
+            state = coupling.step(state, end - state.time if last else h)
+        except UnconvergedError as error:
+            if h < shortest:
+                raise RunError(str(error), status=error.status) from None
+            h /= 2
             continue
-        return now
-    raise RunError(
-        f"building: stopped at t = {state.time:.6g} s of {coupling.scene.end:.6g} s: the forces of bearings and "
-        "building have no balance that the iteration finds; give a shorter solver.max_step",
-        status="newton",
-    )
+        coupling.commit()
+        if last:
+            return state

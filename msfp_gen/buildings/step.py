@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.response import Response
 from msfp_gen.coupling.two_port import TwoPort
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.scene.top import NodeTop
 
 GAMMA = 2 - np.sqrt(2)  # first stage, as a share of the step: both stages then have the same matrix
 STAGE = GAMMA / 2  # weight of the rate at the end of a stage
@@ -30,7 +32,11 @@ class State(NamedTuple):
 
 
 class UnconvergedError(Exception):
-    """A stage has no solution that Newton's method finds."""
+    """A stage has no solution that Newton's method finds: message and status of the run that it ends."""
+
+    def __init__(self, message: str, status: str) -> None:
+        super().__init__(message)
+        self.status = status
 
 
 class Coupling:
@@ -44,13 +50,13 @@ class Coupling:
         self.scale = scene.building.uniform_acceleration([scene.gravity, 0.0, 0.0])
         self.at_rest = np.array([[0.0, 0.0, -load, 0.0, 0.0, 0.0] for load in scene.axial_loads])
         self.responses: list[Response] = []
-        self.stiffnesses = np.zeros((len(self.ports), 6, 6))
+        self.stiffnesses = [_interface_stiffness(each.interface) for each in scene.bearings]
         self.inverse = np.zeros((0, 0))
         self.tau = 0.0
         self.trials = self.tangents = 0
 
     def step(self, begin: State, h: float) -> State:
-        """The state after a step of length h [s], which the bearings have tried. Raises UnconvergedError, RunError."""
+        """The state after a step of length h [s], which the bearings have tried. Raises UnconvergedError."""
         tau = STAGE * h
         if tau != self.tau:
             self.tau, self.inverse = tau, np.zeros((0, 0))
@@ -86,7 +92,11 @@ class Coupling:
                 self._factor()
             last = size
             a = a - self.inverse @ residual / tau**2
-        raise UnconvergedError
+        raise UnconvergedError(
+            f"building: stopped at t = {time:.6g} s of {self.scene.end:.6g} s: the iteration finds no balance of the "
+            "forces of bearings and building; give a shorter solver.max_step",
+            "newton",
+        )
 
     def _size(self, residual: Array) -> float:
         """Norm of a residual in that of the matrix of the stage, in which coordinates of all units add up."""
@@ -105,15 +115,18 @@ class Coupling:
         try:
             return self.ports[index].trial(now.time, lower, np.stack([self.rows[index] @ x for x in now[1:]]))
         except RunError as error:
-            raise RunError(f"{self.scene.label(index)}: {error}", status=error.status) from None
+            raise UnconvergedError(f"{self.scene.label(index)}: {error}", error.status) from None
 
     def _factor(self) -> None:
         """The inverse of the matrix of a stage, with the tangents of the latest trials."""
         building, tau = self.scene.building, self.tau
         matrix = building.mass / tau**2 + building.damping / tau + building.stiffness
-        for rows, response in zip(self.rows, self.responses, strict=True):
+        for index, (rows, response) in enumerate(zip(self.rows, self.responses, strict=True)):
             self.tangents += 1
-            matrix = matrix + rows.T @ response.effective_stiffness(1 / tau, 1 / tau**2)[UPPER, UPPER] @ rows
+            # Where there is no derivative, as in an impact, the previous one: the residual decides all the same.
+            with suppress(RunError):
+                self.stiffnesses[index] = response.effective_stiffness(1 / tau, 1 / tau**2)[UPPER, UPPER]
+            matrix = matrix + rows.T @ self.stiffnesses[index] @ rows
         scale = 1 / np.sqrt(np.diag(matrix))
         self.inverse = scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
 
@@ -124,3 +137,8 @@ def _port(scene: BuildingScene, index: int) -> TwoPort:
         return TwoPort(given.bearing, given.interface, load, given.effects, scene.solver)
     except InputError as error:
         raise InputError(f"scene.bearings[{index}]: {error}") from None
+
+
+def _interface_stiffness(interface: NodeTop) -> Array:
+    k, kr = interface.stiffness, interface.rotational_stiffness
+    return np.diag([k, k, interface.vertical_stiffness, kr, kr, 0.0])
