@@ -12,6 +12,10 @@ from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import characterise
+    from msfp_gen.buildings.building import Building
+    from msfp_gen.buildings.file import load_building
+    from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+    from msfp_gen.buildings.storey import BaseSlab, Storey
     from msfp_gen.coupling.two_port import TwoPort
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
     from msfp_gen.model.model import build_model
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
     from msfp_gen.simulation.batch import simulate_batch
-    from msfp_gen.simulation.simulate import simulate
+    from msfp_gen.simulation.either import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
     from msfp_gen.studies.bounding import bound
     from msfp_gen.studies.calibration import Measurement, fit
@@ -35,8 +39,12 @@ if TYPE_CHECKING:
 # Public name -> the module that defines it; `presets` is a module itself.
 _MODULES = {
     "Auto": "specification.layout",
+    "BaseSlab": "buildings.storey",
     "Bearing": "scene.bearing",
     "Body": "scene.bearing",
+    "Building": "buildings.building",
+    "BuildingBearing": "buildings.scene",
+    "BuildingScene": "buildings.scene",
     "CompileError": "errors",
     "Effects": "specification.layout",
     "InitialState": "scene.parts",
@@ -52,6 +60,7 @@ _MODULES = {
     "Scene": "scene.scene",
     "Solver": "scene.solver",
     "Stop": "scene.parts",
+    "Storey": "buildings.storey",
     "Surface": "scene.bearing",
     "Top": "scene.top",
     "TwoPort": "coupling.two_port",
@@ -60,17 +69,22 @@ _MODULES = {
     "changed_scene": "scene.file.loader",
     "characterise": "analysis.characterise",
     "fit": "studies.calibration",
+    "load_building": "buildings.file",
     "load_scene": "scene.file.loader",
     "presets": "scene.file.presets",
-    "simulate": "simulation.simulate",
+    "simulate": "simulation.either",
     "simulate_batch": "simulation.batch",
     "study": "studies.study.run",
 }
 
 __all__ = [
     "Auto",
+    "BaseSlab",
     "Bearing",
     "Body",
+    "Building",
+    "BuildingBearing",
+    "BuildingScene",
     "CompileError",
     "Effects",
     "InitialState",
@@ -86,6 +100,7 @@ __all__ = [
     "Scene",
     "Solver",
     "Stop",
+    "Storey",
     "Surface",
     "Top",
     "TwoPort",
@@ -95,6 +110,7 @@ __all__ = [
     "changed_scene",
     "characterise",
     "fit",
+    "load_building",
     "load_scene",
     "presets",
     "simulate",

@@ -9,10 +9,16 @@ from typing import Protocol
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.specification.contract import WORKS, names
+
+_DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
 
 
-class Differentiable(Protocol):
-    """What computes the derivatives of its latest trial."""
+class Source(Protocol):
+    """The two-port of a trial."""
+
+    def unpacked(self, row: Array) -> dict[str, Array]:
+        """The values of a row by their names."""
 
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
         """Derivatives of the wrenches of trial `number` along displacements, rates and accelerations of the ends."""
@@ -23,17 +29,34 @@ class Response:
     """Wrenches of a two-port at the end of a trial; rows are the lower and the upper end.
 
     time: of the end of the trial [s]. wrench: force along E1, E2, E3 and moment about the present position of the end,
-    which each end exerts on the bearing: ndarray, shape (2, 6), [N], [N m]. sliding: sliding displacements (3.20),
-    normal_force, shape (n-1,) [m], [N]. dissipated: energy dissipated in the bearing since the start [J].
+    which each end exerts on the bearing: ndarray, shape (2, 6), [N], [N m].
     """
 
     time: float
     wrench: Array
-    sliding: Array
-    normal_force: Array
-    dissipated: float
-    _port: Differentiable
+    _row: Array
+    _port: Source
     _number: int
+
+    @property
+    def sliding(self) -> Array:
+        """Sliding displacements (3.20), shape (n-1,) [m]."""
+        return self._values["sliding"]
+
+    @property
+    def normal_force(self) -> Array:
+        """Normal forces, shape (n-1,) [N]."""
+        return self._values["normal"]
+
+    @property
+    def dissipated(self) -> float:
+        """Energy dissipated in the bearing since the start [J]."""
+        works = dict(zip(names(WORKS), self._values["work"], strict=True))
+        return sum(float(works[name]) for name in _DISSIPATED)
+
+    @cached_property
+    def _values(self) -> dict[str, Array]:
+        return self._port.unpacked(self._row)
 
     @cached_property
     def tangent(self) -> Array:

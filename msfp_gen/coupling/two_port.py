@@ -22,7 +22,7 @@ from msfp_gen.scene.friction_selection import select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, RigTop
-from msfp_gen.specification.contract import STATUSES, WORKS, names
+from msfp_gen.specification.contract import STATUSES
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -33,7 +33,6 @@ LARGEST_ROTATION = 1.5  # of an end [rad]: a run ends at this tilt, next to the 
 SHORTEST = 1e-8  # time of a trial [s], or its share of the time: a shorter one holds no step
 REST = (np.array([0.0, 1.0]), np.zeros((1, 6, 6)))  # knots and coefficients of a base at rest
 _FAILURES = {status.name: status for status in STATUSES}
-_DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
 
 
 class TwoPort:
@@ -138,7 +137,7 @@ class TwoPort:
         self._number += 1
         self._check(self._port.trial(time, ends), time)
         self._trial = (float(time), ends)
-        return self._response(float(time))
+        return Response(float(time), self._port.wrench, self._port.row, self, self._number)
 
     def commit(self) -> None:
         """Accept the latest trial as the state from which the next ones start. Raises InputError: there is none."""
@@ -179,6 +178,10 @@ class TwoPort:
         self._ends = np.frombuffer(state, count=36).reshape(2, 3, 6).copy()
         self.revert()
 
+    def unpacked(self, row: Array) -> dict[str, Array]:
+        """The values of a row by their names, for `Response`."""
+        return self.model.unpack(row)
+
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
         """Derivatives of the wrenches of trial `number`, for its `Response`; word: what they are called there."""
         if number != self._number or self._trial is None:
@@ -211,12 +214,6 @@ class TwoPort:
         where += f", {failure.quantity} = {value:.4g}" if surface and failure.quantity else ""
         reason = f"stopped at t = {reached:.6g} s of {end:.6g} s{where}: {failure.failure}"
         raise RunError(f"two-port: {reason}", status=name)
-
-    def _response(self, time: float) -> Response:
-        row = self.model.unpack(self._port.row)
-        works = dict(zip(names(WORKS), row["work"], strict=True))
-        dissipated = sum(float(works[name]) for name in _DISSIPATED)
-        return Response(time, self._port.wrench, row["sliding"], row["normal"], dissipated, self, self._number)
 
 
 def _scene_at_rest(

@@ -46,7 +46,7 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-def _model(kind: type, /, **more: Any) -> Model:
+def model_of(kind: type, /, **more: Any) -> Model:
     """A pydantic model of the fields of a dataclass that have a rule, and of `more` fields as (annotation, default)."""
     given = {
         name: (_read(rule.parse), ... if default is MISSING else default) for name, rule, default in ruled_fields(kind)
@@ -69,11 +69,11 @@ def _column(rule: Rule, value: object, *, text: bool) -> Any:
 
 def _union(kinds: Iterable[Any]) -> tuple[Any, dict[str, Model]]:
     """The union of the tables that their key `kind` distinguishes, and the model of each kind."""
-    models = {kind.kind: _model(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds}
+    models = {kind.kind: model_of(kind, kind=(Literal[kind.kind], ...), **_inner(kind)) for kind in kinds}
     return Annotated[reduce(or_, models.values()), Field(discriminator="kind")], models
 
 
-_SCALE_TO = _model(ScaleTo)
+_SCALE_TO = model_of(ScaleTo)
 
 
 def _inner(kind: type) -> Table:
@@ -91,7 +91,8 @@ def _bearing_kind(value: Any) -> str:
     return "preset" if isinstance(value, Mapping) and "preset" in value else "full"
 
 
-def _rows(model: Model) -> Any:
+def rows_of(model: Model) -> Any:
+    """The annotation of a list of such tables."""
     return GenericAlias(list, (model,))
 
 
@@ -106,14 +107,14 @@ def _auto(model: Model) -> Any:
     return Annotated[model, BeforeValidator(lambda value: {} if value == "auto" else value)]
 
 
-_SURFACE, _BODY, _LAYOUT = _model(Surface), _model(Body), _model(Layout)
+_SURFACE, _BODY, _LAYOUT = model_of(Surface), model_of(Body), model_of(Layout)
 _FRICTION_AT: Any = (Literal["surface", "pivot"], "surface")
-_BEARING = _model(
+_BEARING = model_of(
     Bearing,
     friction_at=_FRICTION_AT,
     layout=(_LAYOUT, ...),
-    surfaces=(_rows(_SURFACE), ...),
-    bodies=(_rows(_BODY), ...),
+    surfaces=(rows_of(_SURFACE), ...),
+    bodies=(rows_of(_BODY), ...),
 )
 _CHANGES: Table = {name: (_read(rule.parse), None) for name, rule, _ in ruled_fields(Bearing)} | {
     name: (_read(partial(_column, rule)), None) for kind in (Surface, Body) for name, rule, _ in ruled_fields(kind)
@@ -124,20 +125,20 @@ _PRESET: Model = create_model(
 _EITHER = _bearing_union(_BEARING, _PRESET)
 _ROTATION, _ROTATIONS = _union(ROTATIONS.values())
 _LOAD, _LOADS = _union(LOADS.values())
-_MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
+MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
 _TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
-_PARTS: dict[str, Model] = {
-    name: _model(kind)
+PARTS: dict[str, Model] = {
+    name: model_of(kind)
     for name, kind in (("effects", Auto), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
 }
-_SCENE = _model(
+_SCENE = model_of(
     Scene,
     bearing=(_EITHER, ...),
-    motion=(_MOTION, ...),
+    motion=(MOTION, ...),
     top=(_TOP, ...),
     load=(_LOAD, None),
     top_rotation=(_ROTATION, None),
-    **{name: (_auto(model) if name == "effects" else model, None) for name, model in _PARTS.items()},
+    **{name: (_auto(model) if name == "effects" else model, None) for name, model in PARTS.items()},
 )
 # Every table by its path, union tags included: the known keys for messages about a misspelt or missing key.
 _TABLES: dict[str, Model] = {
@@ -153,7 +154,7 @@ _TABLES: dict[str, Model] = {
     **{f"load.{kind}": model for kind, model in _LOADS.items()},
     **{f"top_rotation.{kind}": model for kind, model in _ROTATIONS.items()},
     **{f"motion.{kind}.rotation.{turn}": model for kind in _MOTIONS for turn, model in _ROTATIONS.items()},
-    **_PARTS,
+    **PARTS,
 }
 _TAGGED = ("bearing", "motion", "top", "load", "top_rotation")
 _REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of the known words"}
@@ -161,26 +162,26 @@ _REMEDIES = {"list_type": "give a list of tables", "literal_error": "give one of
 
 def validate_scene(table: Mapping[str, Any]) -> Table:
     """The table of a scene with its quantities in SI units and only the given keys; raises InputError of one line."""
-    return _validate(_SCENE, table)
+    return validate(_SCENE, table)
 
 
 def validate_bearing(table: Mapping[str, Any]) -> Table:
     """The same for a `[bearing]` table."""
-    return _validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
+    return validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
 
 
 def validate_suite(table: Mapping[str, Any]) -> Table:
     """The same for the table of a suite of records: `records`, and `scale_to` with `least_share`."""
-    return _validate(_SUITE, table)
+    return validate(_SUITE, table)
 
 
 _SHARE = Annotated[Any, PlainValidator(partial(Quantity("", above=0.0).parse, text=True))]
-_SUITE_MOTION = _model(motion_tables.RecordMotion, **_inner(motion_tables.RecordMotion))
-_SUITE_TARGET = _model(ScaleTo, least_share=(_SHARE, None))
+_SUITE_MOTION = model_of(motion_tables.RecordMotion, **_inner(motion_tables.RecordMotion))
+_SUITE_TARGET = model_of(ScaleTo, least_share=(_SHARE, None))
 _SUITE: Model = create_model(
     "Suite",
     __base__=_Strict,
-    records=(_rows(_SUITE_MOTION), ...),
+    records=(rows_of(_SUITE_MOTION), ...),
     scale_to=(_SUITE_TARGET, None),
 )
 _TABLES |= {"records": _SUITE_MOTION, "records.scale_to": _SCALE_TO, "scale_to": _SUITE_TARGET}
@@ -188,14 +189,18 @@ _TABLES |= {"records": _SUITE_MOTION, "records.scale_to": _SCALE_TO, "scale_to":
 _ONLY_BEARING = create_model("OnlyBearing", __base__=_Strict, bearing=(_EITHER, ...))
 
 
-def _validate(model: Model, table: Mapping[str, Any]) -> Table:
+def validate(model: Model, table: Mapping[str, Any], tables: Mapping[str, Model] | None = None) -> Table:
+    """The same for a table of a model, `tables`: every table in it by its path, for messages; None: of a scene."""
     try:
         return _plain(model.model_validate(table))  # type: ignore[no-any-return]
     except ValidationError as error:
         details = error.errors(include_url=False)
     # A misspelt key is reported twice, as unknown and as missing: the report of the unknown key is more helpful.
     detail = min(details, key=lambda each: each["type"] != "extra_forbidden")
-    raise InputError(_one_line(detail["type"], detail["loc"], detail["input"], detail.get("ctx", {})))
+    location = detail["loc"]
+    path = ".".join(part for part in location[:-1] if isinstance(part, str))
+    inner = (_TABLES if tables is None else tables).get(path, _Strict)
+    raise InputError(_one_line(inner, detail["type"], location, detail["input"], detail.get("ctx", {})))
 
 
 def _plain(value: Any) -> Any:
@@ -205,9 +210,8 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list) else value
 
 
-def _one_line(kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
+def _one_line(table: Model, kind: str, location: tuple[int | str, ...], value: Any, context: Mapping[str, Any]) -> str:
     path, note = _path(location)
-    table = _TABLES.get(".".join(part for part in location[:-1] if isinstance(part, str)), _Strict)
     if kind == "extra_forbidden":
         known = list(table.model_fields)
         hint = suggestion(str(location[-1]), known) or f"; the keys here are {', '.join(known)}"

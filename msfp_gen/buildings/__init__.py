@@ -1,0 +1,1 @@
+"""Buildings on bearings: linear superstructures, their bearings, and their motion (docs/buildings.md)."""

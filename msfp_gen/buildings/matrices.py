@@ -1,0 +1,116 @@
+"""Matrices of a building from arrays and files (.npz, Matrix Market), and the checks that they are those of one."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.buildings.node import FREEDOMS, MOTIONS, Node, rigid
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+
+MOST = 5000  # coordinates of a building, whose matrices are dense
+SYMMETRY = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
+STRAIN = 1e-6  # largest force of a rigid motion, relative to that which the same matrix exerts on single coordinates
+Matrix = ArrayLike | str | PathLike[str]
+
+
+def matrix_of(source: Matrix, name: str) -> Array:
+    """A square symmetric matrix: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
+
+    Raises InputError that names `building.name`.
+    """
+    path = f"building.{name}"
+    values = _read(Path(source), path, name) if isinstance(source, str | PathLike) else source
+    try:
+        found = np.array(values.toarray() if hasattr(values, "toarray") else values, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{path}: these are no numbers; give a square array or the path of a file") from None
+    if found.ndim != 2 or found.shape[0] != found.shape[1] or not 0 < len(found) <= MOST:
+        raise InputError(f"{path} has the shape {found.shape}: give a square matrix of 1 to {MOST} coordinates")
+    if not np.all(np.isfinite(found)):
+        row, column = np.argwhere(~np.isfinite(found))[0]
+        raise InputError(f"{path}[{row}, {column}] = {found[row, column]}: give finite numbers")
+    difference = np.abs(found - found.T)
+    if difference.max() > SYMMETRY * np.abs(found).max():
+        row, column = np.unravel_index(int(difference.argmax()), found.shape)
+        raise InputError(
+            f"{path}[{row}, {column}] = {found[row, column]:.9g} and [{column}, {row}] = {found[column, row]:.9g}: "
+            "give a symmetric matrix"
+        )
+    average: Array = (found + found.T) / 2
+    return average
+
+
+def _read(path: Path, field: str, name: str) -> Any:
+    try:
+        if path.suffix == ".npz":
+            with np.load(path, allow_pickle=False) as file:
+                if name not in file:
+                    raise InputError(f"{field} = {str(path)!r}: it has no array {name!r} but {', '.join(file)}")
+                return file[name]
+        if path.suffix == ".mtx":
+            from scipy.io import mmread
+
+            return mmread(path)
+    except OSError as error:
+        raise InputError(f"{field} = {str(path)!r}: cannot be read ({error.strerror}); check the file") from None
+    except InputError:
+        raise
+    except Exception as error:  # readers raise several types of exception for a damaged file
+        raise InputError(f"{field} = {str(path)!r}: {error}; check the file") from None
+    raise InputError(f"{field} = {str(path)!r}: give a file of Matrix Market (.mtx) or of NumPy (.npz)")
+
+
+def check_semidefinite(matrix: Array, name: str) -> None:
+    """Raise InputError where a matrix has an eigenvalue below zero, beyond rounding."""
+    values = np.linalg.eigvalsh(matrix)
+    if values[0] < -1e-9 * max(abs(values[0]), abs(values[-1])):
+        raise InputError(f"building.{name} has the eigenvalue {values[0]:.3g}: give a matrix without negative ones")
+
+
+def boundary_of(nodes: tuple[Node, ...]) -> tuple[int, ...]:
+    """Coordinates on which the nodes that carry bearings depend. Raises InputError where two share one."""
+    found: list[int] = []
+    for node in nodes:
+        if node.carries:
+            own = np.flatnonzero(np.any(node.rows, axis=0)).tolist()
+            if shared := set(own) & set(found):
+                raise InputError(f"building.nodes[{node.name!r}]: coordinate {min(shared)} is that of another node")
+            if len(own) != FREEDOMS or np.linalg.matrix_rank(node.rows[:, own]) < FREEDOMS:
+                raise InputError(f"building.nodes[{node.name!r}] depends on {own}: give six different coordinates")
+            found += own
+    if not found:
+        raise InputError("building.nodes: none carries bearings; give at least one with its six coordinates")
+    return tuple(sorted(found))
+
+
+def rigid_motions(nodes: tuple[Node, ...], follow: Array, boundary: tuple[int, ...]) -> Array:
+    """Coordinates of the six rigid motions of the building, shape (n, 6).
+
+    follow: static response of all coordinates to those of the boundary, shape (n, boundary).
+    """
+    motions = np.zeros((len(follow), FREEDOMS))
+    for node in nodes:
+        if node.carries:
+            own = np.flatnonzero(np.any(node.rows, axis=0))
+            motions[own] = np.linalg.solve(node.rows[:, own], rigid(node.position))
+    moved: Array = follow @ motions[list(boundary)]
+    return moved
+
+
+def check_free(matrix: Array, name: str, motions: Array) -> None:
+    """Raise InputError where stiffness or damping resist a rigid motion of the building, which only bearings may do."""
+    forces = np.abs(matrix @ motions)
+    scale = np.abs(matrix) @ np.abs(motions)
+    for index, motion in enumerate(MOTIONS):
+        if forces[:, index].max(initial=0.0) > STRAIN * max(float(scale[:, index].max(initial=0.0)), 1e-300):
+            remedy = {
+                "stiffness": "leave out its supports, which the bearings are, and give the positions of the nodes",
+                "damping": "leave it out and give damping_ratio, or give one relative to the attachments",
+            }[name]
+            raise InputError(f"building.{name} resists a {motion} of the whole building; {remedy}")

@@ -1,0 +1,170 @@
+"""`BuildingScene`: a building, its bearings and the motion of the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from msfp_gen.buildings.building import Building
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Quantity, check_fields, require_type
+from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.top import NodeTop
+from msfp_gen.specification.layout import Effects
+
+BALANCE = 1e-6  # largest part of the weight that the bearings do not balance at rest
+REST = 1e-9  # largest velocity of the ground at the start [m/s]
+
+
+@dataclass(frozen=True)
+class BuildingBearing:
+    """A bearing of a building.
+
+    bearing: its values; the same one may carry the building at several places. interface: `Top.node(...)`, stiffness
+    and damping between its top plate and the building. position: in plan [m]; None: that of the node. node: of the
+    building, to which a rigid link attaches it. effects: `Effects` of its model; None: the default ones, with the
+    friction law whose parameters its surfaces have. name: for messages and results. Raises InputError.
+    """
+
+    bearing: Bearing
+    interface: NodeTop
+    position: Annotated[tuple[float, float] | None, Quantity("m", shape=(2,))] = None
+    node: str = "base"
+    effects: Effects | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require_type(self.bearing, Bearing, "building_bearing.bearing")
+        require_type(self.interface, NodeTop, "building_bearing.interface")
+        require_type(self.effects, (Effects, type(None)), "building_bearing.effects")
+        check_fields(self, "building_bearing")
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingScene:
+    """The complete input of the run of a building.
+
+    building; bearings: at least one, of any layouts, which stand on the same rigid ground. motion: of the ground, from
+    rest, in translation. solver: `rtol` of the bearings; `max_step`: step of the building [s]; None: 5 ms, or that of
+    the motion where it is shorter. duration [s]; None: that of the motion. Raises InputError: inconsistent parts, or
+    weights that the bearings do not balance.
+    """
+
+    building: Building
+    bearings: Sequence[BuildingBearing]
+    motion: Motion
+    solver: Solver = field(default_factory=Solver)
+    duration: Annotated[float | None, Quantity("s", above=0.0)] = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        require_type(self.building, Building, "scene.building")
+        require_type(self.motion, Motion, "scene.motion")
+        require_type(self.solver, Solver, "scene.solver")
+        object.__setattr__(self, "bearings", tuple(self.bearings))
+        for index, each in enumerate(self.bearings):
+            require_type(each, BuildingBearing, f"scene.bearings[{index}]")
+        if not self.bearings:
+            raise InputError("scene.bearings: there are none; give at least one BuildingBearing")
+        check_fields(self, "scene")
+        self._check_gravity()
+        self._check_motion()
+        if self.solver.method == "dopri5":
+            raise InputError("solver.method = 'dopri5': the run of a building is implicit; give 'implicit'")
+        _ = self.axial_loads
+
+    @property
+    def end(self) -> float:
+        """Time at which the run ends [s]."""
+        return self.motion.duration if self.duration is None else self.duration
+
+    @property
+    def step(self) -> float:
+        """Step of the building [s]."""
+        if self.solver.max_step is not None:
+            return self.solver.max_step
+        return min(5e-3, self.motion.max_step or 5e-3)
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of gravity, that of the bearings [m/s^2]."""
+        return self.bearings[0].bearing.gravity
+
+    def label(self, index: int) -> str:
+        """What messages call a bearing."""
+        name = self.bearings[index].name
+        return f"bearing {index + 1}" + (f" ({name})" if name else "")
+
+    @cached_property
+    def attachments(self) -> Array:
+        """Motion of the upper ends of the bearings: rows, shape (bearings, 6, n)."""
+        return np.stack([self._attachment(index) for index in range(len(self.bearings))])
+
+    @cached_property
+    def weights(self) -> Array:
+        """Forces of gravity on the coordinates of the building, shape (n,)."""
+        return self.building.uniform_acceleration([0.0, 0.0, -self.gravity])
+
+    @cached_property
+    def axial_loads(self) -> Array:
+        """Compression of the bearings at rest, on the vertical springs of their interfaces, shape (bearings,) [N].
+
+        Raises InputError: the weights are not balanced, or a bearing would be in tension.
+        """
+        rows = self.attachments[:, 2]
+        springs = np.array([each.interface.vertical_stiffness for each in self.bearings])
+        stiffness = self.building.stiffness + rows.T * springs @ rows
+        # Horizontal motions meet no spring: the least of all solutions. Rounding is relative to each coordinate.
+        scale = 1 / np.sqrt(np.maximum(np.diag(stiffness), 1e-9 * np.diag(stiffness).max()))
+        found = scale * np.linalg.lstsq(scale[:, None] * stiffness * scale, scale * self.weights, rcond=1e-12)[0]
+        loads: Array = -springs * (rows @ found)
+        motions = self.building.rigid_motions
+        left = motions.T @ (self.weights + rows.T @ loads)
+        weight = float(np.abs(motions[:, 2] @ self.weights))
+        arms = np.array([1.0, 1.0, 1.0, *3 * [max(1.0, float(np.abs(rows @ motions[:, 3:]).max()))]])
+        if np.any(np.abs(left) > BALANCE * weight * arms):
+            raise InputError(
+                "scene.bearings: vertical forces at their positions do not balance the weight of the building about "
+                f"E1 and E2 ({left[3]:.4g}, {left[4]:.4g} N m are left); place them around the centre of mass"
+            )
+        for index, load in enumerate(loads):
+            if load <= 0:
+                raise InputError(f"scene.bearings[{index}].position: it carries {load:.4g} N at rest; move it [m]")
+        return loads
+
+    def _attachment(self, index: int) -> Array:
+        given = self.bearings[index]
+        try:
+            node = self.building.node(given.node)
+        except InputError as error:
+            raise InputError(f"scene.bearings[{index}].{error}") from None
+        if not node.carries:
+            raise InputError(f"scene.bearings[{index}].node = {given.node!r}: no bearing can be attached there")
+        return node.rows if given.position is None else node.linked([*given.position, node.position[2]])
+
+    def _check_gravity(self) -> None:
+        for index, each in enumerate(self.bearings):
+            if each.bearing.gravity != self.gravity:
+                raise InputError(
+                    f"scene.bearings[{index}].bearing.gravity = {each.bearing.gravity}: that of the first is "
+                    f"{self.gravity}; give all the same [m/s^2]"
+                )
+
+    def _check_motion(self) -> None:
+        if np.any(self.motion.coefficients[:, 3:]):
+            raise InputError("scene.motion: the ground rotates; a building takes translations, leave the rotation out")
+        speed = float(np.abs(self.motion.velocity(0.0)).max())
+        if speed > REST:
+            raise InputError(f"scene.motion: it starts with {speed:.3g} m/s; give a motion that starts from rest")
+        if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):
+            raise InputError(
+                f"scene.duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, "
+                "or motion.held(...)"
+            )

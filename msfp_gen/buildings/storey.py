@@ -1,0 +1,141 @@
+"""`Storey` and `BaseSlab`: floors and columns of a frame with rigid diaphragms, and its matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from msfp_gen.buildings.node import FREEDOMS, Node, rigid
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.errors import InputError
+
+_POINT = Quantity("m", shape=(2,))
+_INERTIA = Quantity("kg m^2", above=0.0, shape=(3,))
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+_RIGID = [2, 3, 4]  # freedoms of a floor on rigid columns that follow the floor below
+_OWN = [0, 1, 5]  # and those that it has itself
+
+
+@dataclass(frozen=True)
+class BaseSlab:
+    """The slab above the bearings, a rigid body to which they are attached.
+
+    mass [kg]. inertia: about E1, E2 and E3 through the centre of mass [kg m^2]. mass_centre: in plan [m]. Raises
+    InputError.
+    """
+
+    mass: Annotated[float, Quantity("kg", above=0.0)]
+    inertia: Annotated[Triple, _INERTIA]
+    mass_centre: Annotated[Pair, _POINT] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self, "base")
+
+
+@dataclass(frozen=True)
+class Storey:
+    """A floor, and the columns that carry it: springs at half height, as columns between rigid floors have them.
+
+    height: from the floor below [m]. mass, inertia, mass_centre: of the floor, as in `BaseSlab`. stiffness: of all
+    columns along E1 and E2, of fixed ends 12 E I/h^3 each; one number for both [N/m]. torsional_stiffness: about E3
+    through the stiffness centre [N m/rad]. stiffness_centre: in plan [m]. vertical_stiffness [N/m] and
+    rocking_stiffness, about E1 and E2 [N m/rad]: of columns that shorten; None for both: the floor has no vertical
+    motion and no tilt of its own but follows the floor below. Raises InputError.
+    """
+
+    height: Annotated[float, Quantity("m", above=0.0)]
+    mass: Annotated[float, Quantity("kg", above=0.0)]
+    inertia: Annotated[Triple, _INERTIA]
+    stiffness: Annotated[Pair | float, Quantity("N/m", above=0.0, shape=(2,), pair=True)]
+    torsional_stiffness: Annotated[float, Quantity("N m/rad", above=0.0)]
+    mass_centre: Annotated[Pair, _POINT] = (0.0, 0.0)
+    stiffness_centre: Annotated[Pair, _POINT] = (0.0, 0.0)
+    vertical_stiffness: Annotated[float | None, Quantity("N/m", above=0.0)] = None
+    rocking_stiffness: Annotated[Pair | float | None, Quantity("N m/rad", above=0.0, shape=(2,), pair=True)] = None
+
+    def __post_init__(self) -> None:
+        check_fields(self, "storey")
+        if (self.vertical_stiffness is None) != (self.rocking_stiffness is None):
+            given, other = ("vertical_stiffness", "rocking_stiffness")
+            given, other = (given, other) if self.rocking_stiffness is None else (other, given)
+            raise InputError(
+                f"storey.{given} = {getattr(self, given)!r}: columns that shorten let the floor sink and tilt; give "
+                f"storey.{other} as well"
+            )
+
+    @property
+    def springs(self) -> Array:
+        """Stiffnesses of the columns along and about E1, E2, E3, shape (6,); 0 where they are rigid."""
+        k1, k2 = self.stiffness  # type: ignore[misc]  # a pair after the check
+        r1, r2 = self.rocking_stiffness or (0.0, 0.0)  # type: ignore[misc]
+        return np.array([k1, k2, self.vertical_stiffness or 0.0, r1, r2, self.torsional_stiffness])
+
+
+class Columns(NamedTuple):
+    """What is stated of the columns of a storey, at half height at their stiffness centre.
+
+    deformation: rows, shape (6, n): motion of the floor above relative to that below, both extended rigidly. inertia:
+    rows, shape (6, n): force and moment that accelerate all floors above, from the accelerations.
+    """
+
+    name: str
+    deformation: Array
+    inertia: Array
+
+
+class Frame(NamedTuple):
+    """Matrices of an undamped frame, its floors from the base upwards, and its columns."""
+
+    mass: Array
+    stiffness: Array
+    nodes: tuple[Node, ...]
+    columns: tuple[Columns, ...]
+
+
+def frame(base: BaseSlab, storeys: Sequence[Storey]) -> Frame:
+    """The frame of a base and storeys. Its coordinates are those of the floors at the origin of the plan."""
+    nodes = _floors(storeys)
+    floors: list[BaseSlab | Storey] = [base, *storeys]
+    inertias = [_inertia(node, floor) for node, floor in zip(nodes, floors, strict=True)]
+    columns = tuple(_columns(nodes, inertias, index, storey) for index, storey in enumerate(storeys, 1))
+    mass = sum((node.rows.T @ inertia for node, inertia in zip(nodes, inertias, strict=True)), np.zeros(1))
+    stiffness = np.zeros_like(mass)
+    for storey, column in zip(storeys, columns, strict=True):
+        stiffness += column.deformation.T * storey.springs @ column.deformation
+    return Frame(mass, stiffness, nodes, columns)
+
+
+def _inertia(node: Node, floor: BaseSlab | Storey) -> Array:
+    """Force and moment about the node that accelerate the floor: rows, shape (6, n)."""
+    arm = rigid([*floor.mass_centre, 0.0])
+    rows: Array = arm.T * [*3 * [floor.mass], *floor.inertia] @ arm @ node.rows
+    return rows
+
+
+def _floors(storeys: Sequence[Storey]) -> tuple[Node, ...]:
+    sizes = [FREEDOMS, *(len(_OWN) if storey.vertical_stiffness is None else FREEDOMS for storey in storeys)]
+    ends = np.cumsum(sizes)
+    place = np.eye(ends[-1])
+    nodes = [Node("base", np.zeros(3), place[:FREEDOMS], carries=True)]
+    height = 0.0
+    for index, (storey, end, size) in enumerate(zip(storeys, ends[1:], sizes[1:], strict=True), 1):
+        height += storey.height
+        position = np.array([0.0, 0.0, height])
+        rows = nodes[-1].linked(position)
+        rows[_OWN if size < FREEDOMS else slice(None)] = place[end - size : end]
+        nodes.append(Node(f"floor {index}", position, rows))
+    return tuple(nodes)
+
+
+def _columns(nodes: Sequence[Node], inertias: Sequence[Array], index: int, storey: Storey) -> Columns:
+    below, floor = nodes[index - 1], nodes[index]
+    point = np.array([*storey.stiffness_centre, (below.position[2] + floor.position[2]) / 2])
+    inertia = np.zeros_like(floor.rows)
+    for node, own in zip(nodes[index:], inertias[index:], strict=True):
+        inertia += rigid(node.position - point).T @ own
+    return Columns(f"storey {index}", floor.linked(point) - below.linked(point), inertia)

@@ -1,0 +1,148 @@
+"""Buildings on bearings: limits, balances of force and energy, and convergence with the step."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from support.buildings import BEARING, LOAD, MASS, MOTION, frame, scene
+
+from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Scene, Solver, Top, TwoPort, simulate
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.step import Coupling, State
+from msfp_gen.scene.top import NodeTop
+
+
+def test_a_slab_on_a_stiff_interface_moves_as_a_supported_mass():
+    """One bearing, ever stiffer horizontally and against tilt: forces tend to those of `Top.mass`."""
+    mass, vertical, damper = LOAD / BEARING.gravity, 2e7, 3e5
+    top = Top.mass(mass, 2.0 * mass, 0.0, vertical_stiffness=vertical, vertical_damping=damper)
+    solver = Solver(rtol=1e-7, max_step=1e-3)
+    alone = simulate(Scene(BEARING, MOTION, top, Effects(), solver, duration=2.0, output_step=0.01))
+    slab = Building.shear(BaseSlab(mass, 3 * (2.0 * mass,)), [])
+    errors = []
+    for stiffness in (1e8, 1e10):
+        interface = Top.node(stiffness, vertical, 10 * stiffness, 1e-4 * stiffness, damper, 1e-3 * stiffness)
+        bearings = [BuildingBearing(BEARING, interface)]
+        result = simulate(BuildingScene(slab, bearings, MOTION, Solver(max_step=2.5e-3, rtol=1e-6), 2.0))
+        assert result.time[::4] == pytest.approx(alone.history.time, abs=1e-12)
+        errors.append(np.abs(result.wrench[::4, 0, 1, :3] + alone.history.top_force) / LOAD)
+    assert errors[1].max(axis=0)[0] < 1e-4 < errors[0].max(axis=0)[0]
+    assert np.quantile(errors[1], 0.9, axis=0)[2] < 1e-4  # N varies fast where surfaces start to slide
+    assert errors[1].max() < 1e-3
+
+
+def modal_superposition(building: Building, ratio: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Relative displacements and absolute accelerations of the roof on a fixed base, shapes (k, 6)."""
+    fixed = building.fixed
+    inner = np.ix_(fixed.inner, fixed.inner)
+    along = building.rigid_motions[fixed.inner, 0]
+    part, w, count = fixed.modes.T @ building.mass[inner] @ along, fixed.frequencies, len(fixed.frequencies)
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        force = -part * MOTION.acceleration(t)[0]
+        return np.concatenate([y[count:], force - 2 * ratio * w * y[count:] - w**2 * y[:count]])
+
+    found = solve_ivp(rates, (0, time[-1]), np.zeros(2 * count), "DOP853", time, rtol=1e-8, atol=1e-11, max_step=0.02)
+    rows = building.node("floor 3").rows[:, fixed.inner] @ fixed.modes
+    accelerations = np.array([rates(t, y)[count:] for t, y in zip(time, found.y.T, strict=True)]) @ rows.T
+    accelerations[:, :3] += MOTION.acceleration(time)
+    return found.y[:count].T @ rows.T, accelerations
+
+
+def test_stuck_bearings_are_a_fixed_base():
+    """Friction 10: the frame responds as by superposition of its modes on a fixed base, to 1e-3."""
+    interface = Top.node(1e10, 1e10, 1e11, 1e6, 1e6, 1e8)
+    building = frame(frequency=1.0)
+    result = simulate(scene(building, 0.005, BEARING.replace(friction=10.0), interface=interface))
+    displacement, acceleration = modal_superposition(building, 0.05, result.time)
+    roof = result.node("floor 3")
+    relative = roof[:, 0] - np.hstack([result.ground[:, 0], np.zeros_like(result.ground[:, 0])])
+    assert np.abs(relative - displacement).max() < 1e-3 * np.abs(displacement).max()
+    assert np.abs(roof[:, 2] - acceleration).max() < 1e-3 * np.abs(acceleration).max()
+    assert np.abs(displacement[:, 0]).max() > 0.05 and np.abs(displacement[:, 5]).max() > 1e-4
+
+
+@cache
+def run(step: float) -> BuildingResult:
+    return simulate(scene(frame(), step))
+
+
+def test_energy_of_the_building_closes_with_the_square_of_the_step():
+    errors = []
+    for step in (0.01, 0.005):
+        result = run(step)
+        left = result.kinetic + result.strain + result.damped - result.received
+        errors.append(float(np.abs(left).max() / result.kinetic.max()))
+    assert errors[0] < 5e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=1.0)
+
+
+def stored(port: TwoPort, interface: NodeTop) -> float:
+    """Kinetic, potential and recoverable energy of a bearing and of the springs of its interface [J]."""
+    row = port.model.unpack(port._port.row)
+    force, moment = row["top_force"], row["top_moment"]
+    springs = (force[:2] @ force[:2]) / interface.stiffness + force[2] ** 2 / interface.vertical_stiffness
+    springs += moment[:2] @ moment[:2] / interface.rotational_stiffness
+    return float(row["kinetic"] + row["potential"] + row["work"][1] + 0.5 * springs)
+
+
+def test_energy_of_building_and_bearings_closes():
+    """Work of the ground: energies of the frame, stored and dissipated energies of the bearings; to 0.5 %."""
+    interface = Top.node(1e7, 5e7, 1e6)  # without dampers, whose energy has no account
+    made = scene(frame(), 0.005, interface=interface)
+    result, coupling = simulate(made), Coupling(made)
+    before = [stored(port, interface) for port in coupling.ports]
+    state = State(0.0, *np.zeros((3, len(made.building.mass))))
+    for time in result.time[1:]:
+        state = coupling.step(state, time - state.time)
+        coupling.commit()
+    assert np.array_equal(state.u, result.displacement[-1])
+    ground = np.einsum("kbi,ki->k", result.wrench[:, :, 0, :3], result.ground[:, 1])
+    work = float(np.sum(0.5 * (ground[1:] + ground[:-1]) * np.diff(result.time)))
+    rest = np.einsum("bi,bin,n->", result.wrench[0, :, 1], made.attachments, state.u)
+    bearings = sum(stored(port, interface) for port in coupling.ports) - sum(before) + result.dissipated[-1].sum()
+    frame_energy = float((result.kinetic + result.strain + result.damped)[-1])
+    assert work > 4000.0
+    assert work == pytest.approx(frame_energy + bearings - rest, rel=5e-3)
+
+
+def test_the_ground_accelerates_all_masses():
+    """Forces of the ground: inertia and weight of building and bearings; the latter weigh little."""
+    result = run(0.005)
+    light = 4 * sum(body.mass for body in BEARING.bodies)
+    motions = result.scene.building.rigid_motions
+    inertia = result.acceleration @ result.scene.building.mass @ motions[:, :3]
+    inertia[:, 2] += (MASS + light) * BEARING.gravity
+    fastest = np.abs(result.acceleration[:, :3]).max() + np.abs(result.ground[:, 2]).max()
+    assert np.abs(result.base_reaction - inertia).max() < light * 3 * fastest
+    assert np.abs(result.base_reaction[:, 0]).max() > 0.05 * MASS * BEARING.gravity
+
+
+def test_rocking_of_the_frame_varies_the_axial_forces():
+    """Moments of all inertia about the base are those of the axial forces, their tilt and their horizontal forces."""
+    result = run(0.005)
+    building = result.scene.building
+    moment = result.acceleration @ building.mass @ building.rigid_motions[:, 4]
+    places = np.array([each.position for each in result.scene.bearings])
+    upper = result.wrench[:, :, 1] - result.wrench[0, :, 1]
+    overturning = upper[:, :, 2] @ places[:, 0] - upper[:, :, 4].sum(axis=1)
+    assert moment == pytest.approx(overturning, abs=1e-5 * MASS * BEARING.gravity)
+    assert np.ptp(result.axial_force, axis=0).min() > 0.4 * LOAD
+
+
+def test_peaks_converge_with_the_step():
+    roofs = [np.abs(run(step).node("floor 3")[:, 2, 0]).max() for step in (0.01, 0.005, 0.0025)]
+    slips = [np.abs(run(step).bearing_displacement).max() for step in (0.01, 0.005, 0.0025)]
+    assert roofs[1] == pytest.approx(roofs[2], rel=5e-3) and roofs[0] == pytest.approx(roofs[2], rel=2e-2)
+    assert slips[1] == pytest.approx(slips[2], rel=1e-4)
+
+
+def test_a_reduced_building_moves_as_the_whole():
+    whole, part = run(0.01), simulate(scene(frame().reduced(40.0), 0.01))
+    assert len(part.scene.building.mass) < len(whole.scene.building.mass)
+    for name, size in (("bearing_displacement", 2e-4), ("drift", 1e-2), ("storey_force", 1e-2)):
+        one, other = getattr(whole, name), getattr(part, name)
+        assert np.abs(one - other).max() < size * np.abs(one).max(), name

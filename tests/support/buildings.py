@@ -1,0 +1,51 @@
+"""A small eccentric frame on four triple pendulums, for tests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from msfp_gen import BaseSlab, Bearing, Building, Motion, Solver, Storey, Top, presets
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+
+BEARING = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
+LOAD = 112e3  # on each bearing on average [N]
+MASS = 4 * LOAD / BEARING.gravity
+INTERFACE = Top.node(1e7, 5e7, 1e6, damping=1e4, vertical_damping=1e5, rotational_damping=1e3)
+PLACES = ((3.0, 2.0), (-3.0, 2.0), (-3.0, -2.0), (3.0, -2.0))  # [m]
+MOTION = Motion.harmonic(0.05, 0.6, cycles=1)
+BASE = BaseSlab(0.4 * MASS, (3 * MASS, 3 * MASS, 6 * MASS))
+
+
+def stiffness(frequency: float, mass: float) -> float:
+    return mass * (2 * np.pi * frequency) ** 2
+
+
+def storey(frequency: float = 5.0, eccentricity: tuple[float, float] = (0.3, 0.1)) -> Storey:
+    """A storey whose mass swings at that frequency on its own columns [Hz], and at 20 Hz vertically."""
+    mass = 0.2 * MASS
+    vertical = stiffness(20.0, mass)
+    return Storey(
+        height=3.0,
+        mass=mass,
+        inertia=(MASS, MASS, 2 * MASS),
+        stiffness=stiffness(frequency, mass),
+        torsional_stiffness=stiffness(1.4 * frequency, 10 * mass),
+        mass_centre=eccentricity,
+        vertical_stiffness=vertical,
+        rocking_stiffness=9 * vertical,
+    )
+
+
+def frame(**options: object) -> Building:
+    """Three storeys."""
+    return Building.shear(BASE, 3 * [storey(**options)], 0.05)  # type: ignore[arg-type]
+
+
+def scene(building: Building, step: float = 0.01, bearing: Bearing = BEARING, **changes: object) -> BuildingScene:
+    """The building on four bearings under two seconds of a motion along E1."""
+    interface = changes.pop("interface", INTERFACE)
+    bearings = [BuildingBearing(bearing, interface, place) for place in PLACES]  # type: ignore[arg-type]
+    made = BuildingScene(building, bearings, MOTION, Solver(max_step=step), 2.0)
+    return replace(made, **changes)  # type: ignore[arg-type]

@@ -1,0 +1,120 @@
+"""Scenes of buildings: weights on the bearings, messages of bad input, failed runs, repetition."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.buildings import BEARING, INTERFACE, LOAD, MOTION, PLACES, frame, scene
+
+from msfp_gen import (
+    BaseSlab,
+    Building,
+    BuildingBearing,
+    BuildingScene,
+    Effects,
+    InputError,
+    Motion,
+    Rotation,
+    RunError,
+    Solver,
+    simulate,
+)
+from msfp_gen.buildings.result import BuildingResult
+
+STILL = Motion(np.array([0.0, 1.0]), np.zeros((1, 6, 6)))
+
+
+def test_weights_balance_about_the_centre_of_mass():
+    made = scene(frame())
+    places = np.array(PLACES)
+    assert made.axial_loads.sum() == pytest.approx(4 * LOAD, rel=1e-9)
+    # 0.6 of the mass is 0.3 m and 0.1 m from the centre of the bearings.
+    assert made.axial_loads @ places / (4 * LOAD) == pytest.approx([0.18, 0.06], rel=1e-9)
+
+
+def test_three_bearings_carry_what_statics_says():
+    """Statically determinate: loads by barycentric coordinates, whatever the springs."""
+    places = [(0.0, 0.0), (4.0, 0.0), (0.0, 5.0)]
+    bearings = [
+        BuildingBearing(BEARING, replace(INTERFACE, vertical_stiffness=(index + 1) * 1e7), place)
+        for index, place in enumerate(places)
+    ]
+    slab = Building.shear(BaseSlab(3e4, (1e5, 1e5, 1e5), (1.0, 2.0)), [])
+    loads = BuildingScene(slab, bearings, MOTION).axial_loads
+    weight = 3e4 * BEARING.gravity
+    assert loads == pytest.approx([weight * (1 - 0.25 - 0.4), weight * 0.25, weight * 0.4], rel=1e-9)
+
+
+def test_a_building_at_rest_stays_there():
+    result = simulate(scene(frame(), 0.05, motion=STILL, duration=0.5))
+    assert np.abs(result.displacement).max() < 1e-9
+    assert result.axial_force == pytest.approx(np.tile(result.scene.axial_loads, (11, 1)), rel=1e-6)
+
+
+def test_shapes_and_repetition():
+    made = scene(frame(), 0.02, duration=0.1)
+    result, again = simulate(made), simulate(made)
+    count = len(made.building.mass)
+    assert result.time == pytest.approx(0.02 * np.arange(6))
+    assert result.displacement.shape == result.acceleration.shape == (6, count)
+    assert result.wrench.shape == (6, 4, 2, 6) and result.dissipated.shape == (6, 4)
+    assert result.drift.shape == result.storey_force.shape == (6, 3, 6)
+    assert [each.shape for each in result.normal_force] == 4 * [(6, 4)]
+    assert result.node("base").shape == (6, 3, 6) and result.base_reaction.shape == (6, 3)
+    assert np.array_equal(result.wrench, again.wrench) and np.array_equal(result.displacement, again.displacement)
+
+
+def test_a_failed_run_names_the_bearing_and_keeps_its_rows():
+    made = scene(frame(), 0.02, solver=Solver(max_step=0.02, max_steps=1))
+    made = replace(made, bearings=[replace(each, name="corner") for each in made.bearings])
+    with pytest.raises(RunError, match=r"^bearing \d \(corner\): two-port: stopped at t = ") as caught:
+        simulate(made)
+    rows = caught.value.result
+    assert isinstance(rows, BuildingResult) and caught.value.status == "steps"
+    assert len(rows.time) == len(rows.wrench) >= 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"bearings": []}, "scene.bearings: there are none"),
+        ({"duration": 1e3}, r"scene\.duration = 1000\.0: the motion lasts"),
+        ({"solver": Solver("dopri5")}, r"solver\.method = 'dopri5'"),
+        ({"motion": MOTION.rocking(Rotation.of([0.0, MOTION.duration], 1e-3 * np.eye(6)[None, :2]))}, "the ground"),
+        ({"motion": Motion.from_velocity(np.arange(5.0), np.ones((5, 3)))}, "it starts with 1 m/s"),
+        ({"bearings": [BuildingBearing(BEARING, INTERFACE, (3.0, 0.0))]}, "do not balance the weight"),
+        (
+            {"bearings": [BuildingBearing(BEARING, INTERFACE, p) for p in ((1, 1), (2, 1), (1, 2))]},
+            r"scene\.bearings\[1\]\.position: it carries -",
+        ),
+        ({"bearings": [BuildingBearing(BEARING, INTERFACE, node="roof")]}, r"scene\.bearings\[0\]\.node = 'roof'"),
+        ({"bearings": [BuildingBearing(BEARING, INTERFACE, node="floor 1")]}, "no bearing can be attached there"),
+        (
+            {"bearings": [BuildingBearing(BEARING.replace(gravity=g), INTERFACE) for g in (9.8, 9.81)]},
+            r"scene\.bearings\[1\]\.bearing\.gravity = 9\.81",
+        ),
+        ({"motion": 3}, r"scene\.motion = 3: give a Motion"),
+    ],
+)
+def test_messages_of_bad_scenes(change, message):
+    with pytest.raises(InputError, match=message):
+        replace(scene(frame()), **change)
+
+
+def test_messages_of_bad_bearings():
+    with pytest.raises(InputError, match=r"building_bearing\.position = \(1,\): give 2 finite numbers \[m\]"):
+        BuildingBearing(BEARING, INTERFACE, (1,))
+    with pytest.raises(InputError, match=r"building_bearing\.interface = 1: give a NodeTop"):
+        BuildingBearing(BEARING, 1)
+    made = scene(frame())
+    planar = replace(made.bearings[1], effects=Effects(dimension="planar"))
+    made = replace(made, bearings=[made.bearings[0], planar, *made.bearings[2:]])
+    with pytest.raises(InputError, match=r"scene\.bearings\[1\]: effects\.dimension = 'planar'"):
+        simulate(made)
+
+
+def test_options_of_a_bearing_are_rejected():
+    with pytest.raises(InputError, match="checkpoint: the run of a building has no such option"):
+        simulate(scene(frame()), checkpoint="run.ckpt")
