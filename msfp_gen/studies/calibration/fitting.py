@@ -77,10 +77,7 @@ def fit(
     from scipy.optimize import least_squares
 
     residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress)
-    scale = residuals.scale
-    low = np.array([u.low for u in residuals.unknowns] + [-np.inf] * residuals.offsets) / scale
-    high = np.array([u.high for u in residuals.unknowns] + [np.inf] * residuals.offsets) / scale
-    start = np.array([u.start for u in residuals.unknowns] + [0.0] * residuals.offsets) / scale
+    start, low, high = _range(residuals)
     first = residuals.at(start)
     if first.failure is not None:
         raise first.failure
@@ -101,6 +98,14 @@ def fit(
             status="fit",
         )
     return _outcome(scene, residuals, found.x, (low, high))
+
+
+def _range(residuals: Residuals) -> tuple[Array, Array, Array]:
+    """Start, least and largest value of every unknown over its scale; offsets of force have no bounds."""
+    values = np.array([(u.start, u.low, u.high) for u in residuals.unknowns]).reshape(-1, 3)
+    offsets = np.tile([0.0, -np.inf, np.inf], (residuals.offsets, 1))
+    start, low, high = np.vstack([values, offsets]).T / residuals.scale
+    return start, low, high
 
 
 def start_fit(
