@@ -85,6 +85,45 @@ void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_O
             angles[order][i] = found[i].of[order];
 }
 
+#if MSFP_TOP_ROTATION
+/* Angular velocity of the axis at angles psi, theta, phi, from their rates, (3.12) without spin. */
+static void axis_turns(const double *angles, const double *rates, double turn[3])
+{
+    turn[0] = rates[0];
+    turn[1] = rates[1] * cos(angles[0]);
+    turn[2] = rates[1] * sin(angles[0]);
+}
+
+/* Rates of angles at the rates of the rotation vector, are linear in these; their derivatives with respect to the
+ * rotation vector are the second derivatives of the angles on a straight path, in two directions at once. */
+void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3])
+{
+    double path[MSFP_ORDERS][3] = { { 0.0 } }, along[MSFP_ORDERS][3], sum[MSFP_ORDERS][3], difference[MSFP_ORDERS][3];
+    memcpy(path[0], rotation[0], sizeof path[0]);
+    memcpy(path[1], rotation[1], sizeof path[1]);
+    double angles[MSFP_ORDERS][3];
+    msfp_end_angles((const double(*)[3])path, angles);
+    const double sine = sin(angles[0][0]), cosine = cos(angles[0][0]);
+    for (int i = 0; i < 3; ++i) {
+        memset(path[1], 0, sizeof path[1]);
+        path[1][i] = 1.0;
+        msfp_end_angles((const double(*)[3])path, along);
+        axis_turns(along[0], along[1], turns[i]);
+        for (int k = 0; k < 3; ++k)
+            path[1][k] = rotation[1][k] + (k == i);
+        msfp_end_angles((const double(*)[3])path, sum);
+        for (int k = 0; k < 3; ++k)
+            path[1][k] = rotation[1][k] - (k == i);
+        msfp_end_angles((const double(*)[3])path, difference);
+        const double psi1 = 0.25 * (sum[2][0] - difference[2][0]), theta1 = 0.25 * (sum[2][1] - difference[2][1]);
+        const double turned = angles[1][1] * along[1][0];
+        derivatives[i][0] = psi1;
+        derivatives[i][1] = theta1 * cosine - turned * sine;
+        derivatives[i][2] = theta1 * sine + turned * cosine;
+    }
+}
+#endif
+
 /* ---- polynomials of a step ---- */
 
 /* The polynomial c of degree five over the length h, from values and derivatives at its ends. */
