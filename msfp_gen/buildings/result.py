@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.step import Coupling, State
+from msfp_gen.buildings.compiled_run import ENERGIES, BuildingRun, unpacked
 from msfp_gen.common.arrays import Array
+from msfp_gen.coupling.response import DISSIPATED
+from msfp_gen.specification.contract import WORKS, names
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,10 +19,12 @@ class BuildingResult:
 
     time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
     the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
-    velocity and acceleration of the ground, shape (k, 3, 3) [m]. wrench: force and moment that the lower and the upper
-    end of each bearing exert on it, shape (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of
-    each bearing, a list of arrays of shape (k, n-1) [N], [m]. dissipated: energy dissipated in each bearing, shape
-    (k, bearings) [J]. counts: trials and tangents of the bearings.
+    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
+    (k, bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape
+    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of each bearing, a list of arrays of shape
+    (k, n-1) [N], [m]. Energies, shape (k,) or (k, bearings) [J]: dissipated: in each bearing; stored: in each bearing,
+    with the springs of its interface; damped: by the damping of the building; received: work of the bearings on the
+    building, by their forces beyond those at rest; input: work of the ground. counts: of the run.
     """
 
     scene: BuildingScene
@@ -33,6 +37,11 @@ class BuildingResult:
     normal_force: list[Array]
     sliding: list[Array]
     dissipated: Array
+    stored: Array
+    damped: Array
+    received: Array
+    input: Array
+    support: Array
     counts: dict[str, int]
 
     def node(self, name: str) -> Array:
@@ -44,7 +53,7 @@ class BuildingResult:
     def bearing_displacement(self) -> Array:
         """Displacement of the upper end of each bearing relative to the ground, shape (k, bearings, 3) [m]."""
         upper: Array = np.einsum("bin,kn->kbi", self.scene.attachments[:, :3], self.displacement)
-        return upper - self.ground[:, None, 0]
+        return upper - self.support[:, :, 0]
 
     @property
     def axial_force(self) -> Array:
@@ -85,24 +94,8 @@ class BuildingResult:
         return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
 
     @property
-    def damped(self) -> Array:
-        """Energy dissipated by the damping of the building, shape (k,) [J]."""
-        return self._integral(_squares(self.velocity, self.scene.building.damping))
-
-    @property
-    def received(self) -> Array:
-        """Work of the bearings on the building, by their forces beyond those at rest, shape (k,) [J]."""
-        upper = np.einsum("bin,kn->kbi", self.scene.attachments, self.velocity)
-        power = -np.einsum("kbi,kbi->k", self.wrench[:, :, 1] - self.wrench[0, :, 1], upper)
-        return self._integral(power)
-
-    @property
     def _size(self) -> int:
         return len(self.scene.building.mass)
-
-    def _integral(self, power: Array) -> Array:
-        steps = 0.5 * (power[1:] + power[:-1]) * np.diff(self.time)
-        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _squares(rows: Array, matrix: Array) -> Array:
@@ -111,42 +104,35 @@ def _squares(rows: Array, matrix: Array) -> Array:
     return found
 
 
-class Rows:
-    """Rows of a run that grows."""
+def result_of(run: BuildingRun) -> BuildingResult:
+    """The rows of a run until now."""
+    rows = unpacked(run)
+    count = len(run.ports)
+    works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
+    return BuildingResult(
+        run.scene,
+        rows["time"],
+        rows["displacement"],
+        rows["velocity"],
+        rows["acceleration"],
+        rows["ground"][:, 0],
+        np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
+        [rows[f"normal {i}"] for i in range(count)],
+        [rows[f"sliding {i}"] for i in range(count)],
+        np.stack([sum(work[name] for name in DISSIPATED) for work in works], axis=1),
+        np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
+        *(rows[name] for name in ENERGIES),
+        support=rows["ground"][:, run.scene.grounds[1]],
+        counts=run.run.counts,
+    )
 
-    def __init__(self, scene: BuildingScene) -> None:
-        self.scene = scene
-        self.states: list[State] = []
-        self.ground: list[Array] = []
-        self.bearings: list[list[tuple[Array, Array, Array, float]]] = [[] for _ in scene.bearings]
 
-    def start(self, coupling: Coupling, state: State) -> None:
-        """The row of the state at rest."""
-        still = np.zeros((3, 6))
-        coupling.responses = [port.trial(0.0, still, still) for port in coupling.ports]
-        self.add(coupling, state)
-
-    def add(self, coupling: Coupling, state: State) -> None:
-        """The row of a state that the bearings have reached."""
-        self.states.append(state)
-        self.ground.append(coupling.lower(state.time)[:, :3])
-        for rows, each in zip(self.bearings, coupling.responses, strict=True):
-            rows.append((each.wrench, each.normal_force, each.sliding, each.dissipated))
-
-    def result(self, coupling: Coupling) -> BuildingResult:
-        """The rows until now."""
-        columns = [[np.array(column) for column in zip(*rows, strict=True)] for rows in self.bearings]
-        wrench, normal, sliding, dissipated = zip(*columns, strict=True)
-        return BuildingResult(
-            self.scene,
-            np.array([each.time for each in self.states]),
-            np.array([each.u for each in self.states]),
-            np.array([each.v for each in self.states]),
-            np.array([each.a for each in self.states]),
-            np.array(self.ground),
-            np.stack(wrench, axis=1),
-            list(normal),
-            list(sliding),
-            np.stack(dissipated, axis=1),
-            {"trials": coupling.trials, "tangents": coupling.tangents},
-        )
+def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
+    """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
+    upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
+    stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
+    stiffness += 2 * [interface.rotational_stiffness]
+    found: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
+    for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
+        found = found + rows[f"{name} {index}"]
+    return found
