@@ -310,6 +310,5 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}
     templates = environment()
     return {
-        file: templates.get_template(f"{template}.jinja").render(context, file=file)
-        for file, template in names.items()
+        file: templates.get_template(f"{template}.jinja").render(context, file=file) for file, template in names.items()
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -56,18 +57,14 @@ class BuildingRun:
     """A compiled run and its parts.
 
     run: compiled. ports: the two-ports of the bearings, which only the run steps. grounds: the different motions of the
-    ground, that of the scene first.
+    ground, that of the scene first. build: hash of all that determines the numbers beside the scene.
     """
 
     run: Run
     scene: BuildingScene
     ports: list[TwoPort]
     grounds: list[Motion]
-
-    @property
-    def build(self) -> str:
-        """What determines the numbers of the run beside the scene: keys of the models."""
-        return " ".join(port.model.info.key for port in self.ports)
+    build: str
 
 
 def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
@@ -81,7 +78,8 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     grid, building, solver = time_grid(scene, grounds), scene.building, scene.solver
     attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
     pieces = [snapped(each.knots, each.coefficients, grid.stops) for each in grounds]
-    run: Run = load_driver("msfp_gen.buildings").Run(
+    module, key = load_driver("msfp_gen.buildings")
+    run: Run = module.Run(
         (building.mass, building.damping, building.stiffness),
         attached,
         [port.compiled for port in ports],
@@ -103,7 +101,8 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
         output_step=scene.row_step,
         threads=_threads(threads, len(ports)),
     )
-    return BuildingRun(run, scene, ports, grounds)
+    keys = [key, *(port.model.info.key for port in ports)]
+    return BuildingRun(run, scene, ports, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
 
 
 def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:

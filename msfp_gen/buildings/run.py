@@ -46,11 +46,13 @@ def simulate_building(
     if keeper is not None:
         keeper.restore(run.run)
     interrupted = _advance(run, progress, keeper)
-    status = "interrupted" if interrupted else run.run.status[0]
+    status = run.run.status[0]
+    if keeper is not None and status == "ok":  # a run that failed fails again from the last checkpoint
+        keeper.save(run.run)
+    if status == "ok" and interrupted:
+        status = "interrupted"
     if status != "ok":
         raise RunError(failure(run, status), status=status, result=result_of(run))
-    if keeper is not None:
-        keeper.save(run.run)
     return result_of(run)
 
 

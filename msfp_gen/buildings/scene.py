@@ -180,8 +180,8 @@ class BuildingScene:
             if speed > REST:
                 raise InputError(f"{name}: it starts with {speed:.3g} m/s; give a motion that starts from rest")
             if self.end > motion.duration * (1 + 1e-12):
-                field = "scene.duration" if name == "scene.motion" else name
+                field = f"scene.duration = {self.duration}: the motion" if motion is self.motion else f"{name}: it"
                 raise InputError(
-                    f"{field}: the run ends at {self.end:.12g} s, the motion lasts {motion.duration:.12g} s; give at "
-                    "most that as scene.duration, or motion.held(...)"
+                    f"{field} lasts {motion.duration:.12g} s, the run {self.end:.12g} s; give at most that as "
+                    "scene.duration, or motion.held(...)"
                 )

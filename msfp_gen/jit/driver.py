@@ -21,8 +21,8 @@ SUFFIXES = (".c", ".h", ".pyx")
 
 
 @remember
-def load_driver(package: str) -> ModuleType:
-    """The module of the `.pyx` and the C files in a folder of package data, `<package>/compiled`.
+def load_driver(package: str) -> tuple[ModuleType, str]:
+    """The module of the `.pyx` and the C files in `<package>/compiled`, and the hash of all that determines it.
 
     Raises CompileError: no C compiler was found, or it rejected a file; InputError: the cache cannot be written to.
     """
@@ -36,7 +36,7 @@ def load_driver(package: str) -> ModuleType:
             if manifest is None:
                 manifest = _build(entry, files, part)
                 entry.publish(part)
-    return load_extension(entry.folder / manifest.extension, module)
+    return load_extension(entry.folder / manifest.extension, module), entry.key
 
 
 def sources(folder: Traversable) -> dict[str, str]:
@@ -67,5 +67,3 @@ def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Man
 
 def _silent(_: str, __: float) -> None:
     """Progress callback that does nothing."""
-
-

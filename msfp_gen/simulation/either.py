@@ -8,18 +8,30 @@ from typing import TYPE_CHECKING, Any, overload
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError
 from msfp_gen.simulation import simulate as bearings
+from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, fingerprint, require_no_checkpoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from msfp_gen.buildings.compiled_run import BuildingRun
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
 
+_OF_BUILDINGS = ("progress", "checkpoint", "every", "resume", "threads")
+
 
 @overload
-def simulate(scene: BuildingScene) -> BuildingResult: ...
+def simulate(
+    scene: BuildingScene,
+    *,
+    progress: bearings.Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = ...,
+    resume: bool = False,
+    threads: int | None = None,
+) -> BuildingResult: ...
 
 
 @overload
@@ -40,12 +52,50 @@ def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingR
     """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
     if not isinstance(scene, BuildingScene):
         return bearings.simulate(scene, **options)
-    if options:
-        raise InputError(f"{next(iter(options))}: the run of a building has no such option; leave it out")
+    for name, value in options.items():
+        if name not in _OF_BUILDINGS and value not in (False, None, ()):
+            raise InputError(f"{name}: the run of a building has no such option; leave it out")
+    return _simulate_building(scene, **{name: options[name] for name in _OF_BUILDINGS if name in options})
+
+
+def _simulate_building(
+    scene: BuildingScene,
+    progress: bearings.Progress | None = None,
+    checkpoint: str | Path | None = None,
+    every: float = EVERY,
+    resume: bool = False,
+    threads: int | None = None,
+) -> BuildingResult:
     from msfp_gen.buildings.run import simulate_building
 
-    return simulate_building(scene)
+    if checkpoint is None:
+        if resume:
+            raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
+        return simulate_building(scene, progress, threads=threads)
+    path = checkpoint
+    if not resume:
+        require_no_checkpoint(path)
+    keep = lambda run: Checkpoint(path, identity(run), every, resume)  # noqa: E731
+    return simulate_building(scene, progress, keep, threads)
 
 
-simulate.__doc__ = f"{bearings.simulate.__doc__}\n    Of a `BuildingScene`, without options: its `BuildingResult`.\n"
+def identity(run: BuildingRun) -> Identity:
+    """The identity of the run of a building, for its checkpoint. The text states what users recognise a scene by."""
+    import tomli_w
+
+    scene = run.scene
+    known = {
+        "name": scene.name,
+        "building": {"coordinates": len(scene.building.mass), "bearings": len(scene.bearings)},
+        "motion": {"name": scene.motion.name, "duration": scene.motion.duration},
+        "solver": {"method": scene.solver.method, "rtol": scene.solver.rtol},
+        "duration": scene.end,
+    }
+    return Identity(run.build, tomli_w.dumps(known), fingerprint(scene))
+
+
+simulate.__doc__ = (
+    f"{bearings.simulate.__doc__}\n    Of a `BuildingScene`: its `BuildingResult`, with the options progress, checkpoint, "
+    "every, resume,\n    and threads: of its bearings; None: chosen. Results do not depend on it.\n"
+)
 simulate.__signature__ = inspect.signature(bearings.simulate)  # type: ignore[attr-defined]

@@ -68,7 +68,6 @@ int factor_linear(msfp_building *b, double beta)
     l->beta = 0.0;
     if (allocate(l, n, r))
         return MSFP_E_MEMORY;
-    ++b->counts[MSFP_BUILDING_FACTORS];
     for (size_t i = 0; i < (size_t)n * n; ++i)
         l->factors[i] = s->mass[i] / beta + s->damping[i] + beta * s->stiffness[i];
     s->lapack.potrf(lower, &n, l->factors, &n, &info);

@@ -66,7 +66,7 @@ cdef extern from "msfp_building.h":
     void msfp_building_snapshot_write(const msfp_building *, void *) noexcept nogil
     int msfp_building_snapshot_read(msfp_building *, const void *, size_t) noexcept nogil
 
-COUNTS = ("steps", "rejected_steps", "iterations", "tangents", "factorisations")
+COUNTS = ("steps", "rejected_steps", "iterations", "tangents")
 
 
 cdef const double *_doubles(list held, object values) except? NULL:
@@ -164,6 +164,8 @@ cdef class Run:
             return np.zeros((0, size))
         cdef const double[:, ::1] view = <double[:count, :size]>msfp_building_rows(self.run)
         return np.array(view)
+
+    dropped_rows = 0  # it keeps all rows
 
     @property
     def counts(self):

@@ -169,10 +169,14 @@ static double divided(double h, double left)
     return count <= 8.0 ? left / fmax(count, 1.0) : pow(growth, floor(log(h) / log(growth)));
 }
 
-static double step_factor(const msfp_building *b, double error)
+/* The next length after a step of length h. A step that was cut to end at a given time leaves the proposal as it is,
+ * unless its error permits a longer one. */
+static double next_length(const msfp_building *b, double h, double error)
 {
     const double e = fmax(error, 1e-6), last = fmax(b->previous_error, 1e-6), order = b->method.order;
-    return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+    if (h < 0.9 * b->h && error < 0.5)
+        return fmax(b->h, h * fmin(5.0, 0.9 * pow(e, -1.0 / order)));
+    return h * fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
 }
 
 /* ---- steps ---- */
@@ -206,8 +210,7 @@ static void accept(msfp_building *b, double h, double t, double error)
     ++b->counts[MSFP_BUILDING_STEPS];
     for_each_bearing(b, commit_bearing);
     note_energy(b);
-    const int cut = h < 0.9 * b->h && error < 0.5; /* it says little about the length: the earlier proposal stands */
-    b->h = fmax(h * step_factor(b, error), cut ? b->h : 0.0);
+    b->h = next_length(b, h, error);
     b->previous_error = error;
     ground_at(b, t);
     if (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t)) {

@@ -32,16 +32,19 @@ static jet product(jet a, jet b)
 /* Sum over k of (-s)^k/(2k + first)!: sin(x)/x with first = 1, (1 - cos x)/x^2 with first = 2, where s = x^2 < 10. */
 static jet series(jet s, int first)
 {
-    enum { TERMS = 20 };
-    double factor[TERMS], value = 0.0, rate = 0.0, second = 0.0;
-    factor[0] = 1.0 / first;
-    for (int k = 1; k < TERMS; ++k)
-        factor[k] = -factor[k - 1] / ((2.0 * k + first) * (2.0 * k + first - 1.0));
-    for (int k = TERMS - 1; k >= 0; --k) {
-        second = second * s.of[0] + 2.0 * rate;
-        rate = rate * s.of[0] + value;
-        value = value * s.of[0] + factor[k];
+    enum { TERMS = 20, SMALL = 8 };
+    static const double smallest = 0.1; /* below it the terms from SMALL on vanish */
+    double value = 0.0, rate = 0.0, second = 0.0;
+    for (int k = s.of[0] < smallest ? SMALL : TERMS; k > 0; --k) { /* a_(k-1) = 1 + factor s a_k, in nested form */
+        const double factor = -1.0 / ((2 * k + first) * (2 * k + first - 1));
+        second = factor * (second * s.of[0] + 2.0 * rate);
+        rate = factor * (rate * s.of[0] + (value + 1.0));
+        value = factor * s.of[0] * (value + 1.0);
     }
+    const double scale = 1.0 / first;
+    value = (value + 1.0) * scale;
+    rate *= scale;
+    second *= scale;
     return (jet){ { value, rate * s.of[1], second * s.of[1] * s.of[1] + rate * s.of[2] } };
 }
 
@@ -65,6 +68,13 @@ void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_O
 {
     static const int next[3] = { 1, 2, 0 };
     jet r[3], matrix[3][3], square = constant(0.0);
+    int turned = 0;
+    for (int i = 0; i < MSFP_ORDERS * 3; ++i)
+        turned |= (&rotation[0][0])[i] != 0.0;
+    if (!turned) {
+        memset(&angles[0][0], 0, MSFP_ORDERS * sizeof *angles);
+        return;
+    }
     for (int i = 0; i < 3; ++i)
         r[i] = (jet){ { rotation[0][i], rotation[1][i], rotation[2][i] } };
     for (int i = 0; i < 3; ++i)

@@ -248,7 +248,9 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
     double plate[3];
     msfp_body_C_get(run->work.body[NB], plate);
     step->energy = run->next.energy + msfp_port_move_anchor(port, run, plate, step->anchor, port->to.of[1][0]);
-    set_histories(port, &port->to, step->stages.h);
+#if MSFP_UPLIFT
+    set_histories(port, &port->to, step->stages.h); /* event functions read them there */
+#endif
     msfp_event_values(run, &run->next, step->after);
     *share = msfp_first_event(run, run->events_now, step->after);
     step->finished = 1;
