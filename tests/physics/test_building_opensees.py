@@ -68,7 +68,7 @@ def extrapolated(coarse: float, fine: float) -> float:
 
 @pytest.mark.slow
 def test_a_frame_of_served_bearings_tends_to_the_own_run():
-    """Three storeys, four bearings, eccentric: peaks of roof, bearings and axial forces to 0.5 % as the step shrinks."""
+    """Three storeys, four bearings, eccentric: peaks of roof, bearings, axial forces to 0.5 % as the step shrinks."""
     own = storey(frequency=2.0)
     made = Building.shear(BASE, 3 * [own], 0.0)
     building = Building(made.mass, DAMPING_TIME * made.stiffness, made.stiffness, made.nodes, made.columns)
@@ -117,8 +117,8 @@ def peaks(roof: Array, displacement: Array, compression: Array) -> list[float]:
     ]
 
 
-# Dao's example with radii times four and a third of the friction: tilts below 0.06 rad, as the element assumes. Its yield
-# displacement of 1 mm makes the element softer than a stack of surfaces that yield by 1 mm each; both tend to one limit.
+# Dao's example with radii times four and a third of the friction: tilts below 0.06 rad, as the element assumes. With
+# its yield displacement of 1 mm the element dissipates less than a stack of surfaces of 1 mm; both tend to one limit.
 RADII, FRICTIONS, CAPACITIES, WEIGHT, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 1000.0, 1e-4
 
 
