@@ -119,7 +119,7 @@ def scaling() -> None:
 
 
 # Dao's example: shallow geometry times four and friction over three, so that tilts are small as the element assumes.
-RADII, FRICTIONS, CAPACITIES, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 1e-3
+RADII, FRICTIONS, CAPACITIES, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 2.5e-4
 WEIGHT = 1e6  # on a bearing [N]
 VERTICAL = 1e9  # stiffness of a bearing [N/m]
 
@@ -168,7 +168,8 @@ def beside_opensees(count: int, duration: float) -> None:
     bearing, native = shallow()
     parts = floors(count * WEIGHT / 9.81, 2.0, SPACING * count**0.5)
     accelerations, motion = record(duration, (1, 1, 0))
-    interface = Top.node(1e9, VERTICAL, 1e8, 1e6, 2e6, 1e5)
+    # A plate that tilts by N u/k under the moment of its load loses the share N R/k of the stiffness N/R.
+    interface = Top.node(1e9, VERTICAL, 1e10, 1e6, 2e6, 1e7)
     effects = Effects(bouc_wen="plastic")
     bearings = [BuildingBearing(bearing, interface, place, effects=effects) for place in grid(count)]
     scene = BuildingScene(frame(parts), bearings, motion)

@@ -107,7 +107,8 @@ def frame(
     if "port" not in bearings_given[0]:
         settle(ops, bearings_given[0]["load"])
     for axis, values in enumerate(ground):
-        ops.timeSeries("Path", 10 + axis, "-dt", ground_step, "-values", *values)
+        # One more value: beyond the last, which rounding may reach, a path is zero.
+        ops.timeSeries("Path", 10 + axis, "-dt", ground_step, "-values", *values, values[-1])
         ops.pattern("UniformExcitation", 10 + axis, axis + 1, "-accel", 10 + axis)
     ops.constraints("Transformation")
     ops.numberer("RCM")
