@@ -200,7 +200,8 @@ def theirs(
     """The same of OpenSees, with ever shorter steps."""
     found = []
     for step in (0.01, 0.005, 0.0025, 0.00125, 0.000625):
-        bearings = [{"position": each.position, "load": WEIGHT, **native} for each in scene.bearings]
+        loads = zip(scene.bearings, scene.axial_loads.tolist(), strict=True)
+        bearings = [{**native, "position": each.position, "load": load, "weight": load} for each, load in loads]
         answer = client(
             floors_given=floors_given(parts),
             bearings_given=bearings,

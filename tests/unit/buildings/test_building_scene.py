@@ -125,6 +125,7 @@ def test_messages_of_bad_bearings():
         simulate(made)
 
 
-def test_options_of_a_bearing_are_rejected():
-    with pytest.raises(InputError, match="checkpoint: the run of a building has no such option"):
-        simulate(scene(frame()), checkpoint="run.ckpt")
+@pytest.mark.parametrize("option", [{"strict": True}, {"stream": "run.nc"}, {"gradients": ["motion.scale"]}])
+def test_options_of_a_bearing_are_rejected(option):
+    with pytest.raises(InputError, match=f"{next(iter(option))}: the run of a building has no such option"):
+        simulate(scene(frame()), **option)
