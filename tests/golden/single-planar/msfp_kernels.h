@@ -13,7 +13,10 @@
 static inline double msfp_heaviside(double x) { return x > 0.0 ? 1.0 : 0.0; }
 
 /* atan2 of a sine and its cosine; away from a right angle the arc sine gives it in a third of the time. */
-static inline double msfp_angle(double sine, double cosine) { return cosine > 0.7 ? asin(sine) : atan2(sine, cosine); }
+static inline double msfp_angle(double sine, double cosine)
+{
+    return cosine > 0.7 ? msfp_asin(sine) : msfp_atan2(sine, cosine);
+}
 
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
  * 45 operations; out: contact. All surfaces at once: [field][MSFP_LANES]. */
@@ -178,8 +181,8 @@ static inline void msfp_forward(const double *restrict par /* body_parameters */
     const double x_theta = x[0];
     const double x_theta1 = x[1];
     const double x_theta2 = x[2];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double t1x_3 = -s_1*u_t3x + s_2*u_t1x;
     const double t1z_4 = -s_1*u_t3z + s_2*u_t1z;
     const double t3x_5 = s_1*u_t1x + s_2*u_t3x;
@@ -246,8 +249,8 @@ static inline void msfp_forward_tangent(const double *restrict par, const double
     const double x_theta = x[0];
     const double x_theta1 = x[1];
     const double x_theta2 = x[2];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double t1x_3 = -s_1*u_t3x + s_2*u_t1x;
     const double t1z_4 = -s_1*u_t3z + s_2*u_t1z;
     const double t3x_5 = s_1*u_t1x + s_2*u_t3x;
@@ -292,8 +295,8 @@ static inline void msfp_forward_tangent(const double *restrict par, const double
     out[19] = rz_22; /* rcz */
     out[20] = s_1; /* st */
     out[21] = s_2; /* ct */
-    const double p_s_1_x_theta = cos(x_theta);
-    const double p_s_2_x_theta = -sin(x_theta);
+    const double p_s_1_x_theta = msfp_cos(x_theta);
+    const double p_s_2_x_theta = -msfp_sin(x_theta);
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_u_t1x = du[0 * MSFP_DOF + c];
         const double d_u_t1z = du[1 * MSFP_DOF + c];
@@ -377,8 +380,8 @@ static inline void msfp_named_points(const double *restrict d /* dimensions */, 
     const double x_theta = x[0];
     const double x_theta1 = x[1];
     const double x_theta2 = x[2];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double t3x_5 = s_1*u_t1x + s_2*u_t3x;
     const double t3z_6 = s_1*u_t1z + s_2*u_t3z;
     const double wy_7 = u_wy + x_theta1;
@@ -517,8 +520,8 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double x_N = x[1];
     const double f_Y = f[0];
     const double loc_dwy = loc[2];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double s_3 = par_R*par_sign;
     const double u_4 = -loc_dwy*s_3;
     const double s_5 = f_Y*u_4;
@@ -550,8 +553,8 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double x_N = x[1];
     const double f_Y = f[0];
     const double loc_dwy = loc[2];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double s_3 = par_R*par_sign;
     const double u_4 = -loc_dwy*s_3;
     const double s_5 = f_Y*u_4;
@@ -569,8 +572,8 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     out[1] = out_20; /* pz */
     out[2] = s_16; /* My */
     out[3] = dY_12; /* dY */
-    const double p_s_1_x_theta = cos(x_theta);
-    const double p_s_2_x_theta = -sin(x_theta);
+    const double p_s_1_x_theta = msfp_cos(x_theta);
+    const double p_s_2_x_theta = -msfp_sin(x_theta);
     const double p_dY_12_f_Y = -s_8/par_dy;
     const double p_dY_12_s_8 = -f_Y/par_dy;
     const double p_dY_12_u_4 = 1.0/par_dy;
@@ -1125,8 +1128,8 @@ static inline void msfp_rim(const double *restrict par /* surface_parameters */,
     const double par_pr = par[9];
     const double x_theta = x[0];
     const double x_theta1 = x[1];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double s_3 = (1.0/2.0)*par_sign + 1.0/2.0;
     const double s_4 = 1.0/2.0 - 1.0/2.0*par_sign;
     const double s_5 = -s_2*s_4 + s_3;
@@ -1134,8 +1137,8 @@ static inline void msfp_rim(const double *restrict par /* surface_parameters */,
     const double s_7 = par_R - par_pr;
     const double s_8 = fabs(s_1);
     const double gap_9 = -par_R*msfp_angle(s_8, s_2) + par_sc;
-    const double rate_10 = -x_theta1*sin(x_theta);
-    const double rate_11 = x_theta1*cos(x_theta);
+    const double rate_10 = -x_theta1*msfp_sin(x_theta);
+    const double rate_11 = x_theta1*msfp_cos(x_theta);
     const double rate_12 = rate_11*(2*msfp_heaviside(s_1) - 1);
     const double rate_13 = par_R*rate_10*s_8/((s_2*s_2) + (s_8*s_8)) - par_R*rate_12*s_2/((s_2*s_2) + (s_8*s_8));
     const double fc_14 = gap_9*par_kc + par_cc*rate_13;
@@ -1165,8 +1168,8 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     const double par_pr = par[9];
     const double x_theta = x[0];
     const double x_theta1 = x[1];
-    const double s_1 = sin(x_theta);
-    const double s_2 = cos(x_theta);
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
     const double s_3 = (1.0/2.0)*par_sign + 1.0/2.0;
     const double s_4 = 1.0/2.0 - 1.0/2.0*par_sign;
     const double s_5 = -s_2*s_4 + s_3;
@@ -1174,8 +1177,8 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     const double s_7 = par_R - par_pr;
     const double s_8 = fabs(s_1);
     const double gap_9 = -par_R*msfp_angle(s_8, s_2) + par_sc;
-    const double rate_10 = -x_theta1*sin(x_theta);
-    const double rate_11 = x_theta1*cos(x_theta);
+    const double rate_10 = -x_theta1*msfp_sin(x_theta);
+    const double rate_11 = x_theta1*msfp_cos(x_theta);
     const double rate_12 = rate_11*(2*msfp_heaviside(s_1) - 1);
     const double rate_13 = par_R*rate_10*s_8/((s_2*s_2) + (s_8*s_8)) - par_R*rate_12*s_2/((s_2*s_2) + (s_8*s_8));
     const double fc_14 = gap_9*par_kc + par_cc*rate_13;
@@ -1192,15 +1195,15 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     out[3] = gap_9; /* g */
     out[4] = rate_13; /* dg */
     out[5] = fc_14; /* fc */
-    const double p_s_1_x_theta = cos(x_theta);
-    const double p_s_2_x_theta = -sin(x_theta);
+    const double p_s_1_x_theta = msfp_cos(x_theta);
+    const double p_s_2_x_theta = -msfp_sin(x_theta);
     const double p_s_8_s_1 = 2*msfp_heaviside(s_1) - 1;
     const double p_gap_9_s_2 = par_R*s_8/((s_2*s_2) + (s_8*s_8));
     const double p_gap_9_s_8 = -par_R*s_2/((s_2*s_2) + (s_8*s_8));
-    const double p_rate_10_x_theta = -x_theta1*cos(x_theta);
-    const double p_rate_10_x_theta1 = -sin(x_theta);
-    const double p_rate_11_x_theta = -x_theta1*sin(x_theta);
-    const double p_rate_11_x_theta1 = cos(x_theta);
+    const double p_rate_10_x_theta = -x_theta1*msfp_cos(x_theta);
+    const double p_rate_10_x_theta1 = -msfp_sin(x_theta);
+    const double p_rate_11_x_theta = -x_theta1*msfp_sin(x_theta);
+    const double p_rate_11_x_theta1 = msfp_cos(x_theta);
     const double p_rate_12_rate_11 = 2*msfp_heaviside(s_1) - 1;
     const double p_rate_13_rate_10 = par_R*s_8/((s_2*s_2) + (s_8*s_8));
     const double p_rate_13_rate_12 = -par_R*s_2/((s_2*s_2) + (s_8*s_8));

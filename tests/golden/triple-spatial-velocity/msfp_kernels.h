@@ -13,7 +13,10 @@
 static inline double msfp_heaviside(double x) { return x > 0.0 ? 1.0 : 0.0; }
 
 /* atan2 of a sine and its cosine; away from a right angle the arc sine gives it in a third of the time. */
-static inline double msfp_angle(double sine, double cosine) { return cosine > 0.7 ? asin(sine) : atan2(sine, cosine); }
+static inline double msfp_angle(double sine, double cosine)
+{
+    return cosine > 0.7 ? msfp_asin(sine) : msfp_atan2(sine, cosine);
+}
 
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
  * 140 operations; out: contact. All surfaces at once: [field][MSFP_LANES]. */
@@ -83,10 +86,10 @@ static inline void msfp_contact_lanes(const double *restrict par /* surface_para
         const double Mz_44 = s_17*s_40 + s_20*s_41;
         const double s_45 = -par_friction_slow + par_mu;
         const double s_46 = -par_velocity_rate*s_38;
-        const double s_47 = exp(s_46);
+        const double s_47 = msfp_exp(s_46);
         const double s_48 = s_45*s_47;
         const double s_49 = par_mu - s_48;
-        const double rate_50 = -par_velocity_rate*exp(s_46);
+        const double rate_50 = -par_velocity_rate*msfp_exp(s_46);
         const double rate_51 = rate_50*s_45;
         const double s_52 = -rate_51*s_3;
         const double s_53 = s_35*s_52*(2*s_1*s_34 + s_33*u_24);
@@ -185,10 +188,10 @@ static inline void msfp_contact_jacobian(const double *restrict par /* surface_p
         const double Mz_44 = s_17*s_40 + s_20*s_41;
         const double s_45 = -par_friction_slow + par_mu;
         const double s_46 = -par_velocity_rate*s_38;
-        const double s_47 = exp(s_46);
+        const double s_47 = msfp_exp(s_46);
         const double s_48 = s_45*s_47;
         const double s_49 = par_mu - s_48;
-        const double rate_50 = -par_velocity_rate*exp(s_46);
+        const double rate_50 = -par_velocity_rate*msfp_exp(s_46);
         const double rate_51 = rate_50*s_45;
         const double s_52 = -rate_51*s_3;
         const double s_53 = s_35*s_52*(2*s_1*s_34 + s_33*u_24);
@@ -278,7 +281,7 @@ static inline void msfp_contact_jacobian(const double *restrict par /* surface_p
         const double p_s_38_s_34 = s_33*s_35;
         const double p_s_39_N_7 = c_mu*s_23;
         const double p_s_39_c_mu = N_7*s_23;
-        const double p_s_47_s_46 = exp(s_46);
+        const double p_s_47_s_46 = msfp_exp(s_46);
         const double j_px_8_loc_px = p_N_7_loc_px*p_px_8_N_7 + p_px_8_loc_px;
         const double j_py_9_loc_px = p_N_7_loc_px*p_py_9_N_7;
         const double j_pz_10_loc_px = p_N_7_loc_px*p_pz_10_N_7;
@@ -619,10 +622,10 @@ static inline void msfp_forward(const double *restrict par /* body_parameters */
     const double x_psi2 = x[6];
     const double x_theta2 = x[7];
     const double x_phi2 = x[8];
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double t2x_5 = s_1*u_t3x + s_2*u_t2x;
     const double t2y_6 = s_1*u_t3y + s_2*u_t2y;
     const double t2z_7 = s_1*u_t3z + s_2*u_t2z;
@@ -756,10 +759,10 @@ static inline void msfp_forward_tangent(const double *restrict par, const double
     const double x_psi2 = x[6];
     const double x_theta2 = x[7];
     const double x_phi2 = x[8];
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double t2x_5 = s_1*u_t3x + s_2*u_t2x;
     const double t2y_6 = s_1*u_t3y + s_2*u_t2y;
     const double t2z_7 = s_1*u_t3z + s_2*u_t2z;
@@ -854,10 +857,10 @@ static inline void msfp_forward_tangent(const double *restrict par, const double
     out[40] = s_2; /* cp */
     out[41] = s_3; /* st */
     out[42] = s_4; /* ct */
-    const double p_s_1_x_psi = cos(x_psi);
-    const double p_s_2_x_psi = -sin(x_psi);
-    const double p_s_3_x_theta = cos(x_theta);
-    const double p_s_4_x_theta = -sin(x_theta);
+    const double p_s_1_x_psi = msfp_cos(x_psi);
+    const double p_s_2_x_psi = -msfp_sin(x_psi);
+    const double p_s_3_x_theta = msfp_cos(x_theta);
+    const double p_s_4_x_theta = -msfp_sin(x_theta);
     const double p_rate_29_u_t1y = -u_wz*x_psi1;
     const double p_rate_29_u_t1z = u_wy*x_psi1;
     const double p_rate_29_u_wy = u_t1z*x_psi1;
@@ -1036,10 +1039,10 @@ static inline void msfp_named_points(const double *restrict d /* dimensions */, 
     const double x_theta1 = x[4];
     const double x_psi2 = x[6];
     const double x_theta2 = x[7];
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double t2x_5 = s_1*u_t3x + s_2*u_t2x;
     const double t2y_6 = s_1*u_t3y + s_2*u_t2y;
     const double t2z_7 = s_1*u_t3z + s_2*u_t2z;
@@ -1288,10 +1291,10 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double loc_dwy = loc[4];
     const double loc_dwz = loc[5];
     (void)c;
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double s_5 = s_1*s_3;
     const double s_6 = -s_2*s_3;
     const double s_7 = -s_1*s_4;
@@ -1312,7 +1315,7 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double s_24 = s_19*s_20*s_21;
     const double s_25 = -par_friction_slow + par_mu;
     const double s_26 = -par_velocity_rate*s_24;
-    const double s_27 = exp(s_26);
+    const double s_27 = msfp_exp(s_26);
     const double s_28 = s_25*s_27;
     const double s_29 = par_mu - s_28;
     const double s_30 = dY_22*par_td + f_Y;
@@ -1358,10 +1361,10 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double loc_dwy = loc[4];
     const double loc_dwz = loc[5];
     (void)c;
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double s_5 = s_1*s_3;
     const double s_6 = -s_2*s_3;
     const double s_7 = -s_1*s_4;
@@ -1382,7 +1385,7 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double s_24 = s_19*s_20*s_21;
     const double s_25 = -par_friction_slow + par_mu;
     const double s_26 = -par_velocity_rate*s_24;
-    const double s_27 = exp(s_26);
+    const double s_27 = msfp_exp(s_26);
     const double s_28 = s_25*s_27;
     const double s_29 = par_mu - s_28;
     const double s_30 = dY_22*par_td + f_Y;
@@ -1407,10 +1410,10 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     out[5] = Mz_37; /* Mz */
     out[6] = dY_22; /* dY */
     out[7] = dZ_23; /* dZ */
-    const double p_s_1_x_psi = cos(x_psi);
-    const double p_s_2_x_psi = -sin(x_psi);
-    const double p_s_3_x_theta = cos(x_theta);
-    const double p_s_4_x_theta = -sin(x_theta);
+    const double p_s_1_x_psi = msfp_cos(x_psi);
+    const double p_s_2_x_psi = -msfp_sin(x_psi);
+    const double p_s_3_x_theta = msfp_cos(x_theta);
+    const double p_s_4_x_theta = -msfp_sin(x_theta);
     const double p_u_10_loc_dwy = -s_2*s_9;
     const double p_u_10_loc_dwz = -s_1*s_9;
     const double p_u_10_s_1 = -loc_dwz*s_9;
@@ -1431,7 +1434,7 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double p_dZ_23_v_11 = 1.0/par_dy;
     const double p_s_24_s_19 = s_20*s_21;
     const double p_s_24_s_20 = s_19*s_21;
-    const double p_s_27_s_26 = exp(s_26);
+    const double p_s_27_s_26 = msfp_exp(s_26);
     const double p_s_32_s_29 = s_9*x_N;
     const double p_s_32_x_N = s_29*s_9;
     for (int c = 0; c < MSFP_DOF; ++c) {
@@ -2384,10 +2387,10 @@ static inline void msfp_rim(const double *restrict par /* surface_parameters */,
     const double x_theta = x[1];
     const double x_psi1 = x[2];
     const double x_theta1 = x[3];
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double s_5 = -s_1*s_4;
     const double s_6 = s_2*s_4;
     const double s_7 = (1.0/2.0)*par_sign + 1.0/2.0;
@@ -2397,12 +2400,12 @@ static inline void msfp_rim(const double *restrict par /* surface_parameters */,
     const double s_11 = par_R - par_pr;
     const double s_12 = sqrt((s_3*s_3) + (s_5*s_5));
     const double gap_13 = -par_R*msfp_angle(s_12, s_6) + par_sc;
-    const double rate_14 = x_theta1*cos(x_theta);
-    const double rate_15 = x_psi1*cos(x_psi);
-    const double rate_16 = -x_theta1*sin(x_theta);
+    const double rate_14 = x_theta1*msfp_cos(x_theta);
+    const double rate_15 = x_psi1*msfp_cos(x_psi);
+    const double rate_16 = -x_theta1*msfp_sin(x_theta);
     const double rate_17 = -rate_15*s_4 - rate_16*s_1;
     const double rate_18 = rate_14*s_3/sqrt((s_3*s_3) + (s_5*s_5)) + rate_17*s_5/sqrt((s_3*s_3) + (s_5*s_5));
-    const double rate_19 = -x_psi1*sin(x_psi);
+    const double rate_19 = -x_psi1*msfp_sin(x_psi);
     const double rate_20 = rate_16*s_2 + rate_19*s_4;
     const double rate_21 = -par_R*rate_18*s_6/((s_12*s_12) + (s_6*s_6)) + par_R*rate_20*s_12/((s_12*s_12) + (s_6*s_6));
     const double fc_22 = gap_13*par_kc + par_cc*rate_21;
@@ -2441,10 +2444,10 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     const double x_theta = x[1];
     const double x_psi1 = x[2];
     const double x_theta1 = x[3];
-    const double s_1 = sin(x_psi);
-    const double s_2 = cos(x_psi);
-    const double s_3 = sin(x_theta);
-    const double s_4 = cos(x_theta);
+    const double s_1 = msfp_sin(x_psi);
+    const double s_2 = msfp_cos(x_psi);
+    const double s_3 = msfp_sin(x_theta);
+    const double s_4 = msfp_cos(x_theta);
     const double s_5 = -s_1*s_4;
     const double s_6 = s_2*s_4;
     const double s_7 = (1.0/2.0)*par_sign + 1.0/2.0;
@@ -2454,12 +2457,12 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     const double s_11 = par_R - par_pr;
     const double s_12 = sqrt((s_3*s_3) + (s_5*s_5));
     const double gap_13 = -par_R*msfp_angle(s_12, s_6) + par_sc;
-    const double rate_14 = x_theta1*cos(x_theta);
-    const double rate_15 = x_psi1*cos(x_psi);
-    const double rate_16 = -x_theta1*sin(x_theta);
+    const double rate_14 = x_theta1*msfp_cos(x_theta);
+    const double rate_15 = x_psi1*msfp_cos(x_psi);
+    const double rate_16 = -x_theta1*msfp_sin(x_theta);
     const double rate_17 = -rate_15*s_4 - rate_16*s_1;
     const double rate_18 = rate_14*s_3/sqrt((s_3*s_3) + (s_5*s_5)) + rate_17*s_5/sqrt((s_3*s_3) + (s_5*s_5));
-    const double rate_19 = -x_psi1*sin(x_psi);
+    const double rate_19 = -x_psi1*msfp_sin(x_psi);
     const double rate_20 = rate_16*s_2 + rate_19*s_4;
     const double rate_21 = -par_R*rate_18*s_6/((s_12*s_12) + (s_6*s_6)) + par_R*rate_20*s_12/((s_12*s_12) + (s_6*s_6));
     const double fc_22 = gap_13*par_kc + par_cc*rate_21;
@@ -2483,26 +2486,26 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
     out[6] = gap_13; /* g */
     out[7] = rate_21; /* dg */
     out[8] = fc_22; /* fc */
-    const double p_s_1_x_psi = cos(x_psi);
-    const double p_s_2_x_psi = -sin(x_psi);
-    const double p_s_3_x_theta = cos(x_theta);
-    const double p_s_4_x_theta = -sin(x_theta);
+    const double p_s_1_x_psi = msfp_cos(x_psi);
+    const double p_s_2_x_psi = -msfp_sin(x_psi);
+    const double p_s_3_x_theta = msfp_cos(x_theta);
+    const double p_s_4_x_theta = -msfp_sin(x_theta);
     const double p_s_12_s_3 = s_3/sqrt((s_3*s_3) + (s_5*s_5));
     const double p_s_12_s_5 = s_5/sqrt((s_3*s_3) + (s_5*s_5));
     const double p_gap_13_s_12 = -par_R*s_6/((s_12*s_12) + (s_6*s_6));
     const double p_gap_13_s_6 = par_R*s_12/((s_12*s_12) + (s_6*s_6));
-    const double p_rate_14_x_theta = -x_theta1*sin(x_theta);
-    const double p_rate_14_x_theta1 = cos(x_theta);
-    const double p_rate_15_x_psi = -x_psi1*sin(x_psi);
-    const double p_rate_15_x_psi1 = cos(x_psi);
-    const double p_rate_16_x_theta = -x_theta1*cos(x_theta);
-    const double p_rate_16_x_theta1 = -sin(x_theta);
+    const double p_rate_14_x_theta = -x_theta1*msfp_sin(x_theta);
+    const double p_rate_14_x_theta1 = msfp_cos(x_theta);
+    const double p_rate_15_x_psi = -x_psi1*msfp_sin(x_psi);
+    const double p_rate_15_x_psi1 = msfp_cos(x_psi);
+    const double p_rate_16_x_theta = -x_theta1*msfp_cos(x_theta);
+    const double p_rate_16_x_theta1 = -msfp_sin(x_theta);
     const double p_rate_18_rate_14 = s_3/sqrt((s_3*s_3) + (s_5*s_5));
     const double p_rate_18_rate_17 = s_5/sqrt((s_3*s_3) + (s_5*s_5));
-    const double p_rate_18_s_3 = -rate_14*(s_3*s_3)/pow((s_3*s_3) + (s_5*s_5), 3.0/2.0) + rate_14/sqrt((s_3*s_3) + (s_5*s_5)) - rate_17*s_3*s_5/pow((s_3*s_3) + (s_5*s_5), 3.0/2.0);
-    const double p_rate_18_s_5 = -rate_14*s_3*s_5/pow((s_3*s_3) + (s_5*s_5), 3.0/2.0) - rate_17*(s_5*s_5)/pow((s_3*s_3) + (s_5*s_5), 3.0/2.0) + rate_17/sqrt((s_3*s_3) + (s_5*s_5));
-    const double p_rate_19_x_psi = -x_psi1*cos(x_psi);
-    const double p_rate_19_x_psi1 = -sin(x_psi);
+    const double p_rate_18_s_3 = -rate_14*(s_3*s_3)/(((s_3*s_3) + (s_5*s_5))*sqrt((s_3*s_3) + (s_5*s_5))) + rate_14/sqrt((s_3*s_3) + (s_5*s_5)) - rate_17*s_3*s_5/(((s_3*s_3) + (s_5*s_5))*sqrt((s_3*s_3) + (s_5*s_5)));
+    const double p_rate_18_s_5 = -rate_14*s_3*s_5/(((s_3*s_3) + (s_5*s_5))*sqrt((s_3*s_3) + (s_5*s_5))) - rate_17*(s_5*s_5)/(((s_3*s_3) + (s_5*s_5))*sqrt((s_3*s_3) + (s_5*s_5))) + rate_17/sqrt((s_3*s_3) + (s_5*s_5));
+    const double p_rate_19_x_psi = -x_psi1*msfp_cos(x_psi);
+    const double p_rate_19_x_psi1 = -msfp_sin(x_psi);
     const double p_rate_21_rate_18 = -par_R*s_6/((s_12*s_12) + (s_6*s_6));
     const double p_rate_21_rate_20 = par_R*s_12/((s_12*s_12) + (s_6*s_6));
     const double p_rate_21_s_12 = 2*par_R*rate_18*s_12*s_6/(((s_12*s_12) + (s_6*s_6))*((s_12*s_12) + (s_6*s_6))) - 2*par_R*rate_20*(s_12*s_12)/(((s_12*s_12) + (s_6*s_6))*((s_12*s_12) + (s_6*s_6))) + par_R*rate_20/((s_12*s_12) + (s_6*s_6));

@@ -1,24 +1,27 @@
-"""`msfp-gen export --target`: the C library compiled for other platforms; that for Windows is run under Wine."""
+"""`msfp-gen export --target`: the C library for other platforms; programs for Windows run under Wine, bit by bit."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import platform as platform_module
 import re
 import shutil
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.replay import REPLAY, inputs
 
-from msfp_gen import cli
+from msfp_gen import Scene, build_model, cli, load_scene
 from msfp_gen.errors import CompileError
 from msfp_gen.jit import platforms
-from msfp_gen.jit.compiler import find_compiler
+from msfp_gen.simulation.segment import start_run
 
-LAYOUT = ("3", "1", "1")
+LAYOUT = ("5", "2", "2")
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
 # Platform -> the first bytes of its shared library: format, architecture.
 MAGIC = {
@@ -45,31 +48,26 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {target: export(root / target, "--target", target) for target in platforms.TARGETS}
 
 
-def program(prefix: Path, target: str, library: str, folder: Path) -> Path:
-    """example.c, linked with a library of the prefix."""
+def program(prefix: Path, target: str, library: str, folder: Path, source: Path | None = None) -> Path:
+    """example.c, or another program, linked with a library of the prefix."""
     compiler, _ = platforms.find_tools(platforms.TARGETS[target])
-    path = folder / f"example{'.exe' if target.startswith('windows') else ''}"
-    source = prefix / "share/msfp/examples/example.c"
-    command = [*compiler.command, *FLAGS, f"-I{prefix / 'include'}", str(source), str(prefix / library), "-lm"]
+    path = folder / f"program{'.exe' if target.startswith('windows') else ''}"
+    sources = [str(source or prefix / "share/msfp/examples/example.c"), str(prefix / library), "-lm"]
+    command = [*compiler.command, *FLAGS, "-DMODEL=msfp_5_2_2", f"-I{prefix / 'include'}", *sources]
     subprocess.run([*command, "-o", str(path)], check=True)
     return path
 
 
-def rows(output: str) -> np.ndarray:
-    name, _, *found, last = output.splitlines()
-    assert (name, last) == ("msfp_3_1_1", "ok: the run reached its end")
-    return np.array([row.split() for row in found], dtype=float)
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
-    """What the example prints, compiled for this machine by its own compiler."""
-    folder = tmp_path_factory.mktemp("native")
-    prefix = export(folder / "msfp")
-    source, library = prefix / "share/msfp/examples/example.c", prefix / "lib/libmsfp.a"
-    command = [*find_compiler().command, *FLAGS, f"-I{prefix / 'include'}", str(source), str(library), "-lm"]
-    subprocess.run([*command, "-o", "example"], cwd=folder, check=True)
-    return rows(subprocess.run([folder / "example"], text=True, capture_output=True, check=True).stdout)
+def compare(output: str, scene: Scene) -> None:
+    """Rows that replay.c printed with those of Python, bit by bit."""
+    *lines, steps, status = output.splitlines()
+    model = build_model(scene.bearing.layout, scene.effects)
+    run, _ = start_run(scene, model, scene.effect_selection, scene.end, None, ())
+    while run.advance():
+        pass
+    rows = np.array([[float(word) for word in line.split()] for line in lines])
+    assert (int(steps), status) == (run.counts["steps"], "ok")
+    np.testing.assert_array_equal(rows, run.rows)
 
 
 @needs_zig
@@ -95,34 +93,37 @@ def test_a_library_is_of_its_platform(built: dict[str, Path], target: str, tmp_p
 @needs_zig
 def test_the_library_for_windows_shows_the_table_alone(built: dict[str, Path]) -> None:
     imports = (built["windows-x86_64"] / "lib" / platforms.WINDOWS_IMPORT).read_bytes()
-    assert set(re.findall(rb"__imp_(\w+)", imports)) == {b"msfp_3_1_1"}
+    assert set(re.findall(rb"__imp_(\w+)", imports)) == {b"msfp_5_2_2"}
 
 
 @needs_zig
 @pytest.mark.skipif(shutil.which("wine") is None, reason="wine is not installed")
 @pytest.mark.parametrize("kind", ["shared", "static"])
-def test_the_example_runs_under_wine(built: dict[str, Path], expected: np.ndarray, kind: str, tmp_path: Path) -> None:
-    """A program for Windows prints what one for this machine prints, to the last digit but one."""
+def test_rows_under_wine_are_those_of_python_bit_by_bit(built: dict[str, Path], kind: str, tmp_path: Path) -> None:
     prefix, platform = built["windows-x86_64"], platforms.TARGETS["windows-x86_64"]
     library = platform.linker_name if kind == "shared" else "lib/libmsfp.a"
-    path = program(prefix, "windows-x86_64", library, tmp_path)
+    path = program(prefix, "windows-x86_64", library, tmp_path, REPLAY)
     if kind == "shared":
         shutil.copy(prefix / platform.shared, tmp_path)
     environment = {**os.environ, "WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
-    done = subprocess.run(["wine", path], env=environment, cwd=tmp_path, text=True, capture_output=True, timeout=300)
+    scene = load_scene("fenz-test2")
+    done = subprocess.run(
+        ["wine", path, "rows"], env=environment, input=inputs(scene), text=True, capture_output=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr[-2000:]
-    np.testing.assert_allclose(rows(done.stdout), expected, rtol=0, atol=1.1e-4)
+    compare(done.stdout, scene)
 
 
 @needs_zig
-def test_a_library_for_an_older_linux_gives_the_numbers_of_this_one(
-    built: dict[str, Path], expected: np.ndarray, tmp_path: Path
-) -> None:
-    if os.uname().machine != "x86_64" or not Path("/proc").exists():
-        pytest.skip("this machine runs no programs for Linux on x86-64")
-    path = program(built["linux-x86_64"], "linux-x86_64", "lib/libmsfp.a", tmp_path)
-    output = subprocess.run([path], text=True, capture_output=True, check=True).stdout
-    np.testing.assert_allclose(rows(output), expected, rtol=0, atol=1.1e-4)
+@pytest.mark.skipif(
+    (sys.platform, platform_module.machine()) != ("linux", "x86_64"), reason="this is not Linux on x86-64"
+)
+def test_rows_of_another_compiler_are_those_of_python_bit_by_bit(built: dict[str, Path], tmp_path: Path) -> None:
+    """Compiled by zig for an older Linux, and by the compiler at hand for Python."""
+    path = program(built["linux-x86_64"], "linux-x86_64", "lib/libmsfp.a", tmp_path, REPLAY)
+    scene = load_scene("fenz-test2")
+    done = subprocess.run([path, "rows"], input=inputs(scene), text=True, capture_output=True, check=True)
+    compare(done.stdout, scene)
 
 
 def test_without_ziglang_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
