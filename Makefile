@@ -5,8 +5,9 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
 SITE   := $(VENV)/.site
+ZIG    := $(VENV)/.zig
 
-.PHONY: demo test slow lint types package wheels bounds clang fuzz mutants figures docs clean
+.PHONY: demo test slow lint types package wheels bounds clang zig fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -40,6 +41,10 @@ bounds: $(STAMP)
 clang: $(STAMP)
 	CC=clang MSFP_GEN_CFLAGS=-Werror $(BIN)/msfp-gen generate 3 1 1 -o build/clang
 
+# What needs ziglang (100 MB from PyPI): models without a C compiler, libraries for other platforms, the explorer.
+zig: $(ZIG)
+	$(BIN)/python -m pytest -q -n auto --dist loadfile tests/unit/jit/test_zig.py tests/unit/embedding/test_targets.py tests/unit/explorer
+
 # Random scenes against each other: half an hour. See docs/stability.md.
 fuzz: $(STAMP)
 	$(BIN)/python benchmarks/fuzz.py --scenes 10000 --seed 1
@@ -70,6 +75,10 @@ $(STAMP): $(RUNS)
 
 $(SITE): $(RUNS)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[docs]"
+	touch $@
+
+$(ZIG): $(STAMP)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[compiler]"
 	touch $@
 
 clean:

@@ -5,9 +5,15 @@ from __future__ import annotations
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
 
+# Functions of `runtime/msfp_math.h`, which give the same numbers on every system.
+FUNCTIONS = {name: f"msfp_{name}" for name in ("sin", "cos", "exp", "log", "tanh")}
+
 
 class Printer(C99CodePrinter):  # type: ignore[misc]
-    """Printer of C99 that writes small powers as products and calls functions of the runtime for the project's own."""
+    """Printer of C99 that writes small powers as products and calls functions of the runtime."""
+
+    def __init__(self) -> None:
+        super().__init__({"user_functions": FUNCTIONS})
 
     def _print_Pow(self, expr: sp.Pow) -> str:
         base, exponent = expr.as_base_exp()
@@ -15,7 +21,15 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
             text = self.parenthesize(base, sp.printing.precedence.PRECEDENCE["Mul"] + 1)
             product = "*".join([text] * abs(int(exponent)))
             return f"({product})" if exponent > 0 else f"(1.0/({product}))"
-        return str(super()._print_Pow(expr))
+        halves = 2 * float(exponent) if exponent.is_Number else 0.0
+        if abs(halves) in (1.0, 3.0):
+            root = f"sqrt({self._print(base)})"
+            text = self.parenthesize(base, sp.printing.precedence.PRECEDENCE["Mul"] + 1)
+            product = root if abs(halves) == 1.0 else f"({text}*{root})"
+            return product if halves > 0 else f"(1.0/{product})"
+        if exponent == -1:
+            return str(super()._print_Pow(expr))
+        return f"msfp_pow({self._print(base)}, {self._print(exponent)})"
 
     def _print_Step(self, expr: sp.Function) -> str:
         return f"msfp_heaviside({self._print(expr.args[0])})"

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# What is published: sdist and wheel are built and checked, and each is installed in an empty environment. There, outside
-# the checkout, a preset runs, which builds its model from the installed sources.
+# What is published: sdist and wheel are built and checked, with the wheels that `make wheels` left in dist/prebuilt, and
+# each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
+# from the installed sources.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$PWD/.venv/bin
@@ -8,7 +9,8 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 "$bin/python" -m build --outdir "$folder/dist" >"$folder/build.log" 2>&1 || { cat "$folder/build.log" >&2; exit 1; }
-"$bin/python" -m twine check --strict "$folder"/dist/*
+shopt -s nullglob
+"$bin/python" -m twine check --strict "$folder"/dist/* dist/prebuilt/*.whl
 for archive in "$folder"/dist/*; do
     place=$folder/${archive##*.}
     "$bin/uv" venv -q --python "$bin/python" "$place/venv"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -18,6 +20,7 @@ author = "The msfp-gen developers"
 copyright = author
 version = release = __version__
 
+sys.path.insert(0, str(Path(__file__).parent))  # figure_scraper
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 if os.environ.get("MSFP_GEN_SITE_GALLERY") == "1":  # the gallery runs every example
     extensions.append("sphinx_gallery.gen_gallery")
@@ -36,7 +39,8 @@ html_theme_options: dict[str, Any] = {
     "navigation_with_keys": False,
     "show_nav_level": 1,
     "show_prev_next": False,
-    "secondary_sidebar_items": ["page-toc"],
+    # Pages of one wide table use the whole width.
+    "secondary_sidebar_items": {"**": ["page-toc"], "docs/validation": [], "docs/comparison": []},
     "header_links_before_dropdown": 12,
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -70,7 +74,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "within_subsection_order": "FileNameSortKey",
     "capture_repr": ("_repr_html_", "__repr__"),
-    "image_scrapers": ("matplotlib",),
+    "image_scrapers": ("matplotlib", "figure_scraper.figures"),
 }
 
 

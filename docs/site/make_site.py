@@ -97,7 +97,9 @@ def write_gallery(folder: Path) -> None:
     (folder / "GALLERY_HEADER.rst").write_text(
         f"{title}\n{'=' * len(title)}\n\nThe scenes and notebooks in `examples/`, run.\n"
     )
+    (folder / "examples").mkdir()  # sphinx-gallery runs a script where it lies
     for path in sorted((ROOT / "examples").glob("*.toml")):
+        shutil.copy(path, folder / "examples")
         (folder / f"plot_{path.stem}.py").write_text(scene_script(path), encoding="utf-8")
     for path in sorted((ROOT / "examples").glob("*.ipynb")):
         (folder / f"plot_{path.stem}.py").write_text(notebook_script(path), encoding="utf-8")
@@ -110,7 +112,7 @@ def scene_script(path: Path) -> str:
     about = [line.lstrip("# ").rstrip() for line in text.partition("\n\n")[0].splitlines()]
     command = next(line for line in about if line.startswith("msfp-gen "))
     words = " ".join(line for line in about if line != command)
-    title = f"The scene {path.stem}.toml"
+    title = f"{about[0].partition(':')[0].removesuffix('.')} ({path.name})"
     return f'''"""
 {title}
 {"=" * len(title)}
@@ -127,13 +129,13 @@ The same from Python:
 from msfp_gen import load_scene, simulate
 from msfp_gen.figures import plot_result, plot_section
 
-result = simulate(load_scene({str(path)!r}))
-plot_result(result)
+result = simulate(load_scene("examples/{path.name}"))
+figure = plot_result(result)
 
 # %%
 # The stack at its largest displacement:
 
-plot_section(result)
+figure = plot_section(result)
 
 # %%
 # What it reached:
@@ -142,7 +144,7 @@ summary = result.summary
 print("peak displacement [mm]", round(1e3 * summary["peak_displacement"]["radial"], 1))
 print("peak force over load", round(summary["peak_force_ratio"], 4))
 print("rims met", summary["rims_met"])
-'''.replace(repr(str(path)), f'"{path.as_posix()}"')
+'''
 
 
 def notebook_script(path: Path) -> str:

@@ -11,6 +11,7 @@ from msfp_gen.cli.console import SignOption, building, note, show, with_effects
 from msfp_gen.cli.inputs import load_source, result_of
 from msfp_gen.common.output import check_output
 from msfp_gen.errors import InputError
+from msfp_gen.jit.platforms import TARGETS
 from msfp_gen.results.sign import DEFAULT, sign_of
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -22,7 +23,8 @@ app = typer.Typer()
     "  msfp-gen export out.nc -o loop.csv --columns displacement_E1,top_force_E1,sliding\n"
     "  msfp-gen export fenz-test2 -o loop.parquet --columns displacement,top_force\n"
     "  msfp-gen export 5 2 2 --prefix msfp         # a C library: lib, include, share\n"
-    "  msfp-gen export 5 2 2  3 1 1 --prefix msfp  # two layouts in one library"
+    "  msfp-gen export 5 2 2  3 1 1 --prefix msfp  # two layouts in one library\n"
+    "  msfp-gen export 5 2 2 --prefix win --target windows-x86_64"
 )
 @with_effects
 def export(
@@ -46,6 +48,10 @@ def export(
         Path | None,
         typer.Option(metavar="DIR", help="Of layouts: write a C library there. The effects below are for this."),
     ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(metavar="PLATFORM", help=f"Of the C library, if not this machine: {', '.join(TARGETS)}."),
+    ] = None,
     *,
     effects: Effects,
 ) -> None:
@@ -60,7 +66,9 @@ def export(
                 raise InputError(
                     f"{option} = {str(given)!r}: this is for the rows of a run; leave it out with --prefix"
                 )
-        _export_library([ModelSpec(layout, effects) for layout in _layouts(what)], prefix)
+        _export_library([ModelSpec(layout, effects) for layout in _layouts(what)], prefix, target)
+    elif target is not None:
+        raise InputError(f"--target = {target!r}: this is for a C library; give --prefix DIR")
     elif output is None:
         raise InputError("export: give --output FILE for the rows of a run, or --prefix DIR for a C library of layouts")
     elif len(what) > 1 or effects != Effects():
@@ -95,12 +103,13 @@ def _layouts(words: list[str]) -> list[Layout]:
     return [Layout(*numbers[i : i + 3]) for i in range(0, len(numbers), 3)]
 
 
-def _export_library(specs: list[ModelSpec], prefix: Path) -> None:
+def _export_library(specs: list[ModelSpec], prefix: Path, target: str | None) -> None:
     from msfp_gen.common.tables import Table
     from msfp_gen.embedding import export_library
 
     with building(kept=False) as progress:
-        library = export_library(specs, prefix, progress)
+        library = export_library(specs, prefix, progress, target)
     rows = [*library.models.items(), ("prefix", str(library.prefix)), ("files", str(len(library.files)))]
     show([Table("C library msfp", (), rows)])
-    note(f"start with {library.prefix / 'share/msfp/README.md'}; `make run` in share/msfp/examples runs a C example")
+    example = "" if target else "; `make run` in share/msfp/examples runs a C example"
+    note(f"start with {library.prefix / 'share/msfp/README.md'}{example}")

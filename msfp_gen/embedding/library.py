@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION, CALL_ERRORS, effects_text, model_name, surface_values
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.jit.library import STATIC, BuiltLibrary, build_library
+from msfp_gen.jit.platforms import Platform, find_platform
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
@@ -48,51 +48,56 @@ class Library:
 
 
 def export_library(
-    specs: Sequence[ModelSpec], prefix: Path | str, progress: Callable[[str, float], None] | None = None
+    specs: Sequence[ModelSpec],
+    prefix: Path | str,
+    progress: Callable[[str, float], None] | None = None,
+    target: str | None = None,
 ) -> Library:
     """Build the models of `specs` and write the C library with all that its users need below `prefix`.
 
-    progress: called with a text and the completed share, 0 to 1. Raises InputError: two models of one layout, a prefix
-    that is no folder or holds files of the user under these names; CompileError. Nothing is written after an error.
+    progress: called with a text and the completed share, 0 to 1. target: the platform, a key of
+    `msfp_gen.jit.platforms.TARGETS`; None: that of this machine. Raises InputError: two models of one layout, an
+    unknown target, a prefix that is no folder or holds files of the user under these names; CompileError. Nothing is
+    written after an error.
     """
-    begin, target = perf_counter(), Path(prefix).absolute()
+    begin, root, platform = perf_counter(), Path(prefix).absolute(), find_platform(target)
     models = {model_name(spec): spec for spec in specs}
     if len(models) < len(specs):
         raise InputError(
             f"layouts = {', '.join(spec.layout.name.replace('_', ' ') for spec in specs)}: give each layout once; "
             "its names in C are those of the layout"
         )
-    check_prefix(target)
+    check_prefix(root)
     folder = Path(tempfile.mkdtemp(prefix="msfp-gen-export-"))
     try:
-        built = build_library(list(models.values()), folder, progress or (lambda _, __: None))
-        tree = _tree(models, built)
+        built = build_library(list(models.values()), folder, platform, progress or (lambda _, __: None))
+        tree = _tree(models, built, platform, target)
     except BaseException as error:
         if not (isinstance(error, CompileError) and error.log):  # else the folder stays, with the log
             shutil.rmtree(folder, ignore_errors=True)
         raise
     shutil.rmtree(folder)
     try:
-        install(tree, target)
+        install(tree, root)
     except OSError as error:
         raise InputError(f"--prefix = {str(prefix)!r}: {error.strerror or error}; give another folder") from error
     keys = {name: spec.key for name, spec in models.items()}
-    return Library(target, keys, tuple(sorted(tree)), perf_counter() - begin)
+    return Library(root, keys, tuple(sorted(tree)), perf_counter() - begin)
 
 
-def _tree(models: dict[str, ModelSpec], built: BuiltLibrary) -> Tree:
-    content = _content(models, built)
+def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform, target: str | None) -> Tree:
+    content = _content(models, platform, target)
     texts = {path: render(name, content) for name, path in PAGES.items()}
     texts |= {f"include/{name}": text for name, text in built.public.items()}
     for model, files in built.sources.items():
         texts |= {f"{SHARE}/src/{model}/{name}": text for name, text in files.items()}
     tree: Tree = {path: text.encode() for path, text in texts.items()}
-    libraries = {f"lib/{STATIC}": built.static, f"lib/{built.shared.name}": built.shared}
-    tree |= {path: file.read_bytes() for path, file in libraries.items()}
-    return tree | {f"lib/{built.linker_name}": Link(built.shared.name)}
+    tree |= {f"lib/{STATIC}": built.static.read_bytes(), platform.shared: built.shared.read_bytes()}
+    imports = built.imports.read_bytes() if built.imports is not None else Link(built.shared.name)
+    return tree | {platform.linker_name: imports}
 
 
-def _content(models: dict[str, ModelSpec], built: BuiltLibrary) -> dict[str, Any]:
+def _content(models: dict[str, ModelSpec], platform: Platform, target: str | None) -> dict[str, Any]:
     """What the templates need."""
     from msfp_gen.generator.emit import word_enums  # it imports SymPy
 
@@ -115,9 +120,8 @@ def _content(models: dict[str, ModelSpec], built: BuiltLibrary) -> dict[str, Any
         "words": word_enums(),
         "errors": CALL_ERRORS,
         "static": STATIC,
-        "shared": built.shared.name,
-        "linker_name": built.linker_name,
-        "soname_flag": "@rpath/" if sys.platform == "darwin" else "",
+        "platform": platform,
+        "target": target,
         "flags": " ".join(FLAGS["c"]),
         "values": values,
     }

@@ -23,7 +23,8 @@ Progress = Callable[[float, float], None]
 SUFFIXES = (".html", ".htm")
 # Presets of a page without a scene of the user's: laboratory tests, orbits, other devices, and a bundled record.
 EXPLORED = (
-    "fenz-test2", "fenz-test5", "becker-circle-88", "becker-eight-88", "unusual-tfp", "double-push", "ridgecrest-clc",
+    "fenz-test2", "fenz-test5", "becker-circle-88", "becker-eight-88", "unusual-tfp", "double-push", "quintuple-push",
+    "ridgecrest-clc",
 )  # fmt: skip
 RECORD = 15.0  # of a record [s]: the strong part of the bundled one
 SHARED = ("dom.js", "chart.js")  # scripts of the HTML report

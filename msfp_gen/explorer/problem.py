@@ -49,7 +49,7 @@ def problem_of(scene: Scene, title: str) -> Problem:
     fixed = fixed_scene(scene)
     effects = cast(Effects, fixed.effects)
     spec = ModelSpec(fixed.bearing.layout, effects)
-    given, azimuth = _run_arguments(fixed, spec)
+    given, azimuth = run_arguments(fixed, spec)
     run, stack = given["run"], given["stack"]
     motion, load = (
         {"knots": _packed(knots), "coefficients": _columns(coefficients)}
@@ -115,7 +115,7 @@ def fixed_scene(scene: Scene) -> Scene:
     return replace(scene, effects=effects)
 
 
-def _run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
+def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
     """What the compiled run of a scene would be given, and the azimuth of its frame [rad]; nothing is compiled."""
     given: dict[str, Any] = {}
 

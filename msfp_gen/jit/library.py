@@ -1,18 +1,16 @@
 """Build of the C library: the models of one or several layouts in one static and one shared library.
 
-The names of every model have its prefix, so that they link together. Each is compiled for every processor.
+The names of every model have its prefix, so that they link together. Each is compiled for every processor of the
+architecture.
 """
 
 from __future__ import annotations
 
-import shutil
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from msfp_gen.errors import CompileError
-from msfp_gen.generator.interface import ABI_VERSION, model_name
+from msfp_gen.generator.interface import model_name
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import (
     FLAGS,
@@ -20,40 +18,41 @@ from msfp_gen.jit.compiler import (
     Log,
     Step,
     compile_step,
-    find_compiler,
     object_file,
     run_parallel,
 )
-from msfp_gen.jit.options import words
+from msfp_gen.jit.platforms import EXPORTS, Platform, find_tools
 from msfp_gen.specification.layout import ModelSpec
 
 GENERATION_SHARE = 0.3  # of the build time, for the progress display; compilation takes the rest
 STATIC = "libmsfp.a"
-EXPORTS = "msfp.map"  # what the shared library shows: one function of each model
 
 
 @dataclass(frozen=True)
 class BuiltLibrary:
     """Files of a library, in the folder where it was built.
 
-    static, shared: the two libraries. linker_name: name by which a linker finds the shared one. public: name -> text
-    of the headers that programs include. sources: name of a model -> its C files and headers: name -> text.
+    static, shared: the two libraries. imports: the import library of the shared one, where the platform has such.
+    public: name -> text of the headers that programs include. sources: name of a model -> its C files and headers:
+    name -> text.
     """
 
     static: Path
     shared: Path
-    linker_name: str
+    imports: Path | None
     public: dict[str, str]
     sources: dict[str, dict[str, str]]
 
 
-def build_library(specs: Sequence[ModelSpec], folder: Path, progress: Callable[[str, float], None]) -> BuiltLibrary:
+def build_library(
+    specs: Sequence[ModelSpec], folder: Path, platform: Platform, progress: Callable[[str, float], None]
+) -> BuiltLibrary:
     """Derive, emit, compile and link the models of `specs`, of different layouts, in an empty folder.
 
     progress: called with a text and the completed share of the build, 0 to 1. Raises CompileError: no compiler or
     archiver was found, or one of them failed; the folder then holds the sources and the log.
     """
-    compiler, archiver = find_compiler(), find_archiver()
+    compiler, archiver = find_tools(platform)
     sources = _write_sources(specs, folder, progress)
     units = [f"{model}/{name}" for model, files in sources.items() for name in files if name.endswith(".c")]
     log, flags = Log(folder), (*FLAGS["c"], *FLAGS["user"])
@@ -61,30 +60,14 @@ def build_library(specs: Sequence[ModelSpec], folder: Path, progress: Callable[[
         share = GENERATION_SHARE + (1 - GENERATION_SHARE) * done / len(units)
         progress(f"compiling {', '.join(sources)} ({done} of {len(units)} files)", share)
     objects = [object_file(name) for name in units]
-    shared, linker_name, options = shared_names()
     log.run(Step(STATIC, (*archiver, "rcs", STATIC, *objects)))
     # Versions of a function for several processors stay visible in spite of -fvisibility=hidden.
     (folder / EXPORTS).write_text(f"{{ global: {'; '.join(sources)}; local: *; }};\n", encoding="utf-8")
-    log.run(_link_step(compiler, options, objects, shared))
+    shared = Path(platform.shared).name
+    log.run(_link_step(compiler, platform.options, objects, shared))
     public = {name: files[name] for model, files in sources.items() for name in ("msfp.h", f"{model}.h")}
-    return BuiltLibrary(folder / STATIC, folder / shared, linker_name, public, sources)
-
-
-def shared_names() -> tuple[str, str, tuple[str, ...]]:
-    """Of the shared library on this platform: its file name, the name for the linker, options of the compiler."""
-    if sys.platform == "darwin":
-        name = f"libmsfp.{ABI_VERSION}.dylib"
-        return name, "libmsfp.dylib", ("-dynamiclib", "-install_name", f"@rpath/{name}")
-    name = f"libmsfp.so.{ABI_VERSION}"
-    return name, "libmsfp.so", ("-shared", f"-Wl,-soname,{name}", f"-Wl,--version-script={EXPORTS}")
-
-
-def find_archiver() -> tuple[str, ...]:
-    """The archiver that `AR` names, else `ar`. Raises CompileError where there is none."""
-    command = words("AR") or ("ar",)
-    if shutil.which(command[0]) is None:
-        raise CompileError(f"no archiver found (looked for {command[0]}): install binutils or name it with AR=...")
-    return command
+    imports = folder / Path(platform.linker_name).name if platform.imports else None
+    return BuiltLibrary(folder / STATIC, folder / shared, imports, public, sources)
 
 
 def _write_sources(

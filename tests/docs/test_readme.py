@@ -68,5 +68,7 @@ def test_make_targets_exist():
 
 def test_citation_names_the_version_that_is_built():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"## {version}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    released = re.search(r"^date-released: (\S+)$", citation, flags=re.MULTILINE)
+    assert f"\nversion: {version}\n" in citation and released is not None
+    assert f"## {version} ({released[1]})\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

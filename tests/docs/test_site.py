@@ -102,3 +102,7 @@ def test_gallery_runs_every_example(tmp_path: Path) -> None:
     examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
     shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
     assert examples == shown
+    for path in (tmp_path / "site" / "gallery").glob("plot_*.html"):
+        page = path.read_text(encoding="utf-8")
+        assert f"_images/sphx_glr_{path.stem}_001.png" in page, f"{path.name} has no figure"
+        assert str(ROOT) not in page, "a path of this machine"

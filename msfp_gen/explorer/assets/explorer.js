@@ -138,18 +138,20 @@ function show({ found, settings, request: begun, cost }) {
     lines: [{ x: thinned(milli), y: thinned(kilo), colour: blue }],
   }, goTo)];
   find("orbit").replaceChildren();
+  find("orbit").hidden = problem.planar;
   if (!problem.planar) markers.push(addChart(find("orbit"), {
     title: "Orbit in plan", xlabel: "u₁ [mm]", ylabel: "u₂ [mm]", equal: true,
     lines: [{ x: thinned(numbers.u.map((v) => v[0] * 1000)), y: thinned(numbers.u.map((v) => v[1] * 1000)), colour: blue }],
   }, goTo));
   const { cycle } = numbers;
   const weight = problem.axialLoad === null ? null : problem.axialLoad * settings.load;
+  const last = problem.planar ? "last cycle" : "last cycle, in the direction";
   table(find("numbers"), [
     ["largest displacement", `${fixed(1000 * numbers.peakDisplacement[3], 2)} mm`],
     ["largest horizontal force", `${fixed(numbers.peakForce[3] / 1000, 3)} kN`],
     ...(weight === null ? [] : [["over the axial load", fixed(numbers.peakForce[3] / weight, 4)]]),
-    ["effective stiffness, last cycle", cycle ? `${fixed(cycle.stiffness / 1e6, 4)} kN/mm` : (problem.record ? "not defined for a record" : "no closed cycle")],
-    ["effective damping, last cycle", cycle && cycle.damping !== null ? `${fixed(100 * cycle.damping, 2)} %` : "–"],
+    [`effective stiffness, ${last}`, cycle ? `${fixed(cycle.stiffness / 1e6, 4)} kN/mm` : (problem.record ? "not defined for a record" : "no closed cycle")],
+    [`effective damping, ${last}`, cycle && cycle.damping !== null ? `${fixed(100 * cycle.damping, 2)} %` : "–"],
     ["energy dissipated in it", cycle ? `${fixed(cycle.energy / 1000, 4)} kJ` : "–"],
     ["least normal force", `${fixed(Math.min(...numbers.leastNormal) / 1000, 2)} kN`],
   ]);

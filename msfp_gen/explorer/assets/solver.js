@@ -48,9 +48,10 @@ function changedMotion({ knots, coefficients }, { amplitude, rate, angle }) {
   return { knots: rate === 1 ? knots : knots.map((t) => t / rate), coefficients: made };
 }
 
-function changedLoad({ knots, coefficients }, factor) {
-  return { knots, coefficients: factor === 1 ? coefficients : coefficients.map((c, i) =>
-    (Math.floor(i / POWERS) % CHANNELS === 2 ? c * factor : c)) };
+// The load with another axial load, `rate` times as fast.
+function changedLoad({ knots, coefficients }, { load, rate }) {
+  const factor = (i) => (Math.floor(i / POWERS) % CHANNELS === 2 ? load : 1) * rate ** (i % POWERS);
+  return { knots: rate === 1 ? knots : knots.map((t) => t / rate), coefficients: coefficients.map((c, i) => c * factor(i)) };
 }
 
 // settings: { friction, radius: one for each surface; load: factor; amplitude, rate: factors; angle [rad] }.
@@ -66,14 +67,13 @@ function inputOf(problem, settings) {
     return changed;
   });
   const motion = changedMotion(problem.motion, settings);
-  const load = changedLoad(problem.load, settings.load);
+  const load = changedLoad(problem.load, settings);
   const scaled = (times) => (rate === 1 ? times : times.map((t) => t / rate));
-  const loadKnots = load.knots;
   const parts = [
     numbers,
-    [motion.knots.length - 1, loadKnots.length - 1, problem.jumps.length, problem.stops.length, problem.spans[0].length],
+    [motion.knots.length - 1, load.knots.length - 1, problem.jumps.length, problem.stops.length, problem.spans[0].length],
     problem.bodies.flat(), surfaces.flat(), problem.top, ...problem.state,
-    motion.knots, motion.coefficients, loadKnots, load.coefficients,
+    motion.knots, motion.coefficients, load.knots, load.coefficients,
     scaled(problem.jumps), scaled(problem.stops), scaled(problem.spans[0]), scaled(problem.spans[1]),
   ];
   const input = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0));

@@ -2,7 +2,9 @@
 #include "msfp_fields.h"
 #include "api.h"
 
-#if defined(__GNUC__)
+#if defined(_WIN32)
+#define VISIBLE __declspec(dllexport)
+#elif defined(__GNUC__)
 #define VISIBLE __attribute__((visibility("default")))
 #else
 #define VISIBLE

@@ -66,7 +66,7 @@ MSFP_INLINE double msfp_friction_after_slip(double Y, double slip)
     double y = sign * Y, rest = fabs(slip);
     if (!msfp_unload_to_zero(&y, &rest) || y == 1.0) /* at 1 friction is saturated and stays so */
         return sign * y;
-    const double left = (1.0 - y) * exp(-2.0 * rest);
+    const double left = (1.0 - y) * msfp_exp(-2.0 * rest);
     return sign * (1.0 + y - left) / (1.0 + y + left);
 }
 
@@ -103,8 +103,8 @@ MSFP_INLINE double msfp_friction_loss(double Y, double slip)
         return 0.0;
     if (y == 1.0)
         return rest;
-    const double left = (1.0 - y) * exp(-2.0 * rest), end = (1.0 + y - left) / (1.0 + y + left);
-    return rest + log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
+    const double left = (1.0 - y) * msfp_exp(-2.0 * rest), end = (1.0 + y - left) / (1.0 + y + left);
+    return rest + msfp_log(0.5 * (1.0 + y + left)) - 0.5 * (end * end - y * y);
 }
 
 /* Slip over d_y per rotation of the body above (3.19) [1/rad]; in the plane the contact position does not enter. */

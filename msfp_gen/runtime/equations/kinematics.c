@@ -52,13 +52,13 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 #endif
         /* The footprint bounds the contact position; friction inclines the resultant further by its angle. */
         const double footprint = fmin(
-            asin(fmin(slider[MSFP_BODY_VALUE_RIM_RADIUS] / radius, 1.0)) + atan(s[MSFP_SURFACE_VALUE_FRICTION]), 1.5);
-        out[MSFP_SURFACE_PARAMETERS_CA] = cos(footprint);
-        out[MSFP_SURFACE_PARAMETERS_SA] = sin(footprint);
+            msfp_asin(fmin(slider[MSFP_BODY_VALUE_RIM_RADIUS] / radius, 1.0)) + msfp_atan2(s[MSFP_SURFACE_VALUE_FRICTION], 1.0), 1.5);
+        out[MSFP_SURFACE_PARAMETERS_CA] = msfp_cos(footprint);
+        out[MSFP_SURFACE_PARAMETERS_SA] = msfp_sin(footprint);
         for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* the numbers of a friction law come last in both */
             out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
-        p->rim_cosine[j] = cos(tilt);
-        p->rim_slope[j] = radius / sin(tilt);
+        p->rim_cosine[j] = msfp_cos(tilt);
+        p->rim_slope[j] = radius / msfp_sin(tilt);
     }
     for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)
         for (int lane = 0; lane < MSFP_LANES; ++lane)

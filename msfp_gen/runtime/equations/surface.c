@@ -62,11 +62,11 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
     double body[MSFP_BODY_SIZE];
     for (int j = 0; j < NB; ++j) {
 #if !MSFP_PLANAR
-        body[MSFP_BODY_SP] = sin(q[j][0]);
-        body[MSFP_BODY_CP] = cos(q[j][0]);
+        body[MSFP_BODY_SP] = msfp_sin(q[j][0]);
+        body[MSFP_BODY_CP] = msfp_cos(q[j][0]);
 #endif
-        body[MSFP_BODY_ST] = sin(q[j][1]);
-        body[MSFP_BODY_CT] = cos(q[j][1]);
+        body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
+        body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
         msfp_gap(p->surface[j], body, sliding[j]);
     }
 }

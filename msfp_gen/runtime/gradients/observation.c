@@ -36,15 +36,15 @@ MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_
 {
     double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
     for (int j = 0; j < NB; ++j) {
-        body[MSFP_BODY_ST] = sin(q[j][1]);
-        body[MSFP_BODY_CT] = cos(q[j][1]);
+        body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
+        body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
         for (int c = 0; c < C; ++c) {
             d[MSFP_BODY_ST * C + c] = body[MSFP_BODY_CT] * dq[j][1][c];
             d[MSFP_BODY_CT * C + c] = -body[MSFP_BODY_ST] * dq[j][1][c];
         }
 #if !MSFP_PLANAR
-        body[MSFP_BODY_SP] = sin(q[j][0]);
-        body[MSFP_BODY_CP] = cos(q[j][0]);
+        body[MSFP_BODY_SP] = msfp_sin(q[j][0]);
+        body[MSFP_BODY_CP] = msfp_cos(q[j][0]);
         for (int c = 0; c < C; ++c) {
             d[MSFP_BODY_SP * C + c] = body[MSFP_BODY_CP] * dq[j][0][c];
             d[MSFP_BODY_CP * C + c] = -body[MSFP_BODY_SP] * dq[j][0][c];

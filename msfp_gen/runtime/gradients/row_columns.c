@@ -89,11 +89,11 @@ static void limit_friction(const msfp_node_rows *rows, int count, const msfp_row
 {
     for (int j = 0; j < NB; ++j) {
         double most = 1.0;
-        const double size = hypot(row->f[j][0], row->f[j][1]);
+        const double size = msfp_hypot(row->f[j][0], row->f[j][1]);
         int at = -1;
         for (int r = 0; r < count; ++r)
-            if (hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]) > most) {
-                most = hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]);
+            if (msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]) > most) {
+                most = msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]);
                 at = r;
             }
         for (int c = 0; c < C && size > most; ++c) {

@@ -53,13 +53,13 @@ static jet angle_of(jet y, jet x)
 {
     const double turn = x.of[0] * y.of[1] - y.of[0] * x.of[1], square = x.of[0] * x.of[0] + y.of[0] * y.of[0];
     const double dturn = x.of[0] * y.of[2] - y.of[0] * x.of[2], dsquare = 2.0 * (x.of[0] * x.of[1] + y.of[0] * y.of[1]);
-    return (jet){ { atan2(y.of[0], x.of[0]), turn / square, (dturn - turn * dsquare / square) / square } };
+    return (jet){ { msfp_atan2(y.of[0], x.of[0]), turn / square, (dturn - turn * dsquare / square) / square } };
 }
 
 /* Angle between -pi/2 and pi/2 with that sine. */
 static jet angle_of_sine(jet sine)
 {
-    const double angle = asin(sine.of[0]), cosine = cos(angle), rate = sine.of[1] / cosine;
+    const double angle = msfp_asin(sine.of[0]), cosine = msfp_cos(angle), rate = sine.of[1] / cosine;
     return (jet){ { angle, rate, (sine.of[2] + sine.of[0] * rate * rate) / cosine } };
 }
 

@@ -34,7 +34,7 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
             return MSFP_E_UPLIFT;
         }
 #if MSFP_UPLIFT
-        const double aside = hypot(s->q[j][3], s->q[j][4]),
+        const double aside = msfp_hypot(s->q[j][3], s->q[j][4]),
                      face = run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_RS];
         if (face > 0.0 && aside > face) { /* further aside than its face is wide: it cannot land on it */
             run->status_surface = j + 1;
@@ -143,7 +143,7 @@ static void outside_law(const msfp_run *run, finding *found)
     for (int j = 0; j < NB; ++j) {
         const double *contact = run->work.contact[j];
         if (o->monitors & 1 << MSFP_MONITOR_LAW_SPEED)
-            outside(&found[MSFP_MONITOR_LAW_SPEED], hypot(contact[MSFP_CONTACT_U], msfp_contact_v(contact)), speeds,
+            outside(&found[MSFP_MONITOR_LAW_SPEED], msfp_hypot(contact[MSFP_CONTACT_U], msfp_contact_v(contact)), speeds,
                     j + 1);
         if (o->monitors & 1 << MSFP_MONITOR_LAW_LOAD)
             outside(&found[MSFP_MONITOR_LAW_LOAD], contact[MSFP_CONTACT_N], o->law_load[j], j + 1);

@@ -61,9 +61,9 @@ static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
 static void limit_friction(const msfp_row *rows, int count, msfp_row *row)
 {
     for (int j = 0; j < NB; ++j) {
-        double most = 1.0, size = hypot(row->f[j][0], row->f[j][1]);
+        double most = 1.0, size = msfp_hypot(row->f[j][0], row->f[j][1]);
         for (int r = 0; r < count; ++r)
-            most = fmax(most, hypot(rows[r].f[j][0], rows[r].f[j][1]));
+            most = fmax(most, msfp_hypot(rows[r].f[j][0], rows[r].f[j][1]));
         for (int d = 0; d < 2 && size > most; ++d)
             row->f[j][d] *= most / size;
     }

@@ -176,7 +176,7 @@ static double step_factor(const msfp_run *run, double error)
 {
     const double order = msfp_control_order(run->options.method);
     const double e = fmax(error, 1e-6), last = fmax(run->previous_error, 1e-6);
-    return fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+    return fmin(5.0, fmax(0.2, 0.9 * msfp_pow(e, -0.7 / order) * msfp_pow(last, 0.4 / order)));
 }
 
 /* Shorten the step after a failure. Returns 1 where the step is already the smallest: the run ends. */
@@ -257,7 +257,7 @@ static int one_step(msfp_run *run)
         }
         if (error > 1.0 && !(prescribed > 0.0)) {
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];
-            return !shorten_step(run, h, fmax(0.1, 0.9 * pow(error, -1.0 / msfp_control_order(run->options.method))),
+            return !shorten_step(run, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / msfp_control_order(run->options.method))),
                                  MSFP_E_STEP);
         }
         memcpy(before, run->events_now, sizeof before);

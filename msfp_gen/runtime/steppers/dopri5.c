@@ -112,8 +112,9 @@ static int at_stability_limit(const slope *sixth, const slope *last, const msfp_
     double rates = 0.0, states = 0.0;
     for (int b = 0; b < NB; ++b)
         for (int d = 0; d < NQ; ++d) {
-            rates += pow(last->a[b][d] - sixth->a[b][d], 2);
-            states += pow(at->v[b][d] - before->v[b][d], 2);
+            const double slopes = last->a[b][d] - sixth->a[b][d], change = at->v[b][d] - before->v[b][d];
+            rates += slopes * slopes;
+            states += change * change;
         }
     return h * h * rates > 3.25 * 3.25 * states && states > 0.0;
 }

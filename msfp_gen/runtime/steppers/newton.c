@@ -170,8 +170,8 @@ static double rim_force_jump(const msfp_run *run, const msfp_stage *s)
     double worst = 0.0;
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
         const double *par = run->parameters.surface[j], *q = s->at.q[j], *v = s->at.v[j];
-        const double gap = (cos(q[0]) * cos(q[1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
-        const double force = par[MSFP_SURFACE_PARAMETERS_CC] * par[MSFP_SURFACE_PARAMETERS_R] * hypot(v[0], v[1]);
+        const double gap = (msfp_cos(q[0]) * msfp_cos(q[1]) - run->parameters.rim_cosine[j]) * run->parameters.rim_slope[j];
+        const double force = par[MSFP_SURFACE_PARAMETERS_CC] * par[MSFP_SURFACE_PARAMETERS_R] * msfp_hypot(v[0], v[1]);
         if (fabs(gap) * par[MSFP_SURFACE_PARAMETERS_KC] <= 10.0 * force)
             worst =
                 fmax(worst, force / (run->work.contact[j][MSFP_CONTACT_N] * (par[MSFP_SURFACE_PARAMETERS_MU] + 0.01)));

@@ -35,6 +35,7 @@ from msfp_gen.errors import CompileError
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.jit.library import BuiltLibrary
+from msfp_gen.jit.platforms import Platform
 from msfp_gen.simulation.segment import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
@@ -341,13 +342,14 @@ def test_every_line_of_the_fortran_files_fits(prefix: Path) -> None:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Builds that write empty libraries without compiling."""
 
-    def build(specs: Any, folder: Path, progress: Any) -> BuiltLibrary:
-        for name in ("libmsfp.a", "libmsfp.so.1"):
-            (folder / name).write_bytes(b"")
+    def build(specs: Any, folder: Path, platform: Platform, progress: Any) -> BuiltLibrary:
+        static, shared = folder / "libmsfp.a", folder / Path(platform.shared).name
+        static.write_bytes(b"")
+        shared.write_bytes(b"")
         names = [model_name(spec) for spec in specs]
         public = {"msfp.h": "h\n", **{f"{name}.h": f"{name}\n" for name in names}}
         sources = {name: {"run.c": "c\n"} for name in names}
-        return BuiltLibrary(folder / "libmsfp.a", folder / "libmsfp.so.1", "libmsfp.so", public, sources)
+        return BuiltLibrary(static, shared, None, public, sources)
 
     monkeypatch.setattr("msfp_gen.embedding.library.build_library", build)
 
@@ -374,6 +376,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["5", "2", "2", "5", "2", "2", "--prefix", "lib"], "layouts = 5 2 2, 5 2 2: give each layout once"),
         (["5", "2", "2", "--prefix", "lib", "-o", "x.csv"], "--output = 'x.csv': this is for the rows of a run"),
         (["5", "2", "2", "--prefix", "lib", "--columns", "gap"], "--columns = 'gap': this is for the rows of a run"),
+        (["5", "2", "2", "--prefix", "lib", "--target", "vax"], "--target = 'vax': give one of windows-x86_64, macos-"),
+        (["out.nc", "-o", "x.csv", "--target", "macos-arm64"], "--target = 'macos-arm64': this is for a C library"),
         (["5", "2", "2", "-o", "x.csv"], "RUN = '5 2 2': give one result, scene file or preset"),
         (["out.nc", "-o", "x.csv", "--uplift"], "RUN = 'out.nc': give one result, scene file or preset and no effects"),
     ],
@@ -399,7 +403,7 @@ def test_a_second_export_replaces_the_first_and_nothing_else(quick: None, tmp_pa
     assert cli.main(["export", "5", "2", "2", "--prefix", str(prefix)]) == 0
     assert not (prefix / "include/msfp_2_1_0.h").exists() and not (prefix / "share/msfp/src/msfp_2_1_0").exists()
     assert (prefix / "include/own.h").read_text() == "mine\n" and (prefix / "include/msfp_5_2_2.h").exists()
-    assert (prefix / "lib/libmsfp.so").readlink() == Path("libmsfp.so.1")
+    assert (prefix / "lib/libmsfp.so").readlink() == Path(f"libmsfp.so.{ABI_VERSION}")
 
 
 def test_files_of_the_user_are_not_replaced(quick: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
 import json
 import shutil
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from msfp_gen import changed_scene, simulate
+from msfp_gen import build_model, changed_scene, simulate
 from msfp_gen.analysis.characterise.loops import REVERSAL, closed_cycles, effective_properties, turning_points
 from msfp_gen.explorer import EXPLORED, write_explorer
 from msfp_gen.explorer.page import explored_scene
-from msfp_gen.explorer.problem import fixed_scene
+from msfp_gen.explorer.problem import Problem, fixed_scene, problem_of, run_arguments
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
@@ -46,6 +48,22 @@ SLIDE = """
 const input = document.querySelector(`[data-name="${arguments[0]}"]`);
 input.value = arguments[1];
 input.dispatchEvent(new Event("input"));
+"""
+
+
+# The numbers that the worker gives to the compiled run, and the rows that come back.
+EXCHANGED = """
+const source = find("worker").textContent;
+const solver = source.slice(0, source.indexOf("onmessage ="));
+const { decoded, inputOf } = new Function(solver + "return { decoded, inputOf };")();
+const packed = (values) => {
+  let text = "";
+  const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return btoa(text);
+};
+const { problem, settings, found } = state.last;
+return [packed(inputOf(decoded(problem), settings)), packed(found.rows)];
 """
 
 
@@ -100,30 +118,65 @@ def expected(scene):
     return result, loop
 
 
-def check(found, scene):
-    """Compare a page with a run in Python; returns both last cycles.
-
-    Another libm rounds differently in the last digit. Where that changes whether a step is accepted, the steps differ
-    from there on, and the runs differ by what the tolerance of the scene permits; everywhere else by rounding.
-    """
+def check(found, scene, within=1e-9):
+    """Compare the numbers of a page with a run in Python."""
     result, loop = expected(scene)
-    history, summary = result.history, result.summary
+    summary = result.summary
     assert found["status"] == result.status
-    time = np.array(found["time"])
-    same_steps = len(time) == len(history.time) and np.abs(time - history.time).max() < 1e-9 * time[-1]
-    within = 1e-9 if same_steps else 0.1 * scene.solver.rtol
     assert found["force"][3] == pytest.approx(summary["peak_top_force"]["radial"], rel=within)
     assert found["displacement"][3] == pytest.approx(summary["peak_displacement"]["radial"], rel=within)
     loop = None if scene.motion.sampled else loop
     assert (found["cycle"] is None) == (loop is None)
-    if same_steps:
-        for ours, theirs in ((found["loop"], history.top_force), (found["path"], history.displacement)):
-            assert np.abs(np.array(ours) - theirs[:, 0]).max() < 1e-9 * np.abs(theirs[:, 0]).max()
-        if loop is not None:
-            assert found["cycle"]["stiffness"] == pytest.approx(loop.effective_stiffness, rel=1e-8)
-            assert found["cycle"]["energy"] == pytest.approx(loop.energy_dissipated, rel=1e-8)
-            assert found["cycle"]["damping"] == pytest.approx(loop.effective_damping, rel=1e-8)
-    return same_steps
+    if loop is not None and within <= 1e-9:
+        assert found["cycle"]["stiffness"] == pytest.approx(loop.effective_stiffness, rel=within)
+        assert found["cycle"]["energy"] == pytest.approx(loop.energy_dissipated, rel=within)
+        assert found["cycle"]["damping"] == pytest.approx(loop.effective_damping, rel=within)
+
+
+def exchanged(browser):
+    """The input of the last run of the page, and its rows."""
+    return [np.frombuffer(base64.b64decode(text), dtype="<f8") for text in browser.execute_script(EXCHANGED)]
+
+
+def run_in_python(numbers, problem: Problem) -> Any:
+    """The compiled run of Python with the input of a page, in the order of explorer.c."""
+    given, _ = run_arguments(problem.scene, problem.spec)
+    extension = build_model(problem.spec.layout, problem.spec.effects).extension
+    at = 0
+
+    def take(count, shape=(-1,)):
+        nonlocal at
+        at += count
+        return np.ascontiguousarray(numbers[at - count : at]).reshape(shape)
+
+    gravity, method, *options = take(12)
+    pieces, loads, jumps, stops, spans = map(int, take(5))
+    tables = [take(np.size(table), np.shape(table)) for table in given["stack"][1:4]]
+    state = [take(np.size(value), np.shape(value)) for value in given["run"][5:8]]
+    motion = take(pieces + 1), take(36 * pieces, (-1, 6, 6))
+    load = take(loads + 1), take(36 * loads, (-1, 6, 6))
+    names = ("rtol", "atol_angle", "first_step", "max_steps", "duration", "output_step", "stop_displacement",
+             "stop_all_rims", "sampled", "quasistatic")  # fmt: skip
+    named = dict(zip(names, options, strict=True))
+    named |= {name: bool(named[name]) for name in names[-3:]}
+    times = {"jumps": take(jumps), "stops": take(stops), "span_ends": take(spans), "span_steps": take(spans)}
+    assert at == len(numbers) and int(method) == extension.METHODS[given["options"]["method"]]
+    run = extension.Run(
+        extension.Stack(gravity, *tables), *motion, *load, times.pop("jumps"), *state,
+        method=given["options"]["method"], **named, **times,
+    )  # fmt: skip
+    while run.advance():
+        pass
+    return run
+
+
+def check_rows(browser, name):
+    """The rows of the page are those of Python with the same input, bit by bit. Returns the input."""
+    numbers, rows = exchanged(browser)
+    np.testing.assert_array_equal(
+        rows, run_in_python(numbers, problem_of(explored_scene(name), name)).rows.ravel(), strict=True
+    )
+    return numbers
 
 
 def test_it_loads_offline_without_a_word_in_the_console(browser, page):
@@ -134,14 +187,32 @@ def test_it_loads_offline_without_a_word_in_the_console(browser, page):
     assert asked == {page.as_uri()}
 
 
-def test_numbers_are_those_of_python(browser):
-    same = set()
-    for name in EXPLORED:
-        found = choose(browser, name)
-        assert found["name"] == explored_scene(name).name
-        if check(found, fixed_scene(explored_scene(name))):
-            same.add(name)
-    assert {"fenz-test2", "double-push", "ridgecrest-clc"} <= same
+@pytest.mark.parametrize("name", EXPLORED)
+def test_numbers_are_those_of_python(browser, name):
+    found = choose(browser, name)
+    scene = fixed_scene(explored_scene(name))
+    assert found["name"] == scene.name
+    check_rows(browser, name)
+    check(found, scene)
+
+
+@pytest.mark.parametrize("name", EXPLORED)
+def test_rows_are_those_of_python_wherever_the_sliders_stand(browser, name):
+    """Bit by bit, at random places of all sliders together."""
+    choose(browser, name)
+    sliders = browser.execute_script(
+        "const inputs = [...find('controls').querySelectorAll('input')];"
+        "return inputs.map((input) => [input.dataset.name, Number(input.min), Number(input.max)])"
+    )
+    assert len(sliders) >= 6
+    rng = np.random.default_rng(len(name))
+    seen = set()
+    for _ in range(3):
+        for slider, low, high in sliders:
+            act(browser, SLIDE, slider, low + (high - low) * rng.uniform(0.2, 0.7))
+        check_rows(browser, name)
+        seen.add(browser.execute_script("return state.last.found.status"))
+    assert "ok" in seen or "stopped" in seen
 
 
 def slide(browser, name, **settings):
@@ -167,14 +238,15 @@ def test_sliders_of_a_push_change_what_they_say(browser):
         output_step=0.025,
         top=replace(scene.top, axial_load=1.5 * scene.top.axial_load),
     )
-    assert check(found, fixed_scene(changed)), "steps differ"
+    check(found, fixed_scene(changed))
 
 
 def test_sliders_of_a_cyclic_test_change_what_they_say(browser):
+    """The motion of the page differs in the last digit, and a step that is refused there only changes what follows."""
     scene = explored_scene("fenz-test2")
     found = slide(browser, "fenz-test2", amplitude=1.2, frequency=2.0)
     motion = changed_scene("fenz-test2", {"motion.amplitude": 0.03, "motion.frequency": 0.08}).motion
-    check(found, fixed_scene(replace(scene, motion=motion, motion_table=None)))
+    check(found, fixed_scene(replace(scene, motion=motion, motion_table=None)), within=0.1 * scene.solver.rtol)
 
 
 def test_direction_turns_the_motion(browser):
@@ -184,15 +256,21 @@ def test_direction_turns_the_motion(browser):
     assert turned["force"][3] == pytest.approx(plain["force"][3], rel=0.02) and turned["force"][0] != plain["force"][0]
 
 
-def test_a_redraw_takes_less_than_a_tenth_of_a_second(browser):
-    """From the movement of a slider to the end of the drawing; the best of some, since other work disturbs."""
-    for name in EXPLORED:
-        choose(browser, name)
+@pytest.mark.parametrize("name", EXPLORED)
+def test_a_redraw_takes_less_than_a_tenth_of_a_second(browser, name):
+    """From the movement of a slider to the end of the drawing: the median of nine, of the best of some rounds, since
+    other work on the machine disturbs."""
+    choose(browser, name)
+    medians = []
+    for _ in range(5):
         times = []
-        for share in np.linspace(0.9, 1.1, 8):
+        for share in np.linspace(0.9, 1.1, 9):
             act(browser, SLIDE, "scale of the record" if "ridgecrest" in name else "amplitude", share)
             times.append(browser.execute_script("return state.times.redraw"))
-        assert min(times) < 100, (name, times)
+        medians.append(np.median(times))
+        if medians[-1] < 100:
+            return
+    raise AssertionError(medians)
 
 
 def test_everything_is_drawn(browser):
