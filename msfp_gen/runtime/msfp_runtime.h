@@ -125,6 +125,9 @@ typedef struct {
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
     double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
     double dnormal[MSFP_NB][MSFP_DOF];
+#if MSFP_GRADIENTS
+    double dfriction[MSFP_NB][MSFP_SHEAR_SIZE][MSFP_DOF]; /* of dY/dt, dZ/dt */
+#endif
 } msfp_work;
 
 /* Residual [MSFP_DOF] of the condensed equations: the angular balances [N m], with interface forces summed from the top

@@ -161,9 +161,11 @@ void msfp_split_moment_tangent(msfp_work *w, int j);
 
 /* ---- surface.c ---- */
 
-/* Jacobians of all surfaces with respect to their inputs: moment and N of the contacts, lane by lane; rims. */
+/* Rows of the Jacobian of a contact: its moment, N, and in models with gradients dY/dt, dZ/dt. */
+#define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SHEAR_SIZE)
+/* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
 typedef struct {
-    double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+    double contact[MSFP_CONTACT_ROWS * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
 } msfp_surface_jacobians;
 /* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
@@ -182,7 +184,7 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
 
 /* ---- contact.c ---- */
 
-/* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian of moment and N with respect to the
+/* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian [MSFP_CONTACT_ROWS] with respect to the
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
 int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);
@@ -202,6 +204,10 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
 void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                   const msfp_surface_jacobians *jacobians, double *tangent);
+/* The same where `w` holds the evaluation at that point without its Jacobians; friction is solved to rounding. Returns
+ * a status. */
+int msfp_tangent_of_evaluation(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                               double g[MSFP_NB][2], double *tangent);
 
 /* ---- observe.c ---- */
 

@@ -90,7 +90,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
 {
     double force[FORCE], moment[MOMENT], dforce[FORCE * C], dmoment[MOMENT * C];
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
-    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * C], foot[MSFP_FOOT_SIZE];
+    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * C];
     msfp_force_F_put(force, at->load);
     msfp_moment_M_put(moment, at->load + 3);
     put_polar(dforce, (msfp_columns *)dat->load);
@@ -106,9 +106,17 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
                               dmoment MSFP_IF_TOP_ROTATION(dupright), dwrench);
     memcpy(d->force[NB], dwrench, sizeof d->force[NB]);
     memcpy(d->moment[NB], dwrench + FORCE * C, sizeof d->moment[NB]);
-    if (msfp_top_is_sprung(p))
+}
+
+MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                 const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+{
+    double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C], foot[MSFP_FOOT_SIZE];
+    if (msfp_top_is_sprung(p)) {
+        msfp_foot_stage(p, at, stage);
+        foot_stage(p, dp, dat, stage, dstage);
         msfp_foot_direction(p->top, w->body[NB], stage, foot, dp->top, d->body[NB], dstage, d->foot);
-    else {
+    } else {
         memcpy(d->foot + MSFP_FOOT_Y * C, d->body[NB] + MSFP_BODY_CZ * C, C * sizeof(double));
         memcpy(d->foot + MSFP_FOOT_Y1 * C, d->body[NB] + MSFP_BODY_VZ * C, C * sizeof(double));
         memcpy(d->foot + MSFP_FOOT_Y2 * C, d->body[NB] + MSFP_BODY_AZ * C, C * sizeof(double));
@@ -144,6 +152,7 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
     double out[MSFP_BODY_SIZE], moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
     kinematics(p, dp, at, dat, w, d);
     top(p, dp, at, dat, w, d);
+    msfp_foot_columns(p, dp, at, dat, w, d);
     for (int j = NB - 1; j >= 0; --j)
         msfp_interface_force_direction(p->body[j + 1], w->body[j + 1], w->force[j + 1], out, dp->body[j + 1],
                                        d->body[j + 1], d->force[j + 1], d->force[j]);

@@ -37,6 +37,10 @@ typedef struct {
     msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
 } msfp_work_columns;
 
+/* Columns of the motion of the foot, after those of the top plate. */
+void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
+
 /* Derivatives of the contacts of one evaluation with respect to their local unknowns. */
 typedef struct {
     double of[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_UNKNOWN_COLUMNS];
@@ -68,6 +72,8 @@ void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *d
 
 /* ---- a run ---- */
 
+typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
+
 /* Columns of a state, and of its time. */
 typedef struct {
     msfp_columns t, q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
@@ -82,8 +88,11 @@ typedef struct {
     msfp_columns h;               /* of the length of the step */
     msfp_columns start[3];        /* of r_01 - r_nn at the start */
     msfp_columns before[MSFP_NB]; /* theta before the step that led to `now`, of quasi-static steps */
-    msfp_point_columns point;     /* of the last stage of the step, and its evaluation */
-    msfp_work_columns work;
+    msfp_point_columns point;     /* of the last stage of the step */
+    msfp_work_columns work;       /* of its evaluation: at constant rates until `complete` */
+    int complete;
+    msfp_row_columns start_row, end_row; /* of the rows at the ends of the step, where they are known */
+    int start_known, end_known;
     msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
 } msfp_group;
 
@@ -96,10 +105,34 @@ typedef struct {
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;
 
+/* The evaluation of a state that is observed; for all groups. */
+typedef struct {
+    msfp_point at;
+    msfp_seed seed;
+    msfp_work work;
+    msfp_slopes slopes;
+    double g[MSFP_NB][2];
+} msfp_observation;
+
+/* Rows at the ends of the last step and at its interpolation nodes, with the evaluations at these nodes; and columns of
+ * one group. */
+typedef struct {
+    msfp_row value[MSFP_NODES + 2];
+    int known; /* whether `value` is */
+    msfp_observation node[MSFP_NODES];
+    int observed; /* whether `node` is */
+    msfp_row_columns d[MSFP_NODES + 2], row;
+    int columns_known; /* whether `d` is */
+    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)]; /* of a row to the extremes */
+    msfp_observation own;
+    msfp_work_columns work;
+} msfp_recording;
+
 struct msfp_gradients {
     int count, groups; /* parameters, and groups of MSFP_COLUMNS of them */
     msfp_group *group;
     msfp_trail trail;
+    msfp_recording recording;
     const double *steps; /* ends of the steps where they are prescribed [s], with their number and how many are taken */
     int step_count, step;
     double *rows; /* [row][parameter][MSFP_ROW_SIZE] */
@@ -153,40 +186,29 @@ void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
 /* Columns of the accepted step, whose stages are in the trail; group->h is given. */
 void msfp_step_columns(msfp_run *run, msfp_group *group);
+/* Complete the columns of the evaluation that ended the step. */
+void msfp_complete_columns(const msfp_run *run, msfp_group *group);
 
 /* ---- row_columns.c ---- */
 
-typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
-/* Rows at the ends of the last step and at its interpolation nodes, with their columns. */
-typedef struct {
-    msfp_row value[MSFP_NODES + 2];
-    msfp_row_columns d[MSFP_NODES + 2];
-} msfp_node_rows;
-/* Row of a state, with its columns; ds: columns of the state. */
+/* Columns of the row of a state; ds: columns of the state. */
 void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
-                          msfp_row *row, msfp_row_columns d);
-void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows *rows);
+                          msfp_row_columns d);
+/* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
+void msfp_observe_node_columns(msfp_run *run, msfp_group *group);
 /* Columns of the row at a share of the last step; moving: whether the share is a fixed time, and so depends on the
  * parameters where the ends of the step do. */
-void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_rows *rows, double share, int moving,
-                              msfp_row_columns d);
-/* Columns of the row of the end of the step as the evaluation that ended it records it. */
-void msfp_row_reached_columns(const msfp_run *run, const msfp_group *group, msfp_row_columns d);
+void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving, msfp_row_columns d);
+/* Columns of the row of the end of the step, group->end_row, unless they are known. */
+void msfp_row_reached_columns(const msfp_run *run, msfp_group *group);
 /* Row and columns at a share of a quasi-static step. */
 void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d);
 
 /* ---- extreme_columns.c ---- */
 
-/* Rows of one step, and the columns of what a row contributes to the extremes. */
-typedef struct {
-    msfp_node_rows rows;
-    int observed; /* whether `rows` are those of the step */
-    msfp_row_columns row;
-    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)];
-} msfp_recording;
 /* Columns of the extremes that the first row, or the step, has changed. */
 void msfp_extremes_of_first_row(const msfp_run *run, msfp_group *group, const msfp_row *row, const msfp_row_columns d);
-void msfp_extremes_of_step(msfp_run *run, msfp_group *group, msfp_recording *s);
+void msfp_extremes_of_step(msfp_run *run, msfp_group *group);
 
 /* ---- recording.c ---- */
 
