@@ -65,19 +65,6 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
     return MSFP_OK;
 }
 
-#if MSFP_GRADIENTS
-MSFP_WIDE int msfp_tangent_of_evaluation(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed,
-                                         msfp_work *w, double g[MSFP_NB][2], double *tangent)
-{
-    msfp_surface_jacobians jacobians;
-    msfp_rims(p, w, &jacobians);
-    const int status = msfp_surfaces(p, w, seed, g, &jacobians);
-    if (status == MSFP_OK)
-        msfp_tangent(p, at, seed, w, &jacobians, tangent);
-    return status;
-}
-#endif
-
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)
 {
     for (int k = 0; k < NB; ++k) {

@@ -204,10 +204,6 @@ double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const do
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
 void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                   const msfp_surface_jacobians *jacobians, double *tangent);
-/* The same where `w` holds the evaluation at that point without its Jacobians; friction is solved to rounding. Returns
- * a status. */
-int msfp_tangent_of_evaluation(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                               double g[MSFP_NB][2], double *tangent);
 
 /* ---- observe.c ---- */
 

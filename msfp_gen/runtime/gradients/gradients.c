@@ -151,14 +151,14 @@ static int factorise(msfp_run *run)
 {
     msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    trail->all_slopes = 0;
     for (int i = 1; i <= last; ++i) {
         msfp_stage *s = &trail->stage[i];
         s->seed.accuracy = 0.0;
-        const int status = msfp_tangent_of_evaluation(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
-                                                      trail->factors[i]);
+        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
+                                                    &trail->slopes[i], trail->factors[i]);
         if (status)
             return status;
-        msfp_contact_slopes(&run->parameters, &s->seed, &trail->work[i], (const double(*)[2])s->g, &trail->slopes[i]);
         if (msfp_lu(trail->factors[i], DOF, trail->pivots[i]) == 0)
             return MSFP_E_IRREGULAR;
     }
@@ -191,8 +191,9 @@ void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, doub
     static const msfp_parameter_columns constant;
     msfp_columns gaps[NB][MSFP_GAP_SIZE], rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
     memset(v, 0, sizeof v);
-    for (int i = 0; i < NB * NQ; ++i)
-        v[0][i][0] = run->next.v[0][i];
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < NQ; ++i)
+            v[k][i][0] = run->next.v[k][i];
     msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, gaps);
     msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, rates);
     const double rate = rates[j][MSFP_GAP_G][0];

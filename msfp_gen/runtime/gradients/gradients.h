@@ -41,24 +41,31 @@ typedef struct {
 void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                        const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
 
-/* Derivatives of the contacts of one evaluation with respect to their local unknowns. */
+/* Derivatives of the results of the contacts of one evaluation with respect to their inputs. Unless Y follows the closed
+ * form, local unknowns (friction, and its coefficient where it follows a law) are eliminated. */
 typedef struct {
-    double of[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_UNKNOWN_COLUMNS];
+    double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
-/* Columns of the condensed equations at the evaluation in `w`, whose g is the friction force over -mu N there. */
+/* Columns of the condensed equations at the evaluation in `w`. all: of all results of the contacts; otherwise only of
+ * their moments and of the rates of Y, Z. */
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                            const msfp_slopes *slopes, const double g[MSFP_NB][2], msfp_work_columns *d);
+                            const msfp_slopes *slopes, int all, msfp_work_columns *d);
 
 /* ---- contact_columns.c ---- */
 
+/* g: the friction force over -mu N; all: as of msfp_condensed_columns. */
 void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
-                         const double g[MSFP_NB][2], msfp_slopes *slopes);
-/* Columns of the contact of surface j, after those of its local block. */
+                         const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
+/* Tangent of the condensed equations at the evaluation in `w`, whose friction is first solved to rounding; and the
+ * derivatives of its contacts. Returns a status. */
+int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                             double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent);
+/* Columns of the contact of surface j, after those of its local block; all: as of msfp_condensed_columns. */
 void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes,
-                          const double g[MSFP_NB][2], int j, msfp_work_columns *d);
+                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j, int all,
+                          msfp_work_columns *d);
 
 /* ---- observation.c: what is recorded ---- */
 
@@ -101,6 +108,7 @@ typedef struct {
     msfp_stage stage[MSFP_STAGES];
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
+    int all_slopes; /* whether those of the last stage are complete */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;
@@ -187,7 +195,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
 /* Columns of the accepted step, whose stages are in the trail; group->h is given. */
 void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
-void msfp_complete_columns(const msfp_run *run, msfp_group *group);
+void msfp_complete_columns(msfp_run *run, msfp_group *group);
 
 /* ---- row_columns.c ---- */
 
@@ -200,7 +208,7 @@ void msfp_observe_node_columns(msfp_run *run, msfp_group *group);
  * parameters where the ends of the step do. */
 void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving, msfp_row_columns d);
 /* Columns of the row of the end of the step, group->end_row, unless they are known. */
-void msfp_row_reached_columns(const msfp_run *run, msfp_group *group);
+void msfp_row_reached_columns(msfp_run *run, msfp_group *group);
 /* Row and columns at a share of a quasi-static step. */
 void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d);
 

@@ -21,7 +21,7 @@ static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o)
     memset(o->work.coefficient, 0, sizeof o->work.coefficient);
 #endif
     msfp_condensed(&run->parameters, &o->at, &o->seed, &o->work, o->g, residual, NULL);
-    msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, &o->slopes);
+    msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &o->slopes);
 }
 
 /* Columns of the row of an observed state. */
@@ -38,8 +38,7 @@ static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observ
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, &o->slopes,
-                           (const double(*)[2])o->g, dw);
+    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, &o->slopes, 1, dw);
     msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
 }
 
@@ -192,7 +191,7 @@ MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double
     restore_bounds(run, group, &blended, d);
 }
 
-void msfp_row_reached_columns(const msfp_run *run, msfp_group *group)
+void msfp_row_reached_columns(msfp_run *run, msfp_group *group)
 {
     const msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;

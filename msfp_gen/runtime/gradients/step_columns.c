@@ -13,7 +13,8 @@ enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, C = MSFP_COLUMN
 static const int unknown[ND] = MSFP_FREE;
 
 /* As msfp_lu_solve for all columns at once. */
-MSFP_WIDE void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns)
+MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
+                                  msfp_columns *restrict columns)
 {
     for (int k = 0; k < DOF; ++k)
         for (int c = 0; c < C; ++c) {
@@ -99,7 +100,7 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
 MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
                         msfp_point_columns *dat)
 {
-    const double beta = stage->beta;
+    const double beta = stage->beta, inverse = 1.0 / beta;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
             for (int c = 0; c < C; ++c)
@@ -107,7 +108,7 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], ms
         for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
             for (int c = 0; c < C; ++c) {
                 const int d = unknown[i];
-                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) / beta;
+                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) * inverse;
             }
     }
 }
@@ -125,7 +126,7 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
     stage_point(stage, Q, V, dat);
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
-                           &trail->slopes[i], stage->g, &group->work);
+                           &trail->slopes[i], 0, &group->work);
     msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
@@ -134,24 +135,30 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     group->complete = 0;
 }
 
-void msfp_complete_columns(const msfp_run *run, msfp_group *group)
+void msfp_complete_columns(msfp_run *run, msfp_group *group)
 {
-    const msfp_trail *trail = &run->gradients->trail;
+    msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
     const msfp_stage *stage = &trail->stage[last];
+    if (!trail->all_slopes)
+        msfp_contact_slopes(&run->parameters, &stage->seed, &trail->work[last], stage->g, 1, &trail->slopes[last]);
+    trail->all_slopes = 1;
     if (!group->complete)
         msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
-                               &trail->work[last], &trail->slopes[last], stage->g, &group->work);
+                               &trail->work[last], &trail->slopes[last], 1, &group->work);
     group->complete = 1;
 }
 
 /* columns += row * x, where `row` has the derivatives of a number with respect to the rates of a stage, and -x the
  * columns of these rates. */
-MSFP_INLINE void add_rates(const double row[DOF], const msfp_columns *x, double *columns)
+MSFP_INLINE void add_rates(const double *restrict row, const msfp_columns *restrict x, double *restrict columns)
 {
+    double sum[C] = { 0 };
     for (int m = 0; m < DOF; ++m)
         for (int c = 0; c < C; ++c)
-            columns[c] -= row[m] * x[m][c];
+            sum[c] += row[m] * x[m][c];
+    for (int c = 0; c < C; ++c)
+        columns[c] -= sum[c];
 }
 
 /* Columns of what the next stages need of a solved one, by the derivatives with respect to its rates that its tangent
@@ -172,8 +179,11 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
                 f[j][d][c] = dat->f[j][d][c] + stage->beta * df[j][d][c] + dat->beta[c] * rates[j][d];
         }
     const int sprung = msfp_top_is_sprung(&run->parameters);
-    for (int field = sprung ? 0 : MSFP_BODY_CZ; field < MSFP_BODY_SIZE; ++field)
+    const int of_plate[3] = { MSFP_BODY_CZ, MSFP_BODY_VZ, MSFP_BODY_AZ };
+    for (int i = 0; i < (sprung ? MSFP_BODY_SIZE : 3); ++i) {
+        const int field = sprung ? i : of_plate[i];
         add_rates(w->dbody[NB] + field * DOF, x, group->work.body[NB] + field * C);
+    }
     msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
 }
 
@@ -188,7 +198,8 @@ static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
     msfp_columns Q[NB][NQ], V[NB][NQ], dt;
     stage_columns s;
     int node = 0;
-    memset(&s, 0, sizeof s);
+    memset(s.df, 0, sizeof s.df);
+    memset(s.rates, 0, sizeof s.rates);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
