@@ -14,7 +14,7 @@ from .program import Program, Use
 
 COLUMNS = 8
 """Parameters whose derivatives one call carries: as many numbers as the widest vectors hold."""
-CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu")
+CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "mu")
 """Results of `contact`, beside its moment, whose derivatives are used."""
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,

@@ -116,7 +116,8 @@ MSFP_INLINE void stage_columns(const msfp_parameters *p, const msfp_parameter_co
 
 /* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law; their matrix is near
  * the identity, so that elimination needs no pivots. rates: df/dt; rates and tau by lanes. */
-MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, double (*restrict jacobian)[INPUTS][LANES])
+MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows,
+                           double (*restrict jacobian)[INPUTS][LANES], double (*restrict slopes)[INPUTS][LANES])
 {
     double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
     for (int r = 0; r < UNKNOWNS; ++r)
@@ -144,10 +145,13 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
         }
     }
     for (int r = 0; r < rows; ++r)
-        for (int u = 0; u < UNKNOWNS; ++u)
-            for (int i = 0; i < GIVEN; ++i)
-                for (int s = 0; s < LANES; ++s)
-                    jacobian[r][i][s] += jacobian[r][GIVEN + u][s] * a[u][i][s];
+        for (int i = 0; i < GIVEN; ++i)
+            for (int s = 0; s < LANES; ++s) {
+                double sum = jacobian[r][i][s];
+                for (int u = 0; u < UNKNOWNS; ++u)
+                    sum += jacobian[r][GIVEN + u][s] * a[u][i][s];
+                slopes[r][i][s] = sum;
+            }
 }
 
 /* The derivatives of the first `rows` results; inlined for each number of them, so that no others are computed. */
@@ -175,10 +179,12 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
     }
     msfp_contact_by_inputs_jacobian(&p->lanes[0][0], stage, local, force MSFP_IF_LAW(x), out, &jacobian[0][0][0]);
 #if MSFP_CLOSED_FORM
-    if (!seed->closed_form)
+    if (seed->closed_form) {
+        memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
+        return;
+    }
 #endif
-        eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian);
-    memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
+    eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }
 
 MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
@@ -195,16 +201,16 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
 {
     enum { SIZE = MSFP_LOCAL_SIZE * LANES };
     msfp_surface_jacobians jacobians;
-    int condense = 0;
+    int closed_form = 0;
 #if MSFP_CLOSED_FORM
-    condense = seed->closed_form;
+    closed_form = seed->closed_form;
 #endif
     msfp_rims(p, w, &jacobians);
-    const int status = msfp_surfaces(p, w, seed, g, condense ? &jacobians : NULL);
+    const int status = closed_form ? msfp_surfaces(p, w, seed, g, &jacobians) : MSFP_OK;
     if (status)
         return status;
     msfp_contact_slopes(p, seed, w, (const double(*)[2])g, 0, slopes);
-    for (int r = 0; r < MSFP_CONTACT_ROWS && !condense; ++r) /* N, which is row MOMENT, does not enter the tangent */
+    for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r) /* row MOMENT, that of N, does not enter the tangent */
         memcpy(jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
                SIZE * sizeof(double));
     msfp_tangent(p, at, seed, w, &jacobians, tangent);

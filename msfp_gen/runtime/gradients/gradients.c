@@ -146,7 +146,7 @@ void msfp_gradients_before_step(msfp_run *run)
     run->gradients->outward_rate = run->outward_rate;
 }
 
-/* Factored tangents of the stages of the step, whose friction is solved to rounding. */
+/* Factored tangents of the stages of the step, at the evaluations that solved them. */
 static int factorise(msfp_run *run)
 {
     msfp_trail *trail = &run->gradients->trail;
@@ -154,7 +154,6 @@ static int factorise(msfp_run *run)
     trail->all_slopes = 0;
     for (int i = 1; i <= last; ++i) {
         msfp_stage *s = &trail->stage[i];
-        s->seed.accuracy = 0.0;
         const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
                                                     &trail->slopes[i], trail->factors[i]);
         if (status)

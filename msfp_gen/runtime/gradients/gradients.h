@@ -58,8 +58,7 @@ void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_colum
 /* g: the friction force over -mu N; all: as of msfp_condensed_columns. */
 void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                          const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
-/* Tangent of the condensed equations at the evaluation in `w`, whose friction is first solved to rounding; and the
- * derivatives of its contacts. Returns a status. */
+/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts. Returns a status. */
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                              double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent);
 /* Columns of the contact of surface j, after those of its local block; all: as of msfp_condensed_columns. */
@@ -160,15 +159,16 @@ void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, doub
 /* ---- initial_columns.c, step_columns.c: states ---- */
 
 /* sum += weight * columns, of `count` numbers */
-MSFP_INLINE void msfp_add_columns(msfp_columns *sum, const msfp_columns *columns, double weight, int count)
+MSFP_INLINE void msfp_add_columns(msfp_columns *restrict sum, const msfp_columns *restrict columns, double weight,
+                                  int count)
 {
     for (int i = 0; i < count; ++i)
         for (int c = 0; c < MSFP_COLUMNS; ++c)
             sum[i][c] += weight * columns[i][c];
 }
 /* sum += values * factor: columns of a product whose other factor has the columns `factor`. */
-MSFP_INLINE void msfp_add_scaled(msfp_columns *sum, const double *values, const msfp_columns factor, double weight,
-                                   int count)
+MSFP_INLINE void msfp_add_scaled(msfp_columns *restrict sum, const double *restrict values, const msfp_columns factor,
+                                 double weight, int count)
 {
     for (int i = 0; i < count; ++i)
         for (int c = 0; c < MSFP_COLUMNS; ++c)
