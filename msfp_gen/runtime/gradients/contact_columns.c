@@ -217,20 +217,6 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     return MSFP_OK;
 }
 
-/* Sum of slope[i][j] times columns i of `from`. */
-MSFP_INLINE void combine(const double (*slope)[LANES], int j, const double *from, int count, double *to)
-{
-    enum { PACKS = C / MSFP_PACK_SIZE };
-    const msfp_pack *packs = (const msfp_pack *)from;
-    msfp_pack sum[PACKS];
-    for (int k = 0; k < PACKS; ++k)
-        sum[k] = slope[0][j] * packs[k];
-    for (int i = 1; i < count; ++i)
-        for (int k = 0; k < PACKS; ++k)
-            sum[k] += slope[i][j] * packs[i * PACKS + k];
-    memcpy(to, sum, sizeof sum);
-}
-
 MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
                                     const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
                                     int all, msfp_work_columns *d)
@@ -249,6 +235,6 @@ MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_paramet
     for (int i = 0; i < GIVEN; ++i)
         memcpy(columns + i * C, blocks[input[i].block] + input[i].index * C, C * sizeof *columns);
     for (int r = 0; r < (all ? RESULTS : FEW); ++r)
-        combine(slopes->of[r], j, columns, count, d->contact[j] + result[r] * C);
+        msfp_combine_columns(&slopes->of[r][0][j], LANES, columns, count, d->contact[j] + result[r] * C);
 }
 #endif

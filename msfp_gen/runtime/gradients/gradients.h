@@ -6,6 +6,7 @@
  */
 #ifndef MSFP_GRADIENTS_H
 #define MSFP_GRADIENTS_H
+#include <string.h>
 #include "run.h"
 
 #if MSFP_GRADIENTS
@@ -173,6 +174,19 @@ MSFP_INLINE void msfp_add_scaled(msfp_columns *restrict sum, const double *restr
     for (int i = 0; i < count; ++i)
         for (int c = 0; c < MSFP_COLUMNS; ++c)
             sum[i][c] += weight * values[i] * factor[c];
+}
+/* Sum of weights[i stride] times columns[i], of `count` rows of columns, in vectors. */
+MSFP_INLINE void msfp_combine_columns(const double *weights, int stride, const double *columns, int count, double *sum)
+{
+    enum { PACKS = MSFP_COLUMNS / MSFP_PACK_SIZE };
+    const msfp_pack *packs = (const msfp_pack *)columns;
+    msfp_pack total[PACKS];
+    for (int k = 0; k < PACKS; ++k)
+        total[k] = weights[0] * packs[k];
+    for (int i = 1; i < count; ++i)
+        for (int k = 0; k < PACKS; ++k)
+            total[k] += weights[i * stride] * packs[i * PACKS + k];
+    memcpy(sum, total, sizeof total);
 }
 /* Whether a column is not zero. */
 MSFP_INLINE int msfp_any_column(const double *columns)

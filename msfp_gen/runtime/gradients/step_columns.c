@@ -151,12 +151,10 @@ void msfp_complete_columns(msfp_run *run, msfp_group *group)
 
 /* columns += row * x, where `row` has the derivatives of a number with respect to the rates of a stage, and -x the
  * columns of these rates. */
-MSFP_INLINE void add_rates(const double *restrict row, const msfp_columns *restrict x, double *restrict columns)
+MSFP_INLINE void add_rates(const double *row, const msfp_columns *x, double *columns)
 {
-    double sum[C] = { 0 };
-    for (int m = 0; m < DOF; ++m)
-        for (int c = 0; c < C; ++c)
-            sum[c] += row[m] * x[m][c];
+    double sum[C];
+    msfp_combine_columns(row, 1, x[0], DOF, sum);
     for (int c = 0; c < C; ++c)
         columns[c] -= sum[c];
 }
