@@ -16,7 +16,7 @@ from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
 from .derive import Equations
-from .gradients import COLUMNS, UNKNOWN_COLUMNS
+from .gradients import COLUMNS, contact_lists
 from .heat import HEAT_KERNEL
 from .interface import ABI_VERSION, CALL_ERRORS, interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
@@ -284,7 +284,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "blocks": blocks,
         "functions": [function(k) for k in kernels],
         "directional": [function(k) for k in directional],
-        "gradient_columns": (COLUMNS, UNKNOWN_COLUMNS),
+        "gradient_columns": COLUMNS,
+        "contact": next((contact_lists(k.program) for k in directional if k.program.lanes), {}),
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
         "description": json.dumps(description(spec)),

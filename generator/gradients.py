@@ -14,18 +14,15 @@ from .program import Program, Use
 
 COLUMNS = 8
 """Parameters whose derivatives one call carries: as many numbers as the widest vectors hold."""
-UNKNOWN_COLUMNS = 4
-"""Columns of the local unknowns of a contact (two of friction, its coefficient): a vector of four."""
-
-CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu")
+CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "mu")
 """Results of `contact`, beside its moment, whose derivatives are used."""
-LOCAL_UNKNOWNS = ("g", "c")
-"""Inputs of `contact` that its local equations determine: friction, and the coefficient of a friction law."""
+CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
+"""Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
+friction and the coefficient of a friction law."""
 DIFFERENTIATED = (
     "arms",
     "forward",
     "surface_local",
-    "contact",
     "moment_to_world",
     "interface_force",
     "angular_balance",
@@ -42,29 +39,40 @@ def _with_all_inputs(use: Use) -> Use:
     return replace(use, active=frozenset(field.name for field in use.block.fields), moving=True)
 
 
-def _constant(use: Use) -> Use:
-    return replace(use, active=frozenset(), moving=False)
-
-
 def directional(program: Program) -> Program:
     """The program with all inputs active; the derivative of every result is emitted."""
-    constant = LOCAL_UNKNOWNS if program.name == "contact" else ()
-    inputs = [_constant(use) if use.alias in constant else _with_all_inputs(use) for use in program.inputs]
-    return _derived(program, "direction", inputs, "MSFP_COLUMNS")
+    inputs = [_with_all_inputs(use) for use in program.inputs]
+    name, results = f"{program.name}_direction", frozenset(program.results)
+    return replace(program, name=name, inputs=inputs, tangents=results, columns="MSFP_COLUMNS", lanes=False)
 
 
-def by_unknowns(program: Program) -> Program:
-    """The program of a contact with its local unknowns as active inputs."""
-    inputs = [use if use.alias in LOCAL_UNKNOWNS else _constant(use) for use in program.inputs]
-    return _derived(program, "by_unknowns", inputs, "MSFP_UNKNOWN_COLUMNS")
+def by_inputs(program: Program) -> Program:
+    """The program of a contact with all inputs active that it uses, for its Jacobian at all surfaces at once."""
+    symbols = {s.name for statement in program.statements for s in statement.expression.free_symbols}
+
+    def used(use: Use) -> Use:
+        names = {f.name for f in use.block.fields if use.alias in ("h", "loc") or f"{use.alias}_{f.name}" in symbols}
+        if use.alias == "c":
+            names &= {"mu"}
+        return replace(use, active=frozenset(names - {"sign"}), moving=True)
+
+    assert tuple(use.alias for use in program.inputs) in (CONTACT_INPUTS[:4], (*CONTACT_INPUTS[:4], "c"))
+    results = frozenset(name for name in program.results if name in CONTACT or name.startswith("M"))
+    return replace(program, name="contact_by_inputs", inputs=[used(use) for use in program.inputs], tangents=results)
 
 
-def _derived(program: Program, suffix: str, inputs: list[Use], columns: str) -> Program:
-    results = frozenset(program.results)
-    if program.name == "contact":
-        results = frozenset(name for name in results if name in CONTACT or name.startswith("M"))
-    name = f"{program.name}_{suffix}"
-    return replace(program, name=name, inputs=inputs, tangents=results, columns=columns, lanes=False)
+def contact_lists(program: Program) -> dict[str, list[tuple[int, int]] | list[int]]:
+    """Inputs of `by_inputs` in order, as (position of the block, index in the block), and indices of its results."""
+    assert program.output is not None
+    return {
+        "inputs": [
+            (CONTACT_INPUTS.index(use.alias), i)
+            for use in program.inputs
+            for i, f in enumerate(use.block.fields)
+            if f.name in use.active
+        ],
+        "results": [i for i, f in enumerate(program.output.block.fields) if f.name in program.tangents],
+    }
 
 
 def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:
@@ -73,4 +81,4 @@ def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:
         if program.name in DIFFERENTIATED:
             yield directional(program)
         if program.name == "contact":
-            yield by_unknowns(program)
+            yield by_inputs(program)

@@ -85,9 +85,11 @@ class Result(RunData):
     def to_netcdf(self, path: str | Path) -> Path:
         """Write the dataset as netCDF-4 file, completely or not at all; a failed run is written with its status.
 
+        Derivatives with respect to parameters are in its group `gradient`.
+
         Raises InputError where the suffix is not .nc or the folder does not exist.
         """
-        from msfp_gen.results.dataset import write_netcdf
+        from msfp_gen.results.netcdf import write_netcdf
 
         return write_netcdf(self, path)
 

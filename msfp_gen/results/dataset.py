@@ -1,25 +1,20 @@
-"""A result as an xarray.Dataset, and as a netCDF-4 file."""
+"""A result as an xarray.Dataset."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
-from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.output import DATASET_SUFFIXES, check_output, write_bytes
 from msfp_gen.results.history import ENERGY, LABELS, History, quantities
-from msfp_gen.results.reading import COUNTER, DIGEST, PROVENANCE, digest_of
+from msfp_gen.results.reading import COUNTER, PROVENANCE
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from msfp_gen.results.stored_group import ArrayDigest
 
 
 Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
@@ -42,49 +37,6 @@ def coordinates_of(history: History) -> dict[str, Any]:
         "surface": ("surface", np.arange(1, history.surfaces + 1), {"long_name": "sliding surface, bottom first"}),
         **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
     }
-
-
-def write_netcdf(result: RunData, path: str | Path) -> Path:
-    """Write the dataset of `result` to `path`, completely or not at all. Raises InputError for an invalid path."""
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
-
-    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, PIECES, to_pieces
-
-    path = check_output(path, DATASET_SUFFIXES)
-    dataset = to_dataset(result)
-    pieces = to_pieces(result.scene.motion) if dataset.attrs["motion"] == PIECES else None
-    dataset.attrs[DIGEST] = digest_of_dataset(dataset, pieces)
-    # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
-    encoding = {
-        name: {"zlib": True, "complevel": 1}
-        for name, variable in dataset.data_vars.items()
-        if "time" in variable.dims and variable.size
-    }
-    # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
-    content = BytesIO()
-    with h5netcdf.File(content, "w") as file:
-        dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
-        if pieces is not None:
-            pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
-    write_bytes(path, [content.getbuffer()])
-    return path
-
-
-def digest_of_dataset(
-    dataset: xr.Dataset, pieces: xr.Dataset | None, rows: Mapping[str, ArrayDigest] | None = None
-) -> str:
-    """The digest of the values that `read_result` reads. rows: of what was written in blocks, instead of `dataset`."""
-    from msfp_gen.scene.file.stored_motion import GROUP
-
-    arrays: dict[str, Any] = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
-    arrays["time"] = dataset["time"].to_numpy()
-    about = dict(dataset.attrs)
-    arrays |= rows or {}
-    if pieces is not None:
-        arrays |= {f"{GROUP}/{name}": variable.to_numpy() for name, variable in pieces.data_vars.items()}
-        about |= {f"{GROUP}/{name}": value for name, value in pieces.attrs.items()}
-    return digest_of(about, arrays)
 
 
 def row_variables(history: History) -> Variables:

@@ -14,7 +14,8 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing, write_bytes
 from msfp_gen.errors import InputError
-from msfp_gen.results.dataset import to_dataset, write_netcdf
+from msfp_gen.results.dataset import to_dataset
+from msfp_gen.results.netcdf import write_netcdf
 from msfp_gen.results.sign import DEFAULT, sign_of, signed
 
 if TYPE_CHECKING:

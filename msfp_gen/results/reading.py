@@ -14,7 +14,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from msfp_gen.errors import InputError
+from msfp_gen.results import stored_gradient
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.gradient import Gradients
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.note import Note
 from msfp_gen.results.run_data import RunData
@@ -68,6 +70,7 @@ def _read(root: StoredGroup, kind: type[R]) -> R:
     scene = _scene(root, about, arrays)
     history = _history(root, scene.bearing.layout.surfaces, arrays)
     events = _events(root, scene.bearing.layout.surfaces, arrays)
+    gradients = _gradients(root, history, len(events), about, arrays)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")
     if written is not None and written != digest_of(about, arrays):  # files of earlier versions have none
@@ -82,11 +85,25 @@ def _read(root: StoredGroup, kind: type[R]) -> R:
         {name: str(value) for name, value in _without(PROVENANCE, about).items()},
         tuple(map(_note, json.loads(str(about["notes"])))),
         _extremes(json.loads(str(about["extremes"])), scene.bearing.layout.surfaces) if "extremes" in about else None,
+        gradients,
     )
 
 
+def _gradients(
+    root: StoredGroup, history: History, events: int, about: dict[str, Attribute], arrays: Arrays
+) -> Gradients | None:
+    """The derivatives with respect to parameters, where the file has some."""
+    if stored_gradient.GROUP not in root:
+        return None
+    found, read = stored_gradient.from_group(root, len(history.time), history.surfaces, events)
+    for name, value in read.items():
+        place: dict[str, Any] = arrays if isinstance(value, np.ndarray) else about
+        place[f"{stored_gradient.GROUP}/{name}"] = value
+    return found
+
+
 def _is_read(name: str) -> bool:
-    return name in (*WORDS, "extremes") or name.startswith((COUNTER, PROVENANCE, "motion/"))
+    return name in (*WORDS, "extremes") or name.startswith((COUNTER, PROVENANCE, "motion/", "gradient/"))
 
 
 def _without(prefix: str, attributes: dict[str, Attribute]) -> dict[str, Attribute]:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from msfp_gen.common.output import replacing
-from msfp_gen.results.dataset import digest_of_dataset, energy_variables, row_variables, to_dataset
+from msfp_gen.results.dataset import energy_variables, row_variables, to_dataset
+from msfp_gen.results.netcdf import digest_of_dataset
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import taken
 from msfp_gen.results.reading import DIGEST
@@ -52,7 +53,7 @@ def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[Histo
             except Exception:  # of HDF5, which reads what was not written
                 disk.raise_failure()
                 raise
-            file.attrs[DIGEST] = digest_of_dataset(first, pieces, digests)
+            file.attrs[DIGEST] = digest_of_dataset(first, {} if pieces is None else {GROUP: pieces}, digests)
         disk.finish()
 
 

@@ -97,9 +97,11 @@ typedef struct {
 #endif
 } msfp_seed;
 
-/* Jacobians of all surfaces with respect to their inputs: moment and N of the contacts, lane by lane; rims. */
+/* Rows of the Jacobian of a contact: its moment, N, and in models with gradients dY/dt, dZ/dt. */
+#define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SHEAR_SIZE)
+/* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
 typedef struct {
-    double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+    double contact[MSFP_CONTACT_ROWS * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
 } msfp_surface_jacobians;
 
 /* Results of one evaluation, with tangents [field][column]. Blocks as in msfp_model.h. */
@@ -132,6 +134,9 @@ typedef struct {
     double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
     double dnormal[MSFP_NB][MSFP_DOF];
     msfp_surface_jacobians jacobians;
+#if MSFP_GRADIENTS
+    double dfriction[MSFP_NB][MSFP_SHEAR_SIZE][MSFP_DOF]; /* of dY/dt, dZ/dt */
+#endif
 } msfp_work;
 
 /* Residual [MSFP_DOF] of the condensed equations: the angular balances [N m], with interface forces summed from the top

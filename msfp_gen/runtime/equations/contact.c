@@ -174,6 +174,9 @@ MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, doubl
     return MSFP_E_NEWTON;
 }
 
+/* Row of the kernel's Jacobian (M, dY, dZ, mu, N) that is row r of MSFP_CONTACT_ROWS. */
+MSFP_INLINE int jacobian_row(int r) { return r < MOMENT ? r : r == MOMENT ? MOMENT + UNKNOWNS : r - 1; }
+
 #if MSFP_CLOSED_FORM
 /* Y of all surfaces after the slip of the step, and their contacts; slope: dg/d(angular velocity of the body)
  * [s/rad]. */
@@ -202,8 +205,8 @@ MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const doubl
 {
     double jacobian[ROWS * MSFP_LOCAL * LANES];
     msfp_contact_jacobian(par, all->stage, all->local, all->g, all->out, jacobian);
-    for (int r = 0; r <= MOMENT; ++r) {
-        const double *row = jacobian + (r < MOMENT ? r : MOMENT + UNKNOWNS) * MSFP_LOCAL * LANES;
+    for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
+        const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
         for (int k = 0; k < INPUTS; ++k)
             for (int s = 0; s < LANES; ++s)
                 condensed[(r * INPUTS + k) * LANES + s] =
@@ -212,7 +215,7 @@ MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const doubl
 }
 #endif
 
-/* Jacobian of the moment and of N with g and mu eliminated: [MOMENT + 1][INPUTS][lane]. The matrix of the local
+/* Jacobian with g and mu eliminated: [MSFP_CONTACT_ROWS][INPUTS][lane]. The matrix of the local
  * unknowns is close to the identity plus a dissipative part, so that elimination needs no pivots. */
 MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
 {
@@ -236,8 +239,8 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 for (int s = 0; s < LANES; ++s)
                     a[r][c][s] -= factor[s] * a[k][c][s];
         }
-    for (int r = 0; r <= MOMENT; ++r) {
-        const double *row = jacobian + (r < MOMENT ? r : MOMENT + UNKNOWNS) * MSFP_LOCAL * LANES;
+    for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
+        const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
         for (int k = 0; k < INPUTS; ++k) {
             double *sum = condensed + (r * INPUTS + k) * LANES;
             for (int s = 0; s < LANES; ++s)

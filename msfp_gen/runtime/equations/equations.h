@@ -178,7 +178,7 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
 
 /* ---- contact.c ---- */
 
-/* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian of moment and N with respect to the
+/* Y, Z and the contact of all surfaces; g as of msfp_condensed. condensed: Jacobian [MSFP_CONTACT_ROWS] with respect to the
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
 int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);

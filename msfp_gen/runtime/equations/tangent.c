@@ -28,6 +28,11 @@ enum {
     VARIATION_WP = VARIATION_M + MOMENT
 };
 enum { INPUTS = MSFP_LOCAL_SIZE };
+#if MSFP_GRADIENTS
+#define FRICTION_ROW(w, j, i) (w)->dfriction[j][i]
+#else
+#define FRICTION_ROW(w, j, i) NULL
+#endif
 static const double no_twist[TWIST]; /* columns are derivatives at zero twist */
 
 /* All columns at one body, [field][column], and at the surfaces next to it. */
@@ -118,7 +123,7 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
 #endif
 }
 
-/* Columns of the moment and of N of surface j, in the basis of the body below. */
+/* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of dY/dt, dZ/dt. */
 MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, const msfp_surface_jacobians *jacobians, int j,
                          const double *variation, columns *c)
 {
@@ -126,9 +131,11 @@ MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, const msfp_surface
     const double *rim = jacobians->rim[j], factors[2] = { seed->cq, seed->cv };
     local_inputs(w, seed, rim, j, variation, inputs);
     msfp_force_to_local_tangent(w->body[j], w->force[j], unused, c->below, local);
-    for (int r = 0; r <= MOMENT; ++r)
+    for (int r = 0; r < MSFP_CONTACT_ROWS; ++r)
         contact_row(jacobians->contact + r * INPUTS * MSFP_LANES + j, local, j, inputs, seed->cv,
-                    r < MOMENT ? c->moment_below + r * DOF : w->dnormal[j]);
+                    r < MOMENT    ? c->moment_below + r * DOF
+                    : r == MOMENT ? w->dnormal[j]
+                                  : FRICTION_ROW(w, j, r - MOMENT - 1));
     for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
         for (int r = 0; r < MOMENT; ++r)
             c->moment_below[r * DOF + j * ND + i % PAIR] += factors[i / PAIR] * rim[(FORCE + r) * MSFP_RIM_LOCAL + i];

@@ -44,17 +44,38 @@ MSFP_INLINE void put_coordinates(double *block, msfp_columns *const q, msfp_colu
             memcpy(block + msfp_coordinate_field(order, i) * C, orders[order][MSFP_PLANAR ? 1 : i], sizeof *q);
 }
 
-MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+/* Whether all of `count` numbers are zero. */
+MSFP_INLINE int all_zero(const double *values, int count)
+{
+    double sum = 0.0;
+    for (int i = 0; i < count; ++i)
+        sum += fabs(values[i]);
+    return sum == 0.0;
+}
+
+/* Columns of the base plate, which most parameters do not change. */
+MSFP_INLINE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                            const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double below[MSFP_BODY_SIZE], dbelow[MSFP_BODY_SIZE * C] = { 0 }, out[MSFP_BODY_SIZE];
     msfp_columns(*base)[6] = (msfp_columns(*)[6])dat->base;
+    put_coordinates(d->x[0], base[0] + 3, base[1] + 3, base[2] + 3);
+    if (all_zero(dat->base[0][0], 18 * C) && all_zero(dp->body[0], MSFP_BODY_PARAMETERS_SIZE * C)) {
+        memset(d->body[0], 0, sizeof d->body[0]);
+        return;
+    }
     msfp_inertial_frame(at, below);
     put_polar(dbelow + MSFP_BODY_CX * C, base[0]);
     put_polar(dbelow + MSFP_BODY_VX * C, base[1]);
     put_polar(dbelow + MSFP_BODY_AX * C, base[2]);
-    put_coordinates(d->x[0], base[0] + 3, base[1] + 3, base[2] + 3);
     msfp_forward_direction(p->body[0], below, w->x[0], out, dp->body[0], dbelow, d->x[0], d->body[0]);
+}
+
+MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+{
+    double out[MSFP_BODY_SIZE];
+    base_plate(p, dp, at, dat, w, d);
     for (int k = 1; k <= NB; ++k) {
         put_coordinates(d->x[k], (msfp_columns *)dat->q[k - 1], (msfp_columns *)dat->v[k - 1],
                         (msfp_columns *)dat->a[k - 1]);
@@ -90,7 +111,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
 {
     double force[FORCE], moment[MOMENT], dforce[FORCE * C], dmoment[MOMENT * C];
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
-    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * C], foot[MSFP_FOOT_SIZE];
+    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * C];
     msfp_force_F_put(force, at->load);
     msfp_moment_M_put(moment, at->load + 3);
     put_polar(dforce, (msfp_columns *)dat->load);
@@ -106,9 +127,17 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
                               dmoment MSFP_IF_TOP_ROTATION(dupright), dwrench);
     memcpy(d->force[NB], dwrench, sizeof d->force[NB]);
     memcpy(d->moment[NB], dwrench + FORCE * C, sizeof d->moment[NB]);
-    if (msfp_top_is_sprung(p))
+}
+
+MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                                 const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+{
+    double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C], foot[MSFP_FOOT_SIZE];
+    if (msfp_top_is_sprung(p)) {
+        msfp_foot_stage(p, at, stage);
+        foot_stage(p, dp, dat, stage, dstage);
         msfp_foot_direction(p->top, w->body[NB], stage, foot, dp->top, d->body[NB], dstage, d->foot);
-    else {
+    } else {
         memcpy(d->foot + MSFP_FOOT_Y * C, d->body[NB] + MSFP_BODY_CZ * C, C * sizeof(double));
         memcpy(d->foot + MSFP_FOOT_Y1 * C, d->body[NB] + MSFP_BODY_VZ * C, C * sizeof(double));
         memcpy(d->foot + MSFP_FOOT_Y2 * C, d->body[NB] + MSFP_BODY_AZ * C, C * sizeof(double));
@@ -139,11 +168,12 @@ MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp,
 
 MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                       const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                                      const msfp_slopes *slopes, const double g[MSFP_NB][2], msfp_work_columns *d)
+                                      const msfp_slopes *slopes, int all, msfp_work_columns *d)
 {
     double out[MSFP_BODY_SIZE], moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
     kinematics(p, dp, at, dat, w, d);
     top(p, dp, at, dat, w, d);
+    msfp_foot_columns(p, dp, at, dat, w, d);
     for (int j = NB - 1; j >= 0; --j)
         msfp_interface_force_direction(p->body[j + 1], w->body[j + 1], w->force[j + 1], out, dp->body[j + 1],
                                        d->body[j + 1], d->force[j + 1], d->force[j]);
@@ -152,7 +182,7 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
         msfp_surface_local_direction(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], out,
                                      d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], d->rim[j],
                                      d->local[j]);
-        msfp_contact_columns(p, dp, seed, dat, w, slopes, g, j, d);
+        msfp_contact_columns(p, dp, seed, dat, w, slopes, j, all, d);
         msfp_surface_moment(w, j, moment);
         for (int i = 0; i < MOMENT * C; ++i)
             dmoment[i] = d->contact[j][i] + d->rim[j][FORCE * C + i];

@@ -15,11 +15,21 @@
 
 enum {
     C = MSFP_COLUMNS,
-    U = MSFP_UNKNOWN_COLUMNS,
+    LANES = MSFP_LANES,
+    MOMENT = MSFP_MOMENT_SIZE,
     FRICTION = MSFP_SHEAR_SIZE,
-    UNKNOWNS = FRICTION + MSFP_LAW /* local unknowns of a contact: g, and mu where it follows a law */
+    UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns of a contact: g, and mu where it follows a law */
+    RESULTS = MSFP_CONTACT_RESULTS,
+    INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
+    GIVEN = INPUTS - UNKNOWNS,
+    FEW = MOMENT + UNKNOWNS /* results on which the motion depends */
 };
-MSFP_STATIC_ASSERT(UNKNOWNS <= U, unknown_columns);
+enum { PARAMETERS, STAGE, LOCAL }; /* blocks of inputs */
+static const struct {
+    int block, index;
+} input[INPUTS] = MSFP_CONTACT_INPUT_LIST;
+/* Indices in the block of a contact. The moment comes first, then what the equations of the unknowns contain. */
+static const int result[RESULTS] = MSFP_CONTACT_RESULT_LIST;
 
 #if MSFP_CLOSED_FORM
 /* Derivatives of Y after a slip (msfp_friction_after_slip): with respect to Y before, and to the slip. */
@@ -104,105 +114,127 @@ MSFP_INLINE void stage_columns(const msfp_parameters *p, const msfp_parameter_co
     }
 }
 
-/* Solve for the derivatives of the local unknowns, g = fp + tau df/dt and mu by its law: [unknown][C]. Their matrix is
- * near the identity, so that elimination needs no pivots. slopes: of the contact by the unknowns; d: its columns at
- * constant unknowns. */
-MSFP_INLINE void solve_unknowns(const double *contact, const msfp_point_columns *dat, int j, const double *stage,
-                                const double *dstage, const double *slopes, const double *d, double *solution)
+/* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law; their matrix is near
+ * the identity, so that elimination needs no pivots. rates: df/dt; rates and tau by lanes. */
+MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows,
+                           double (*restrict jacobian)[INPUTS][LANES], double (*restrict slopes)[INPUTS][LANES])
 {
-    static const int rows[] = { MSFP_CONTACT_DY,
-#if !MSFP_PLANAR
-                                MSFP_CONTACT_DZ,
-#endif
-#if MSFP_LAW
-                                MSFP_CONTACT_MU
-#endif
-    };
-    double a[UNKNOWNS][UNKNOWNS];
-    for (int r = 0; r < UNKNOWNS; ++r) {
-        const double factor = r < FRICTION ? stage[MSFP_STAGE_TAU] : 1.0;
-        for (int u = 0; u < UNKNOWNS; ++u)
-            a[r][u] = (r == u) - factor * slopes[rows[r] * U + u];
-        for (int c = 0; c < C; ++c)
-            solution[r * C + c] =
-                factor * d[rows[r] * C + c] +
-                (r < FRICTION ? dat->f[j][r][c] + dstage[MSFP_STAGE_TAU * C + c] * contact[rows[r]] : 0.0);
-    }
+    double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
+    for (int r = 0; r < UNKNOWNS; ++r)
+        for (int i = 0; i < INPUTS; ++i) {
+            const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
+            const double past = stage && input[i].index == MSFP_STAGE_Y + r, own = given ? past : -(i - GIVEN == r);
+            for (int s = 0; s < LANES; ++s) {
+                const double slope = (r < FRICTION ? tau[s] : 1.0) * jacobian[MOMENT + r][i][s] + own +
+                                     (stage && input[i].index == MSFP_STAGE_TAU ? rates[r * LANES + s] : 0.0);
+                a[r][i][s] = given ? slope : -slope;
+            }
+        }
     for (int u = 0; u < UNKNOWNS; ++u) {
-        const double inverse = 1.0 / a[u][u];
-        for (int i = u; i < UNKNOWNS; ++i)
-            a[u][i] *= inverse;
-        for (int c = 0; c < C; ++c)
-            solution[u * C + c] *= inverse;
+        double inverse[LANES], factor[LANES];
+        for (int s = 0; s < LANES; ++s)
+            inverse[s] = 1.0 / a[u][GIVEN + u][s];
+        for (int i = 0; i < INPUTS; ++i)
+            for (int s = 0; s < LANES; ++s)
+                a[u][i][s] *= inverse[s];
         for (int r = 0; r < UNKNOWNS; ++r) {
-            const double factor = a[r][u];
-            if (r == u)
-                continue;
-            for (int i = u; i < UNKNOWNS; ++i)
-                a[r][i] -= factor * a[u][i];
-            for (int c = 0; c < C; ++c)
-                solution[r * C + c] -= factor * solution[u * C + c];
+            memcpy(factor, a[r][GIVEN + u], sizeof factor);
+            for (int i = 0; i < INPUTS && r != u; ++i)
+                for (int s = 0; s < LANES; ++s)
+                    a[r][i][s] -= factor[s] * a[u][i][s];
         }
     }
+    for (int r = 0; r < rows; ++r)
+        for (int i = 0; i < GIVEN; ++i)
+            for (int s = 0; s < LANES; ++s) {
+                double sum = jacobian[r][i][s];
+                for (int u = 0; u < UNKNOWNS; ++u)
+                    sum += jacobian[r][GIVEN + u][s] * a[u][i][s];
+                slopes[r][i][s] = sum;
+            }
+}
+
+/* The derivatives of the first `rows` results; inlined for each number of them, so that no others are computed. */
+MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+                                const double g[MSFP_NB][2], int rows, msfp_slopes *slopes)
+{
+    double stage[MSFP_STAGE_SIZE * LANES], local[MSFP_LOCAL_SIZE * LANES], force[FRICTION * LANES], one[MSFP_STAGE_SIZE];
+    double out[MSFP_CONTACT_SIZE * LANES], jacobian[RESULTS][INPUTS][LANES];
+#if MSFP_LAW
+    double x[MSFP_COEFFICIENT_SIZE * LANES];
+#endif
+    for (int s = 0; s < LANES; ++s) {
+        const int j = s < MSFP_NB ? s : MSFP_NB - 1;
+        contact_stage(p, seed, w, j, one);
+        for (int i = 0; i < MSFP_STAGE_SIZE; ++i)
+            stage[i * LANES + s] = one[i];
+        for (int i = 0; i < MSFP_LOCAL_SIZE; ++i)
+            local[i * LANES + s] = w->local[j][i];
+        for (int i = 0; i < FRICTION; ++i)
+            force[i * LANES + s] = g[j][i];
+#if MSFP_LAW
+        for (int i = 0; i < MSFP_COEFFICIENT_SIZE; ++i)
+            x[i * LANES + s] = w->coefficient[j][i];
+#endif
+    }
+    msfp_contact_by_inputs_jacobian(&p->lanes[0][0], stage, local, force MSFP_IF_LAW(x), out, &jacobian[0][0][0]);
+#if MSFP_CLOSED_FORM
+    if (seed->closed_form) {
+        memcpy(slopes->of, jacobian, (size_t)rows * sizeof *jacobian);
+        return;
+    }
+#endif
+    eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }
 
 MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
-                                   const double g[MSFP_NB][2], msfp_slopes *slopes)
+                                   const double g[MSFP_NB][2], int all, msfp_slopes *slopes)
 {
-    double stage[MSFP_STAGE_SIZE], out[MSFP_CONTACT_SIZE], dg[FRICTION * U] = { 0 };
-#if MSFP_LAW
-    double x[MSFP_COEFFICIENT_SIZE * U] = { 0 };
-    x[MSFP_COEFFICIENT_MU * U + FRICTION] = 1.0;
-#endif
-    for (int u = 0; u < FRICTION; ++u)
-        dg[u * U + u] = 1.0;
-    for (int j = 0; j < MSFP_NB; ++j) {
-        contact_stage(p, seed, w, j, stage);
-        msfp_contact_by_unknowns(p->surface[j], stage, w->local[j], g[j] MSFP_IF_LAW(w->coefficient[j]), out,
-                                 dg MSFP_IF_LAW(x), slopes->of[j]);
-    }
+    if (all)
+        contact_slopes(p, seed, w, g, RESULTS, slopes);
+    else
+        contact_slopes(p, seed, w, g, FEW, slopes);
 }
 
-/* Results of a contact whose derivatives are used, beside its moment, which comes first. */
-static const int used[] = { MSFP_CONTACT_DY, MSFP_CONTACT_Y, MSFP_CONTACT_N, MSFP_CONTACT_ST, MSFP_CONTACT_CT,
-                            MSFP_CONTACT_U,
-#if !MSFP_PLANAR
-                            MSFP_CONTACT_DZ, MSFP_CONTACT_Z, MSFP_CONTACT_SP, MSFP_CONTACT_CP, MSFP_CONTACT_V,
-#endif
-#if MSFP_LAW
-                            MSFP_CONTACT_MU,
-#endif
-};
-
-MSFP_INLINE void add_unknowns(const double *slopes, const double *solution, int field, double *d)
+int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                             double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent)
 {
-    for (int u = 0; u < UNKNOWNS; ++u)
-        for (int c = 0; c < C; ++c)
-            d[field * C + c] += slopes[field * U + u] * solution[u * C + c];
+    enum { SIZE = MSFP_LOCAL_SIZE * LANES };
+    msfp_surface_jacobians jacobians;
+    int closed_form = 0;
+#if MSFP_CLOSED_FORM
+    closed_form = seed->closed_form;
+#endif
+    msfp_rims(p, w, &jacobians);
+    const int status = closed_form ? msfp_surfaces(p, w, seed, g, &jacobians) : MSFP_OK;
+    if (status)
+        return status;
+    msfp_contact_slopes(p, seed, w, (const double(*)[2])g, 0, slopes);
+    for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r) /* row MOMENT, that of N, does not enter the tangent */
+        memcpy(jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
+               SIZE * sizeof(double));
+    msfp_tangent(p, at, seed, w, &jacobians, tangent);
+    return MSFP_OK;
 }
 
 MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                                    const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes,
-                                    const double g[MSFP_NB][2], int j, msfp_work_columns *d)
+                                    const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
+                                    int all, msfp_work_columns *d)
 {
-    double stage[MSFP_STAGE_SIZE], dstage[MSFP_STAGE_SIZE * C] = { 0 }, out[MSFP_CONTACT_SIZE], solution[UNKNOWNS * C];
-    double *dcontact = d->contact[j];
-    contact_stage(p, seed, w, j, stage);
+    double dstage[MSFP_STAGE_SIZE * C] = { 0 }, columns[INPUTS * C];
+    const double *blocks[] = { dp->surface[j], dstage, d->local[j] };
+    int count = GIVEN;
 #if MSFP_CLOSED_FORM
-    if (seed->closed_form)
-        closed_form(p, dp, seed, dat, w, d, j, dstage, solution);
-    else
+    if (seed->closed_form) {
+        closed_form(p, dp, seed, dat, w, d, j, dstage, columns + GIVEN * C);
+        count = INPUTS;
+    } else
 #endif
         stage_columns(p, dp, seed, dat, j, dstage);
-    msfp_contact_direction(p->surface[j], stage, w->local[j], g[j] MSFP_IF_LAW(w->coefficient[j]), out,
-                           dp->surface[j], dstage, d->local[j], dcontact);
-#if MSFP_CLOSED_FORM
-    if (!seed->closed_form)
-#endif
-        solve_unknowns(out, dat, j, stage, dstage, slopes->of[j], dcontact, solution);
-    for (int r = 0; r < MSFP_MOMENT_SIZE; ++r)
-        add_unknowns(slopes->of[j], solution, r, dcontact);
-    for (size_t r = 0; r < sizeof used / sizeof *used; ++r)
-        add_unknowns(slopes->of[j], solution, used[r], dcontact);
+    (void)w;
+    for (int i = 0; i < GIVEN; ++i)
+        memcpy(columns + i * C, blocks[input[i].block] + input[i].index * C, C * sizeof *columns);
+    for (int r = 0; r < (all ? RESULTS : FEW); ++r)
+        msfp_combine_columns(&slopes->of[r][0][j], LANES, columns, count, d->contact[j] + result[r] * C);
 }
 #endif

@@ -85,8 +85,9 @@ static double turning_share(const msfp_run *run)
     return before > 0.0 && after < 0.0 ? before / (before - after) : 1.0;
 }
 
-void msfp_extremes_of_step(msfp_run *run, msfp_group *group, msfp_recording *s)
+void msfp_extremes_of_step(msfp_run *run, msfp_group *group)
 {
+    msfp_recording *s = &run->gradients->recording;
     const double *now = (const double *)&run->extremes, *before = (const double *)&run->gradients->extremes;
     int changed[EXTREMES], any = 0;
     double value[EXTREMES];
@@ -96,17 +97,14 @@ void msfp_extremes_of_step(msfp_run *run, msfp_group *group, msfp_recording *s)
     if (!any)
         return;
     msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &row);
-    msfp_row_reached_columns(run, group, s->row);
-    contributions(run, group, &row, (const msfp_columns *)s->row, 0, value, s->contributed);
+    msfp_row_reached_columns(run, group);
+    contributions(run, group, &row, (const msfp_columns *)group->end_row, 0, value, s->contributed);
     const double share = turning_share(run);
     if (!take(run, group, value, s->contributed, changed) || share >= 1.0)
         return;
     if (run->node_count) {
-        if (!s->observed)
-            msfp_observe_node_columns(run, group, &s->rows);
-        s->observed = 1;
         msfp_row_inside(run, share, &row);
-        msfp_row_between_columns(run, group, &s->rows, share, 0, s->row);
+        msfp_row_between_columns(run, group, share, 0, s->row);
     } else
         msfp_row_of_cubic_columns(run, group, share, &row, s->row);
     contributions(run, group, &row, (const msfp_columns *)s->row, 1, value, s->contributed);

@@ -1,5 +1,6 @@
 /* gradients.c: the derivatives of a run: their inputs, the hooks in the loop of the run, the times of events. */
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include "gradients.h"
@@ -122,36 +123,41 @@ double msfp_prescribed_step(const msfp_run *run)
 
 void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
 {
-    if (run->gradients)
-        run->gradients->trail.stage[i] = *stage;
+    if (!run->gradients)
+        return;
+    run->gradients->trail.stage[i] = *stage;
+    memcpy(&run->gradients->trail.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
+}
+
+void msfp_gradients_rows(msfp_run *run, const msfp_row *rows)
+{
+    if (!run->gradients)
+        return;
+    memcpy(run->gradients->recording.value, rows, (size_t)(run->node_count + 2) * sizeof *rows);
+    run->gradients->recording.known = 1;
 }
 
 void msfp_gradients_before_step(msfp_run *run)
 {
     if (!run->gradients)
         return;
+    run->gradients->recording.known = run->gradients->recording.observed = 0;
     run->gradients->extremes = run->extremes;
     run->gradients->outward_rate = run->outward_rate;
 }
 
-/* Evaluate the stages of the step anew, to rounding, with their tangents. */
+/* Factored tangents of the stages of the step, at the evaluations that solved them. */
 static int factorise(msfp_run *run)
 {
     msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
-    double residual[DOF];
+    trail->all_slopes = 0;
     for (int i = 1; i <= last; ++i) {
         msfp_stage *s = &trail->stage[i];
-        s->seed.same_base = 0;
-        s->seed.accuracy = 0.0;
-#if MSFP_LAW
-        memset(trail->work[i].coefficient, 0, sizeof trail->work[i].coefficient);
-#endif
-        const int status = msfp_condensed(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g, residual,
-                                          trail->factors[i]);
+        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
+                                                    &trail->slopes[i], trail->factors[i]);
         if (status)
             return status;
-        msfp_contact_slopes(&run->parameters, &s->seed, &trail->work[i], (const double(*)[2])s->g, &trail->slopes[i]);
         if (msfp_lu(trail->factors[i], DOF, trail->pivots[i]) == 0)
             return MSFP_E_IRREGULAR;
     }
@@ -184,8 +190,9 @@ void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, doub
     static const msfp_parameter_columns constant;
     msfp_columns gaps[NB][MSFP_GAP_SIZE], rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
     memset(v, 0, sizeof v);
-    for (int i = 0; i < NB * NQ; ++i)
-        v[0][i][0] = run->next.v[0][i];
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < NQ; ++i)
+            v[k][i][0] = run->next.v[k][i];
     msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, gaps);
     msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, rates);
     const double rate = rates[j][MSFP_GAP_G][0];
@@ -211,6 +218,7 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
         msfp_group *group = &g->group[i];
         for (int c = 0; c < C; ++c)
             group->h[c] = fixed ? -group->now.t[c] : 0.0;
+        group->end_known = 0;
         msfp_step_columns(run, group);
         if (rim >= 0) { /* the step ends where the gap is zero, so that its length depends on the parameters */
             msfp_columns dt;
@@ -226,15 +234,22 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
 
 void msfp_gradients_accept(msfp_run *run)
 {
-    for (int i = 0; run->gradients && i < run->gradients->groups; ++i)
-        run->gradients->group[i].now = run->gradients->group[i].next;
+    for (int i = 0; run->gradients && i < run->gradients->groups; ++i) {
+        msfp_group *group = &run->gradients->group[i];
+        group->now = group->next;
+        group->start_known = group->end_known;
+        if (group->end_known)
+            memcpy(group->start_row, group->end_row, sizeof group->end_row);
+    }
 }
 
 int msfp_gradients_jump(msfp_run *run)
 {
     int status = MSFP_OK;
-    for (int i = 0; run->gradients && i < run->gradients->groups && status == MSFP_OK; ++i)
+    for (int i = 0; run->gradients && i < run->gradients->groups && status == MSFP_OK; ++i) {
+        run->gradients->group[i].start_known = 0;
         status = msfp_initial_columns(run, &run->gradients->group[i], 0);
+    }
     return status;
 }
 

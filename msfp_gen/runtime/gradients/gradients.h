@@ -6,6 +6,7 @@
  */
 #ifndef MSFP_GRADIENTS_H
 #define MSFP_GRADIENTS_H
+#include <string.h>
 #include "run.h"
 
 #if MSFP_GRADIENTS
@@ -37,24 +38,34 @@ typedef struct {
     msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
 } msfp_work_columns;
 
-/* Derivatives of the contacts of one evaluation with respect to their local unknowns. */
+/* Columns of the motion of the foot, after those of the top plate. */
+void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
+
+/* Derivatives of the results of the contacts of one evaluation with respect to their inputs. Unless Y follows the closed
+ * form, local unknowns (friction, and its coefficient where it follows a law) are eliminated. */
 typedef struct {
-    double of[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_UNKNOWN_COLUMNS];
+    double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
-/* Columns of the condensed equations at the evaluation in `w`, whose g is the friction force over -mu N there. */
+/* Columns of the condensed equations at the evaluation in `w`. all: of all results of the contacts; otherwise only of
+ * their moments and of the rates of Y, Z. */
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                            const msfp_slopes *slopes, const double g[MSFP_NB][2], msfp_work_columns *d);
+                            const msfp_slopes *slopes, int all, msfp_work_columns *d);
 
 /* ---- contact_columns.c ---- */
 
+/* g: the friction force over -mu N; all: as of msfp_condensed_columns. */
 void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
-                         const double g[MSFP_NB][2], msfp_slopes *slopes);
-/* Columns of the contact of surface j, after those of its local block. */
+                         const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
+/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts. Returns a status. */
+int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                             double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent);
+/* Columns of the contact of surface j, after those of its local block; all: as of msfp_condensed_columns. */
 void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes,
-                          const double g[MSFP_NB][2], int j, msfp_work_columns *d);
+                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j, int all,
+                          msfp_work_columns *d);
 
 /* ---- observation.c: what is recorded ---- */
 
@@ -67,6 +78,8 @@ void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *d
                        msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE]);
 
 /* ---- a run ---- */
+
+typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
 
 /* Columns of a state, and of its time. */
 typedef struct {
@@ -82,8 +95,11 @@ typedef struct {
     msfp_columns h;               /* of the length of the step */
     msfp_columns start[3];        /* of r_01 - r_nn at the start */
     msfp_columns before[MSFP_NB]; /* theta before the step that led to `now`, of quasi-static steps */
-    msfp_point_columns point;     /* of the last stage of the step, and its evaluation */
-    msfp_work_columns work;
+    msfp_point_columns point;     /* of the last stage of the step */
+    msfp_work_columns work;       /* of its evaluation: at constant rates until `complete` */
+    int complete;
+    msfp_row_columns start_row, end_row; /* of the rows at the ends of the step, where they are known */
+    int start_known, end_known;
     msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
 } msfp_group;
 
@@ -92,14 +108,39 @@ typedef struct {
     msfp_stage stage[MSFP_STAGES];
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
+    int all_slopes; /* whether those of the last stage are complete */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;
+
+/* The evaluation of a state that is observed; for all groups. */
+typedef struct {
+    msfp_point at;
+    msfp_seed seed;
+    msfp_work work;
+    msfp_slopes slopes;
+    double g[MSFP_NB][2];
+} msfp_observation;
+
+/* Rows at the ends of the last step and at its interpolation nodes, with the evaluations at these nodes; and columns of
+ * one group. */
+typedef struct {
+    msfp_row value[MSFP_NODES + 2];
+    int known; /* whether `value` is */
+    msfp_observation node[MSFP_NODES];
+    int observed; /* whether `node` is */
+    msfp_row_columns d[MSFP_NODES + 2], row;
+    int columns_known; /* whether `d` is */
+    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)]; /* of a row to the extremes */
+    msfp_observation own;
+    msfp_work_columns work;
+} msfp_recording;
 
 struct msfp_gradients {
     int count, groups; /* parameters, and groups of MSFP_COLUMNS of them */
     msfp_group *group;
     msfp_trail trail;
+    msfp_recording recording;
     const double *steps; /* ends of the steps where they are prescribed [s], with their number and how many are taken */
     int step_count, step;
     double *rows; /* [row][parameter][MSFP_ROW_SIZE] */
@@ -119,19 +160,33 @@ void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, doub
 /* ---- initial_columns.c, step_columns.c: states ---- */
 
 /* sum += weight * columns, of `count` numbers */
-MSFP_INLINE void msfp_add_columns(msfp_columns *sum, const msfp_columns *columns, double weight, int count)
+MSFP_INLINE void msfp_add_columns(msfp_columns *restrict sum, const msfp_columns *restrict columns, double weight,
+                                  int count)
 {
     for (int i = 0; i < count; ++i)
         for (int c = 0; c < MSFP_COLUMNS; ++c)
             sum[i][c] += weight * columns[i][c];
 }
 /* sum += values * factor: columns of a product whose other factor has the columns `factor`. */
-MSFP_INLINE void msfp_add_scaled(msfp_columns *sum, const double *values, const msfp_columns factor, double weight,
-                                   int count)
+MSFP_INLINE void msfp_add_scaled(msfp_columns *restrict sum, const double *restrict values, const msfp_columns factor,
+                                 double weight, int count)
 {
     for (int i = 0; i < count; ++i)
         for (int c = 0; c < MSFP_COLUMNS; ++c)
             sum[i][c] += weight * values[i] * factor[c];
+}
+/* Sum of weights[i stride] times columns[i], of `count` rows of columns, in vectors. */
+MSFP_INLINE void msfp_combine_columns(const double *weights, int stride, const double *columns, int count, double *sum)
+{
+    enum { PACKS = MSFP_COLUMNS / MSFP_PACK_SIZE };
+    const msfp_pack *packs = (const msfp_pack *)columns;
+    msfp_pack total[PACKS];
+    for (int k = 0; k < PACKS; ++k)
+        total[k] = weights[0] * packs[k];
+    for (int i = 1; i < count; ++i)
+        for (int k = 0; k < PACKS; ++k)
+            total[k] += weights[i * stride] * packs[i * PACKS + k];
+    memcpy(sum, total, sizeof total);
 }
 /* Whether a column is not zero. */
 MSFP_INLINE int msfp_any_column(const double *columns)
@@ -153,40 +208,29 @@ void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
 /* Columns of the accepted step, whose stages are in the trail; group->h is given. */
 void msfp_step_columns(msfp_run *run, msfp_group *group);
+/* Complete the columns of the evaluation that ended the step. */
+void msfp_complete_columns(msfp_run *run, msfp_group *group);
 
 /* ---- row_columns.c ---- */
 
-typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
-/* Rows at the ends of the last step and at its interpolation nodes, with their columns. */
-typedef struct {
-    msfp_row value[MSFP_NODES + 2];
-    msfp_row_columns d[MSFP_NODES + 2];
-} msfp_node_rows;
-/* Row of a state, with its columns; ds: columns of the state. */
+/* Columns of the row of a state; ds: columns of the state. */
 void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
-                          msfp_row *row, msfp_row_columns d);
-void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows *rows);
+                          msfp_row_columns d);
+/* Columns of the rows at the ends and nodes of the step, into the recording, unless they are there. */
+void msfp_observe_node_columns(msfp_run *run, msfp_group *group);
 /* Columns of the row at a share of the last step; moving: whether the share is a fixed time, and so depends on the
  * parameters where the ends of the step do. */
-void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_rows *rows, double share, int moving,
-                              msfp_row_columns d);
-/* Columns of the row of the end of the step as the evaluation that ended it records it. */
-void msfp_row_reached_columns(const msfp_run *run, const msfp_group *group, msfp_row_columns d);
+void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving, msfp_row_columns d);
+/* Columns of the row of the end of the step, group->end_row, unless they are known. */
+void msfp_row_reached_columns(msfp_run *run, msfp_group *group);
 /* Row and columns at a share of a quasi-static step. */
 void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d);
 
 /* ---- extreme_columns.c ---- */
 
-/* Rows of one step, and the columns of what a row contributes to the extremes. */
-typedef struct {
-    msfp_node_rows rows;
-    int observed; /* whether `rows` are those of the step */
-    msfp_row_columns row;
-    msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)];
-} msfp_recording;
 /* Columns of the extremes that the first row, or the step, has changed. */
 void msfp_extremes_of_first_row(const msfp_run *run, msfp_group *group, const msfp_row *row, const msfp_row_columns d);
-void msfp_extremes_of_step(msfp_run *run, msfp_group *group, msfp_recording *s);
+void msfp_extremes_of_step(msfp_run *run, msfp_group *group);
 
 /* ---- recording.c ---- */
 

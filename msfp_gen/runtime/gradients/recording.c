@@ -40,14 +40,13 @@ static void event_columns(msfp_run *run, msfp_group *group, int j, msfp_row_colu
 {
     const msfp_state *next = &run->next;
     msfp_state_columns at = group->next;
-    msfp_row row;
     if (msfp_is_quasistatic(run)) {
         msfp_event_time_columns(run, group, j, at.t);
         msfp_add_scaled(at.q[0], next->v[0], at.t, 1.0, NB * NQ);
         msfp_add_scaled(at.v[0], next->a[0], at.t, 1.0, NB * NQ);
         msfp_add_scaled(at.f[0], next->df[0], at.t, 1.0, NB * 2);
     }
-    msfp_observe_columns(run, group, next, &at, &row, d);
+    msfp_observe_columns(run, group, next, &at, d);
     memcpy(event[0], at.t, sizeof *event);
     for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < C; ++c)
@@ -58,65 +57,57 @@ static void event_columns(msfp_run *run, msfp_group *group, int j, msfp_row_colu
 int msfp_record_present_columns(msfp_run *run, int first)
 {
     struct msfp_gradients *g = run->gradients;
-    msfp_recording *s = malloc(sizeof *s);
-    if (!s || reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE)) {
-        free(s);
+    msfp_columns *d = g->recording.row;
+    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE))
         return MSFP_E_MEMORY;
-    }
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
-        msfp_row row;
-        msfp_observe_columns(run, group, &run->now, &group->now, &row, s->row);
+        msfp_observe_columns(run, group, &run->now, &group->now, d);
         for (size_t r = g->row_count; r < run->row_count; ++r)
-            store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)s->row);
-        if (first)
-            msfp_extremes_of_first_row(run, group, &row, (const msfp_columns *)s->row);
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)d);
+        if (first) {
+            msfp_row row;
+            msfp_observe_state(run, &run->now, &row);
+            msfp_extremes_of_first_row(run, group, &row, (const msfp_columns *)d);
+        }
     }
     g->row_count = run->row_count;
-    free(s);
     return MSFP_OK;
 }
 
 /* Columns of a row that the step recorded, at a fixed time: the end of the step, where it is fixed, or inside it. */
-static void row_columns(msfp_run *run, msfp_group *group, double time, msfp_recording *s)
+static const msfp_columns *row_columns(msfp_run *run, msfp_group *group, double time)
 {
+    msfp_columns *d = run->gradients->recording.row;
     if (msfp_is_quasistatic(run) || (run->options.output_step <= 0.0 && !msfp_any_column(group->next.t))) {
-        msfp_row_reached_columns(run, group, s->row);
-        return;
+        msfp_row_reached_columns(run, group);
+        return (const msfp_columns *)group->end_row;
     }
-    if (!s->observed)
-        msfp_observe_node_columns(run, group, &s->rows);
-    s->observed = 1;
     const double share = (time - run->now.t) / (run->next.t - run->now.t);
-    msfp_row_between_columns(run, group, &s->rows, fmin(1.0, share), 1, s->row);
+    msfp_row_between_columns(run, group, fmin(1.0, share), 1, d);
+    return (const msfp_columns *)d;
 }
 
 int msfp_record_step_columns(msfp_run *run)
 {
     struct msfp_gradients *g = run->gradients;
-    msfp_recording *s = malloc(sizeof *s);
-    if (!s || reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE) ||
-        reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT)) {
-        free(s);
+    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE) ||
+        reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT))
         return MSFP_E_MEMORY;
-    }
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
         msfp_columns event[EVENT];
-        s->observed = 0;
+        g->recording.columns_known = 0;
         for (size_t e = g->event_count; e < run->event_count; ++e) {
-            event_columns(run, group, run->events[e].surface - 1, s->row, event);
+            event_columns(run, group, run->events[e].surface - 1, g->recording.row, event);
             store(g, g->events, e, i, EVENT, (const msfp_columns *)event);
         }
-        for (size_t r = g->row_count; r < run->row_count; ++r) {
-            row_columns(run, group, run->rows[r].time, s);
-            store(g, g->rows, r, i, MSFP_ROW_SIZE, (const msfp_columns *)s->row);
-        }
-        msfp_extremes_of_step(run, group, s);
+        for (size_t r = g->row_count; r < run->row_count; ++r)
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, group, run->rows[r].time));
+        msfp_extremes_of_step(run, group);
     }
     g->row_count = run->row_count;
     g->event_count = run->event_count;
-    free(s);
     return MSFP_OK;
 }
 #endif

@@ -1,56 +1,81 @@
 /* row_columns.c: derivatives of rows: of a state, at the end of a step, and inside it. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises loops over columns */
+#endif
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
 enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
 
-void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds, msfp_row *row,
-                    msfp_row_columns d)
+/* Evaluate the equations at a state, for its columns. */
+static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o)
+{
+    double residual[MSFP_DOF];
+    memset(&o->seed, 0, sizeof o->seed);
+    msfp_to_point(run, s, &o->at);
+    memcpy(o->seed.fp, o->at.f, sizeof o->seed.fp);
+    memcpy(o->g, o->at.f, sizeof o->g);
+#if MSFP_LAW
+    memset(o->work.coefficient, 0, sizeof o->work.coefficient);
+#endif
+    msfp_condensed(&run->parameters, &o->at, &o->seed, &o->work, o->g, residual, NULL);
+    msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &o->slopes);
+}
+
+/* Columns of the row of an observed state. */
+static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, double t,
+                             const msfp_state_columns *ds, msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
-    msfp_point at;
-    msfp_work w;
-    msfp_slopes slopes;
-    msfp_work_columns *dw = malloc(sizeof *dw);
+    msfp_work_columns *dw = &run->gradients->recording.work;
     msfp_point_columns dat;
-    msfp_seed seed = { 0 };
-    double g[NB][2];
-    msfp_observe_state(run, s, row);
-    if (!dw)
-        return;
-    msfp_to_point(run, s, &at);
-    memcpy(seed.fp, at.f, sizeof seed.fp);
-    memcpy(g, at.f, sizeof g);
-#if MSFP_LAW
-    memset(w.coefficient, 0, sizeof w.coefficient);
-#endif
-    double residual[MSFP_DOF];
-    msfp_condensed(p, &at, &seed, &w, g, residual, NULL);
-    msfp_contact_slopes(p, &seed, &w, (const double(*)[2])g, &slopes);
     memset(&dat, 0, sizeof dat);
-    msfp_inputs_columns(run, group, s->t, ds->t, &dat);
+    msfp_inputs_columns(run, group, t, ds->t, &dat);
     memcpy(dat.q, ds->q, sizeof dat.q);
     memcpy(dat.v, ds->v, sizeof dat.v);
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_condensed_columns(p, &group->parameters, &at, &dat, &seed, &w, &slopes, (const double(*)[2])g, dw);
-    msfp_record_columns(p, &group->parameters, &at, &dat, &w, dw, d);
-    free(dw);
+    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, &o->slopes, 1, dw);
+    msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
 }
 
-void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows *rows)
+void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
+                          msfp_row_columns d)
+{
+    observe(run, s, &run->gradients->recording.own);
+    observed_columns(run, group, &run->gradients->recording.own, s->t, ds, d);
+}
+
+/* Rows at the ends and nodes of the step, and evaluations at its nodes, unless they are there. */
+static void observe_nodes(msfp_run *run, msfp_recording *r)
 {
     msfp_state s;
+    msfp_row row;
+    if (!r->known)
+        msfp_row_inside(run, 1.0, &row); /* which gives them to msfp_gradients_rows */
+    for (int i = 0; i < run->node_count && !r->observed; ++i) {
+        msfp_interpolate(run, run->node[i].share, &s);
+        observe(run, &s, &r->node[i]);
+    }
+    r->observed = 1;
+}
+
+void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
+{
+    msfp_recording *r = &run->gradients->recording;
     const int last = run->node_count + 1;
-    msfp_observe_columns(run, group, &run->now, &group->now, &rows->value[0], rows->d[0]);
+    if (r->columns_known)
+        return;
+    observe_nodes(run, r);
+    if (!group->start_known)
+        msfp_observe_columns(run, group, &run->now, &group->now, group->start_row);
+    memcpy(r->d[0], group->start_row, sizeof group->start_row);
     for (int i = 1; i < last; ++i) {
         const double share = run->node[i - 1].share;
         msfp_state_columns *node = &group->node[i - 1];
-        msfp_interpolate(run, share, &s);
         for (int c = 0; c < C; ++c) {
             node->t[c] = group->now.t[c] + share * group->h[c];
             node->foot[MSFP_FOOT_Y2][c] =
@@ -60,9 +85,11 @@ void msfp_observe_node_columns(msfp_run *run, msfp_group *group, msfp_node_rows 
             for (int d = 0; d < NQ; ++d)
                 for (int c = 0; c < C; ++c)
                     node->a[k][d][c] = (1.0 - share) * group->now.a[k][d][c] + share * group->next.a[k][d][c];
-        msfp_observe_columns(run, group, &s, node, &rows->value[i], rows->d[i]);
+        observed_columns(run, group, &r->node[i - 1], run->now.t + share * (run->next.t - run->now.t), node, r->d[i]);
     }
-    msfp_observe_columns(run, group, &run->next, &group->next, &rows->value[last], rows->d[last]);
+    msfp_row_reached_columns(run, group);
+    memcpy(r->d[last], group->end_row, sizeof group->end_row);
+    r->columns_known = group->start_known = 1;
 }
 
 /* Derivatives of the weights of msfp_weights_at with respect to the share. */
@@ -85,7 +112,7 @@ static void weight_slopes(const msfp_run *run, double share, double *slopes)
 }
 
 /* The bound of limit_friction in output.c: |(Y, Z)| no larger than in the rows that a row is interpolated from. */
-static void limit_friction(const msfp_node_rows *rows, int count, const msfp_row *row, msfp_row_columns d)
+static void limit_friction(const msfp_recording *rows, int count, const msfp_row *row, msfp_row_columns d)
 {
     for (int j = 0; j < NB; ++j) {
         double most = 1.0;
@@ -135,9 +162,11 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
     }
 }
 
-void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_rows *rows, double share, int moving,
-                        msfp_row_columns d)
+MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
+                                        msfp_row_columns d)
 {
+    msfp_observe_node_columns(run, group);
+    const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
     double slopes[MSFP_NODES + 2], *value;
@@ -162,12 +191,16 @@ void msfp_row_between_columns(msfp_run *run, msfp_group *group, const msfp_node_
     restore_bounds(run, group, &blended, d);
 }
 
-void msfp_row_reached_columns(const msfp_run *run, const msfp_group *group, msfp_row_columns d)
+void msfp_row_reached_columns(msfp_run *run, msfp_group *group)
 {
     const msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    if (group->end_known)
+        return;
+    msfp_complete_columns(run, group);
     msfp_record_columns(&run->parameters, &group->parameters, &trail->stage[last].at, &group->point,
-                        &trail->work[last], &group->work, d);
+                        &trail->work[last], &group->work, group->end_row);
+    group->end_known = 1;
 }
 
 /* The cubic through values and rates at the ends of the step, of a quasi-static step: columns at a share of it. */
@@ -191,9 +224,11 @@ void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, m
     hermite(a->q[0], a->v[0], b->q[0], b->v[0], h, share, NB * NQ, ds->q[0]);
     hermite(a->v[0], a->a[0], b->v[0], b->a[0], h, share, NB * NQ, ds->v[0]);
     hermite(a->f[0], a->df[0], b->f[0], b->df[0], h, share, NB * 2, ds->f[0]);
-    for (int i = 0; i < NB * NQ; ++i)
-        for (int c = 0; c < C; ++c)
-            ds->a[0][i][c] = (1.0 - share) * a->a[0][i][c] + share * b->a[0][i][c];
-    msfp_observe_columns(run, group, &s, ds, row, d);
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < NQ; ++i)
+            for (int c = 0; c < C; ++c)
+                ds->a[k][i][c] = (1.0 - share) * a->a[k][i][c] + share * b->a[k][i][c];
+    msfp_observe_state(run, &s, row);
+    msfp_observe_columns(run, group, &s, ds, d);
 }
 #endif

@@ -13,7 +13,8 @@ enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, C = MSFP_COLUMN
 static const int unknown[ND] = MSFP_FREE;
 
 /* As msfp_lu_solve for all columns at once. */
-MSFP_WIDE void msfp_solve_columns(const double *factors, const int *pivots, msfp_columns *columns)
+MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
+                                  msfp_columns *restrict columns)
 {
     for (int k = 0; k < DOF; ++k)
         for (int c = 0; c < C; ++c) {
@@ -99,7 +100,7 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
 MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
                         msfp_point_columns *dat)
 {
-    const double beta = stage->beta;
+    const double beta = stage->beta, inverse = 1.0 / beta;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
             for (int c = 0; c < C; ++c)
@@ -107,12 +108,12 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], ms
         for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
             for (int c = 0; c < C; ++c) {
                 const int d = unknown[i];
-                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) / beta;
+                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) * inverse;
             }
     }
 }
 
-/* Solve stage i for the columns of its rates, and evaluate it: group->point and group->work. */
+/* Solve stage i for the columns of its rates: group->point. group->work has the columns at constant rates. */
 MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ])
 {
     const msfp_trail *trail = &run->gradients->trail;
@@ -123,17 +124,65 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
-    for (int pass = 0; pass < 2; ++pass) {
-        stage_point(stage, Q, V, dat);
-        msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
-                               &trail->slopes[i], stage->g, &group->work);
-        if (pass)
-            break;
-        msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
-        for (int k = 0; k < NB; ++k)
-            for (int d = 0; d < ND; ++d)
-                msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
+    stage_point(stage, Q, V, dat);
+    msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
+                           &trail->slopes[i], 0, &group->work);
+    msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < ND; ++d)
+            msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
+    stage_point(stage, Q, V, dat);
+    group->complete = 0;
+}
+
+void msfp_complete_columns(msfp_run *run, msfp_group *group)
+{
+    msfp_trail *trail = &run->gradients->trail;
+    const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    const msfp_stage *stage = &trail->stage[last];
+    if (!trail->all_slopes)
+        msfp_contact_slopes(&run->parameters, &stage->seed, &trail->work[last], stage->g, 1, &trail->slopes[last]);
+    trail->all_slopes = 1;
+    if (!group->complete)
+        msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
+                               &trail->work[last], &trail->slopes[last], 1, &group->work);
+    group->complete = 1;
+}
+
+/* columns += row * x, where `row` has the derivatives of a number with respect to the rates of a stage, and -x the
+ * columns of these rates. */
+MSFP_INLINE void add_rates(const double *row, const msfp_columns *x, double *columns)
+{
+    double sum[C];
+    msfp_combine_columns(row, 1, x[0], DOF, sum);
+    for (int c = 0; c < C; ++c)
+        columns[c] -= sum[c];
+}
+
+/* Columns of what the next stages need of a solved one, by the derivatives with respect to its rates that its tangent
+ * contains: of the rates of Y, Z, of Y, Z and of the foot. */
+MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const double rates[NB][2],
+                               msfp_columns df[NB][2], msfp_columns f[NB][2])
+{
+    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage *stage = &trail->stage[i];
+    const msfp_work *w = &trail->work[i];
+    const msfp_point_columns *dat = &group->point;
+    const msfp_columns *x = (const msfp_columns *)group->work.residual;
+    msfp_friction_columns(&group->work, df, NULL);
+    for (int j = 0; j < NB; ++j)
+        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d) {
+            add_rates(w->dfriction[j][d], x, df[j][d]);
+            for (int c = 0; c < C; ++c)
+                f[j][d][c] = dat->f[j][d][c] + stage->beta * df[j][d][c] + dat->beta[c] * rates[j][d];
+        }
+    const int sprung = msfp_top_is_sprung(&run->parameters);
+    const int of_plate[3] = { MSFP_BODY_CZ, MSFP_BODY_VZ, MSFP_BODY_AZ };
+    for (int i = 0; i < (sprung ? MSFP_BODY_SIZE : 3); ++i) {
+        const int field = sprung ? i : of_plate[i];
+        add_rates(w->dbody[NB] + field * DOF, x, group->work.body[NB] + field * C);
     }
+    msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
 }
 
 static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
@@ -147,7 +196,8 @@ static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
     msfp_columns Q[NB][NQ], V[NB][NQ], dt;
     stage_columns s;
     int node = 0;
-    memset(&s, 0, sizeof s);
+    memset(s.df, 0, sizeof s.df);
+    memset(s.rates, 0, sizeof s.rates);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
@@ -161,10 +211,10 @@ static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
             dt[c] = now->t[c] + method->c[i] * group->h[c];
         msfp_inputs_columns(run, group, run->now.t + method->c[i] * h, dt, dat);
         solve_stage(run, group, i, Q, V);
+        stage_results(run, group, i, (const double(*)[2])s.rates[i], s.df[i], next->f);
         memcpy(s.v[i], dat->v, sizeof s.v[i]);
         memcpy(s.a[i], dat->a, sizeof s.a[i]);
         memcpy(s.foot[i], group->work.foot + MSFP_FOOT_Y1 * C, sizeof s.foot[i]);
-        msfp_friction_columns(&group->work, s.df[i], next->f);
         memcpy(next->q, dat->q, sizeof next->q);
         memcpy(next->v, dat->v, sizeof next->v);
         memcpy(next->a, dat->a, sizeof next->a);
@@ -200,6 +250,7 @@ static MSFP_WIDE void quasistatic_step(msfp_run *run, msfp_group *group)
     memcpy(dat->foot, now->foot, sizeof dat->foot);
     msfp_inputs_columns(run, group, run->next.t, now->t, dat);
     solve_stage(run, group, 1, Q, V);
+    msfp_complete_columns(run, group);
     *next = *now;
     memcpy(next->q, dat->q, sizeof next->q);
     memcpy(next->v, dat->v, sizeof next->v);

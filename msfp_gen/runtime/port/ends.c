@@ -100,8 +100,8 @@ void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_O
 static void axis_turns(const double *angles, const double *rates, double turn[3])
 {
     turn[0] = rates[0];
-    turn[1] = rates[1] * cos(angles[0]);
-    turn[2] = rates[1] * sin(angles[0]);
+    turn[1] = rates[1] * msfp_cos(angles[0]);
+    turn[2] = rates[1] * msfp_sin(angles[0]);
 }
 
 /* Rates of angles at the rates of the rotation vector, are linear in these; their derivatives with respect to the
@@ -113,7 +113,7 @@ void msfp_end_turns(const double rotation[2][3], double turns[3][3], double deri
     memcpy(path[1], rotation[1], sizeof path[1]);
     double angles[MSFP_ORDERS][3];
     msfp_end_angles((const double(*)[3])path, angles);
-    const double sine = sin(angles[0][0]), cosine = cos(angles[0][0]);
+    const double sine = msfp_sin(angles[0][0]), cosine = msfp_cos(angles[0][0]);
     for (int i = 0; i < 3; ++i) {
         memset(path[1], 0, sizeof path[1]);
         path[1][i] = 1.0;

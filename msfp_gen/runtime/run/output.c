@@ -123,6 +123,7 @@ static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
         msfp_observe_state(run, &s, &rows[i + 1]);
     }
     msfp_observe_state(run, &run->next, &rows[run->node_count + 1]);
+    MSFP_IF_GRADIENTS(msfp_gradients_rows(run, rows), (void)0);
 }
 
 /* The row at a share of the last step; rows: of its nodes. */

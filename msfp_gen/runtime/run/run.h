@@ -83,6 +83,8 @@ double msfp_prescribed_step(const msfp_run *run);
 void msfp_gradients_before_step(msfp_run *run);
 int msfp_gradients_step(msfp_run *run, const double *before, const double *after);
 void msfp_gradients_accept(msfp_run *run);
+/* Rows at the ends of the last step and at its interpolation nodes. */
+void msfp_gradients_rows(msfp_run *run, const msfp_row *rows);
 /* After a jump of the accelerations; after a last row of a run that was stopped. */
 int msfp_gradients_jump(msfp_run *run);
 int msfp_gradients_last_row(msfp_run *run);

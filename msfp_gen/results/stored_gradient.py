@@ -1,0 +1,63 @@
+"""Reading of the derivatives of a run: a group of its netCDF-4 file (`results/netcdf.py`)."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.gradient import ENERGIES, Gradients
+from msfp_gen.results.history import LABELS, STACK, quantities
+from msfp_gen.scene.parameters import Parameter
+
+if TYPE_CHECKING:
+    from msfp_gen.common.arrays import Array
+    from msfp_gen.results.stored_group import StoredGroup
+
+GROUP = "gradient"  # group of the file
+EVENT_ARRAYS = ("event_time", "event_displacement", "event_top_force")
+
+
+def from_group(root: StoredGroup, rows: int, surfaces: int, events: int) -> tuple[Gradients, dict[str, Any]]:
+    """The derivatives in the group of a file, and its arrays and attributes by name.
+
+    rows, surfaces, events: their number in the run. Raises ValueError where something is not as expected.
+    """
+    group = root.group(GROUP)
+    about = group.attributes(lambda name: name in ("parameters", "extremes"))
+    parameters = tuple(_parameter(given) for given in json.loads(str(about["parameters"])))
+    extremes = tuple(Extremes.of_table(given) for given in json.loads(str(about["extremes"])))
+    count, read = len(parameters), dict[str, Any](about)
+    if len(extremes) != count or not count:
+        raise ValueError("the derivatives of the extremes are not those of the parameters")
+    sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
+
+    def array(name: str, *shape: int) -> Array:
+        values: Array = group.array(name, (count, *shape))
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} of the gradient is not finite")
+        read[name] = values
+        return values
+
+    found = {}
+    for field, quantity in quantities().items():
+        parts = quantity.names or (field,)
+        if field == "time" or not any(name in group for name in parts):
+            continue
+        dims = quantity.dims[:-1] if len(parts) > 1 else quantity.dims
+        columns = [array(name, rows, *(sizes[dim] for dim in dims)) for name in parts if name in group]
+        found[field] = columns[0] if len(parts) == 1 else np.stack(columns, axis=-1)
+    energy = {name: array(f"energy_{name}", rows) for name in ENERGIES}
+    time, displacement, force = (
+        array(name, events, *shape) for name, shape in zip(EVENT_ARRAYS, ((), (3,), (3,)), strict=True)
+    )
+    return Gradients(parameters, found, energy, time, displacement, force, extremes), read
+
+
+def _parameter(given: dict[str, Any]) -> Parameter:
+    parameter = Parameter(**(given | {"index": tuple(given["index"])}))
+    if not np.isfinite(parameter.value):
+        raise ValueError(f"the value of {parameter.path} is not finite")
+    return parameter
