@@ -149,6 +149,7 @@ def _outcome(scene: Scene, residuals: Residuals, x: Array, limits: tuple[Array, 
     values, correlation = x * scale, correlation_of(spread.covariance)
     near = np.minimum(x - limits[0], limits[1] - x) < AT_BOUND * (limits[1] - limits[0])
     near &= np.isfinite(limits[0])
+    bounds = list(zip(*((limit * scale).tolist() for limit in limits), strict=True))
     estimates = tuple(
         Estimate(*row)
         for row in zip(
@@ -159,6 +160,7 @@ def _outcome(scene: Scene, residuals: Residuals, x: Array, limits: tuple[Array, 
             deviation.tolist(),
             (values - half).tolist(),
             (values + half).tolist(),
+            bounds,
             near.tolist(),
             strict=True,
         )

@@ -231,13 +231,19 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
     out = tmp_path / "out"
     command = ["fit", str(scene), str(test), "-p", "friction[0],friction[1]=friction[2]"]
     command += ["--bounds", "friction[0]=0.01:0.09", "--axial-load", "112e3", "--weights", "2", "--offset"]
-    assert main([*command, "--json", "-o", str(out)]) == 0
+    page = tmp_path / "fit.html"
+    assert main([*command, "--json", "-o", str(out), "--report", str(page)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["estimates"][0]["value"] == pytest.approx(TRUE[0], rel=0.02)
     assert {path.name for path in out.iterdir()} == {"scene.toml", "fit.json", "residuals.csv", "fit.png"}
     fitted = load_scene(out / "scene.toml")
     assert fitted.bearing.surfaces[0].friction == found["estimates"][0]["value"]
     assert fitted.motion == near().motion
+    assert f"{found['estimates'][0]['value']:.5g}" in page.read_text(encoding="utf-8")
+    assert (
+        found["estimates"][0]["bounds"] == pytest.approx([0.01, 0.09])
+        and found["estimates"][-1]["bounds"] == [None] * 2
+    )
     assert len((out / "residuals.csv").read_text().splitlines()) == ROWS + 1
     assert tomllib.loads((out / "scene.toml").read_text())["bearing"]["surfaces"][1]["friction"] != 0.0136
     assert main(command) == 0
@@ -251,6 +257,7 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
         (["--bounds", "friction[0]"], "--bounds = 'friction[0]'"),
         (["--column", "force"], "--column = 'force'"),
         (["--column", "load=x"], "columns: 'load' is no column"),
+        (["--report", "fit.pdf"], "--report = 'fit.pdf'"),
     ],
 )
 def test_wrong_options_write_nothing(
