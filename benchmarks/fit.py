@@ -14,7 +14,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
-from msfp_gen.studies.calibration.fitting import TOLERANCE, start_fit
+from msfp_gen.studies.calibration.fitting import start_fit
+from msfp_gen.studies.calibration.search import TOLERANCE
 from msfp_gen.studies.calibration.unknowns import changed_scene
 
 AMPLITUDES = (0.02, 0.06, 0.12)  # [m]

@@ -279,6 +279,17 @@ def test_a_value_at_its_bound_gets_a_note() -> None:
     found = fit(start(), [measured(0.12)], FRICTION[:1], bounds={"friction[0]": (0.035, 0.05)})
     assert found[PATHS[0]].at_bound and found[PATHS[0]].value == pytest.approx(0.035, rel=1e-2)
     assert any("at its bound" in note for note in found.notes)
+    assert found[PATHS[0]].value - 0.035 < 0.1 * found[PATHS[0]].deviation
+
+
+def test_the_search_ends_where_a_step_is_within_the_errors() -> None:
+    """Noise of 0.5 %: a few evaluations. Exact tests: the errors of the runs decide, which the fit says."""
+    found = fit(start(), [measured(0.12)], FRICTION)
+    assert found.evaluations < 8
+    time, displacement, force = loop(0.12)
+    exact = fit(start(), [Measurement("exact", time, displacement, force)], FRICTION)
+    assert all("errors of the runs" in note or "residuals are" in note for note in exact.notes), exact.notes
+    assert exact[PATHS[0]].value == pytest.approx(TRUE[0], rel=1e-3)
 
 
 def test_a_fit_that_does_not_converge_says_so() -> None:
