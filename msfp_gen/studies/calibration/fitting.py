@@ -78,12 +78,12 @@ def fit(
 
     """
     residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress)
-    start, low, high = _range(residuals)
+    start, low, high = search_range(residuals)
     x, end = least_squares(residuals, start, low, high, max_evaluations)
     return _outcome(scene, residuals, x, end, (low, high))
 
 
-def _range(residuals: Residuals) -> tuple[Array, Array, Array]:
+def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
     """Start, least and largest value of every unknown over its scale; offsets of force have no bounds."""
     values = np.array([(u.start, u.low, u.high) for u in residuals.unknowns]).reshape(-1, 3)
     offsets = np.tile([0.0, -np.inf, np.inf], (residuals.offsets, 1))
