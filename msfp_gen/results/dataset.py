@@ -13,7 +13,7 @@ import numpy as np
 
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output, write_bytes
 from msfp_gen.results.history import ENERGY, LABELS, History, quantities
-from msfp_gen.results.reading import COUNTER, DIGEST, PROVENANCE, digest_of
+from msfp_gen.results.reading import COUNTER, DIGEST, EDITION, PROVENANCE, digest_of, edition
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
@@ -136,6 +136,7 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
     return {
         "title": result.scene.name or "unnamed",
         "source": "msfp-gen",
+        EDITION: edition(),
         "status": result.status,
         "message": result.message,
         "notes": json.dumps([asdict(note) for note in result.notes]),

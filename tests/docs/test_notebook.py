@@ -89,5 +89,12 @@ def check_design(printed, code):
     assert less < shear == pytest.approx(float(found[3]), rel=1e-3), "the bound is the larger shear"
 
 
+def test_the_design_page_shows_the_code_of_its_notebook():
+    page = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^```python\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    code = "\n".join(sources(ROOT / "examples" / "design.ipynb"))
+    assert len(shown) == 2 and all(block.strip() in code for block in shown)
+
+
 CHECKS = {"earthquake": check_earthquake, "design": check_design}
 FIGURES = {"earthquake": 4, "design": 1}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,7 +105,7 @@ def start_fit(
     if isinstance(tests, str | Path | Measurement) or not tests:
         raise InputError(f"tests = {tests!r}: give a list of files or measurements")
     read = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
-    sampled = tuple(test.sampled() for test in read)
+    sampled = tuple(test.sampled() for test in _distinct(read))
     scenes = scenes_of(scene, sampled)
     unknowns = unknowns_of(scenes[0], parameters, bounds)
     if any(test.axial_load is not None for test in sampled):
@@ -112,6 +113,16 @@ def start_fit(
             if any(member.path == "top.axial_load" for member in unknown.members):
                 raise InputError("parameters = 'top.axial_load': a test gives its own load; leave out one of them")
     return Residuals(sampled, scenes, unknowns, offset, progress)
+
+
+def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
+    """The tests, with a number behind a name that an earlier one has, such as a file of another folder."""
+    names = [test.name for test in tests]
+    counts = [names[: i + 1].count(name) for i, name in enumerate(names)]
+    return [
+        replace(test, name=f"{test.name} ({count})") if count > 1 else test
+        for test, count in zip(tests, counts, strict=True)
+    ]
 
 
 def _outcome(scene: Scene, residuals: Residuals, x: Array, end: Evaluation, limits: tuple[Array, Array]) -> Fit:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
 Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
+TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
+RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
 FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
 
 
@@ -175,6 +177,21 @@ def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:
     return tuple(_test_scene(scene, test) for test in tests)
 
 
+def _check_size(scene: Scene, test: Measurement) -> None:
+    """Raises InputError for a test that cannot be of this bearing, as with a wrong unit."""
+    travel = sum(surface.capacity for surface in scene.bearing.surfaces)
+    largest, ratio = np.abs(test.displacement).max(), np.abs(test.force).max() / scene.top.axial_load  # type: ignore[attr-defined]
+    if largest > TRAVEL * travel:
+        raise InputError(
+            f"{test.name}: displacement reaches {largest:.4g} m, and the surfaces slide by {travel:.4g} m at "
+            "most; check its unit and the bearing"
+        )
+    if not RATIOS[0] < ratio < RATIOS[1]:
+        raise InputError(
+            f"{test.name}: force reaches {ratio:.3g} of the axial load; check the unit of the force, and the load"
+        )
+
+
 def _test_scene(scene: Scene, test: Measurement) -> Scene:
     zeros = np.zeros(len(test.time))
     path = np.column_stack([test.displacement - test.displacement[0], zeros, zeros])
@@ -189,6 +206,7 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
         output_step=motion.duration / (len(test.time) - 1),
         top=scene.top if test.axial_load is None else replace(scene.top, axial_load=test.axial_load),  # type: ignore[call-arg]
     )
+    _check_size(made, test)
     made = replace(made, effects=made.modelled)  # so that no evaluation selects others
     for surface in undamped_surfaces(made, made.modelled)[:1]:
         raise InputError(UNDAMPED.format(surface=surface))

@@ -225,6 +225,26 @@ def test_scenes_that_are_no_test_are_refused() -> None:
         fit(start(), [], ["friction[0]"])
 
 
+def test_tests_of_another_size_than_the_bearing_are_refused() -> None:
+    """A wrong unit is named before a run."""
+    test = measured(0.05)
+    for changes, message in (
+        (
+            {"displacement": 1e3 * test.displacement},
+            "test 0.05: displacement reaches 50 m, .* slide by 0.173 m at most",
+        ),
+        ({"force": 1e3 * test.force}, r"force reaches 1.* of the axial load; check the unit"),
+        ({"force": 1e-3 * test.force}, r"force reaches 0\.000.* of the axial load"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fit(start(), [replace(test, **changes)], ["friction[0]"])  # type: ignore[arg-type]
+
+
+def test_tests_of_one_name_are_told_apart() -> None:
+    tests = [measured(0.05), measured(0.05), replace(measured(0.12), name="other")]
+    assert [test.name for test in start_fit(start(), tests, FRICTION).tests] == ["test 0.05", "test 0.05 (2)", "other"]
+
+
 def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, test = tmp_path / "scene.toml", written(tmp_path, measured(0.05))
     scene.write_text(scene_text(near()), encoding="utf-8")
