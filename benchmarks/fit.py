@@ -1,7 +1,7 @@
 """How often 95 % intervals of a fit contain the true values, and its time against a fit by finite differences.
 
 Synthetic tests of the triple pendulum of PEER 2017/07 at three amplitudes, with noise of 1 % of the peak and an offset.
-Usage: python benchmarks/fit.py [NUMBER OF FITS]; three minutes; prints the tables of docs/fit.md.
+Usage: python benchmarks/fit.py [NUMBER OF FITS]; five minutes; prints tables of docs/fit.md.
 """
 
 from __future__ import annotations
