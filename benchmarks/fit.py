@@ -1,26 +1,38 @@
 """How often 95 % intervals of a fit contain the true values, and its time against a fit by finite differences.
 
 Synthetic tests of the triple pendulum of PEER 2017/07 at three amplitudes, with noise of 1 % of the peak and an offset.
-Usage: python benchmarks/fit.py [NUMBER OF FITS]; three minutes; prints the tables of docs/fit.md.
+Usage: python benchmarks/fit.py [NUMBER OF FITS]; five minutes; prints tables of docs/fit.md.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
-from msfp_gen.studies.calibration.fitting import TOLERANCE, start_fit
+from msfp_gen.common.arrays import Array
+from msfp_gen.studies.calibration.fitting import search_range, start_fit
+from msfp_gen.studies.calibration.residuals import Residuals
+from msfp_gen.studies.calibration.search import least_squares
 from msfp_gen.studies.calibration.unknowns import changed_scene
 
 AMPLITUDES = (0.02, 0.06, 0.12)  # [m]
 ROWS, NOISE, OFFSET = 200, 0.01, 0.01  # noise and deviation of the offsets over the peak of all tests
 PATHS = ("friction[0]", "friction[1]=friction[2]", "friction[3]")
 FITS = 100
+SEEDS = 3  # sets of tests of the table of times
+STEP = 0.01  # relative, of finite differences
+SETS = (
+    PATHS[:1],
+    PATHS,
+    (*PATHS, "radius[0]", "radius[1]=radius[2]", "radius[3]"),
+    (*PATHS, "radius[0]", "radius[1]=radius[2]", "radius[3]",
+     "capacity[0]", "yield_displacement[0]=yield_displacement[3]"),
+)  # fmt: skip
 
 
 def rig() -> Scene:
@@ -86,35 +98,59 @@ def bias(scene: Scene) -> None:
     print()
 
 
+class Differences(Residuals):
+    """The same residuals, with a Jacobian by finite differences of relative step 0.01 (docs/calibration.md)."""
+
+    central, runs = False, 0
+
+    def _run(self, index: int, values: Array, show: Callable[[float, float], None]) -> tuple[Array, Array]:
+        test, slopes = self.tests[index], []
+
+        def force(at: Array) -> Array:
+            run = simulate(changed_scene(self.scenes[index], self.unknowns, at), progress=show).history
+            self.runs += index == 0
+            return np.asarray(np.interp(test.time - test.time[0], run.time, run.top_force[:, 0]))
+
+        middle = force(values)
+        for number, value in enumerate(values):
+            step = STEP * value * np.eye(len(values))[number]
+            ahead = force(values + step)
+            slope = (ahead - force(values - step)) / 2 if self.central else ahead - middle
+            slopes.append(slope / (STEP * value))
+        return middle, np.column_stack(slopes)
+
+
 def cost(scene: Scene) -> None:
-    """Time of one fit with exact Jacobians, and by finite differences (docs/calibration.md), in one run."""
-    made, _ = noisy(clean_tests(scene), 0)
+    """CPU time of fits with exact Jacobians, and by finite differences with the same search, in turn.
+
+    Means of three sets of tests, which differ in their noise. The differences are those of the values at the end.
+    """
+    clean = clean_tests(scene)
     begin = (scene.bearing.arrays()["friction"] * [1.3, 0.8, 0.8, 1.2]).tolist()
     start = replace(scene, bearing=scene.bearing.replace(friction=begin))
-    clock = time.perf_counter()
-    exact = fit(start, made, PATHS)
-    ours, prepared, runs = time.perf_counter() - clock, start_fit(start, made, PATHS), 0
-
-    def residuals(x: np.ndarray) -> np.ndarray:
-        nonlocal runs
-        runs += 1
-        rows = []
-        for test, each in zip(prepared.tests, prepared.scenes, strict=True):
-            run = simulate(changed_scene(each, prepared.unknowns, x * prepared.scale)).history
-            rows.append((np.interp(test.time, run.time, run.top_force[:, 0]) - test.force) / prepared.largest)
-        return np.concatenate(rows)
-
-    bounds = tuple(np.array([getattr(u, side) / u.start for u in prepared.unknowns]) for side in ("low", "high"))
-    clock = time.perf_counter()
-    other = least_squares(
-        residuals, np.ones(3), "3-point", bounds, ftol=TOLERANCE, xtol=TOLERANCE, gtol=None, diff_step=0.01
-    )
-    theirs = time.perf_counter() - clock
-    gap = max(abs(e.value / value - 1) for e, value in zip(exact.estimates, other.x * prepared.scale, strict=True))
-    print("| fit of three values to three tests | runs of each test | time |\n|---|---|---|")
-    print(f"| exact Jacobian | {exact.evaluations} | 1 |")
-    print(f"| central differences, step 0.01 | {runs} | {theirs / ours:.1f} |")
-    print(f"\nLargest difference of the values: {100 * gap:.2g} %")
+    print("| values | Jacobian | evaluations | runs of each test | CPU time | largest difference of a value |")
+    print("|---|---|---|---|---|---|")
+    for paths in SETS:
+        totals = {name: np.zeros(4) for name in ("exact", "forward", "central")}
+        for seed in range(SEEDS):
+            made, best, end = noisy(clean, seed)[0], None, None
+            for name, total in totals.items():
+                prepared = start_fit(start, made, paths)
+                kind = Residuals if name == "exact" else Differences
+                tried = kind(prepared.tests, prepared.scenes, prepared.unknowns, False)
+                tried.central = name == "central"
+                clock = time.process_time()
+                x, at = least_squares(tried, *search_range(tried), 100)
+                taken = time.process_time() - clock
+                best, end = (x, at) if best is None else (best, end)
+                deviation = np.sqrt(np.diag(np.linalg.inv(end.jacobian.T @ end.jacobian)) * end.variance)
+                total += (tried.count, getattr(tried, "runs", tried.count), taken, (np.abs(x - best) / deviation).max())
+        for name, total in totals.items():
+            count, runs, taken, gap = total / SEEDS
+            ratio = taken * SEEDS / totals["exact"][2]
+            apart = "-" if name == "exact" else f"{gap:.1g} standard errors"
+            print(f"| {len(best)} | {name} | {count:.1f} | {runs:.0f} | {ratio:.1f} | {apart} |", flush=True)
+    print()
 
 
 if __name__ == "__main__":

@@ -76,9 +76,7 @@ def agreement() -> None:
 def contacts() -> None:
     """Print the largest distance of a contact point from the axis of its slider, over the radius of the face."""
     print("\n| scene | largest offset over radius, surface by surface |\n|---|---|")
-    for name in presets.names():
-        if name.endswith(("-tfp", "-fp")) and name != "unusual-tfp":
-            continue  # a bearing
+    for name in presets.names("scene"):
         scene = load_scene(name)
         faces = scene.bearing.arrays()["rim_radius"][
             [scene.bearing.slider(j) for j in range(scene.bearing.layout.surfaces)]

@@ -22,7 +22,7 @@ app = typer.Typer()
 
 @app.command(
     epilog="Examples:\n\n\b\n"
-    '  msfp-gen fit scene.toml test1.csv test2.csv --parameters "bearing.friction[*]" -o fitted\n'
+    '  msfp-gen fit scene.toml test1.csv test2.csv --parameters "bearing.friction[*]" -o fitted --report fit.html\n'
     '  msfp-gen fit scene.toml test.csv --parameters "friction[0],friction[1]=friction[2]" --offset\n'
     '  msfp-gen fit scene.toml test.csv -p "friction[*]" --column "force=Load cell" --bounds "friction[*]=0.01:0.2"'
 )
@@ -53,15 +53,22 @@ def fit(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Write the fitted scene, numbers, residuals and a figure."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write a page with values, limits, loops and residuals; no network."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
 ) -> None:
     """Fit friction and other values of a scene to laboratory tests, with 95 % intervals."""
-    from msfp_gen.common.output import make_folder
+    from msfp_gen.common.output import check_output, make_folder
+    from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
     from msfp_gen.scene.file.loader import load_scene
     from msfp_gen.studies.calibration import fit as run_fit
     from msfp_gen.studies.calibration.fitting import start_fit
     from msfp_gen.studies.calibration.tables import fit_tables
 
+    if report is not None:
+        check_output(report, REPORT_SUFFIXES, "--report")
     chosen = load_scene(scene)
     read = _measurements(tests, column or (), axial_load, weights)
     paths = [path for text in parameters for path in text.split(",")]
@@ -74,17 +81,20 @@ def fit(
     line = Progress("fit")
     with line as update:
 
-        def report(count: int, share: float, deviation: float) -> None:
+        def show_evaluation(count: int, share: float, deviation: float) -> None:
             assert update is not None
             line.name = f"evaluation {count}" + (f", deviation {deviation:.4g} N" if deviation == deviation else "")
             update(share, 1.0)
 
-        found = run_fit(chosen, read, paths, bounds=limits, offset=offset, progress=None if update is None else report)
+        found = run_fit(
+            chosen, read, paths, bounds=limits, offset=offset, progress=None if update is None else show_evaluation
+        )
     if as_json:
         say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
         show(fit_tables(found))
-    for path in found.save(output) if output is not None else []:
+    written = [] if output is None else found.save(output)
+    for path in [*written, *([] if report is None else [write_fit_report(found, report)])]:
         note(f"wrote {path}")
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -62,11 +64,8 @@ def ida(
     _check(plot, output)
     found = analyse(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
     plain = found.fractiles.replace(float("inf"), None).to_dict("records")
-    _show(as_json, {"measure": measure, "demand": demand, "unit": found.unit, "fractiles": plain}, ida_table(found))
-    _write(output, found.fractiles)
-    if plot is not None:
-        plot_ida(found, plot)
-        note(f"wrote {plot}")
+    content = {"measure": measure, "demand": demand, "unit": found.unit, "fractiles": plain}
+    _finish(content, ida_table(found), found.fractiles, partial(plot_ida, found), (plot, output, as_json))
 
 
 @app.command(
@@ -113,11 +112,8 @@ def fragility(
     found = analyse(
         rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster, by=by
     )  # fmt: skip
-    _show(as_json, found.as_dict(), fragility_table(found))
-    _write(output, fragility_frame(found))
-    if plot is not None:
-        plot_fragility(found, plot)
-        note(f"wrote {plot}")
+    table, frame = fragility_table(found), fragility_frame(found)
+    _finish(found.as_dict(), table, frame, partial(plot_fragility, found), (plot, output, as_json))
 
 
 @app.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
@@ -136,10 +132,8 @@ def tornado(
 
     _check(plot, output)
     found = analyse(folder, quantity, statistic)
-    _finish(found, tornado_table(found), [vars(bar) for bar in found.bars], as_json, output)
-    if plot is not None:
-        plot_tornado(found, plot)
-        note(f"wrote {plot}")
+    rows = [vars(bar) for bar in found.bars]
+    _finish(asdict(found), tornado_table(found), rows, partial(plot_tornado, found), (plot, output, as_json))
 
 
 @app.command(epilog="Examples:\n\n\b\n  msfp-gen study sobol out --quantity peak_displacement --plot sobol.png")
@@ -161,10 +155,7 @@ def sobol(
     found = analyse(folder, quantity, statistic, level)
     columns = ("axes", "first", "first_interval", "total", "total_interval")
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(found, c) for c in columns), strict=True)]
-    _finish(found, sobol_table(found), rows, as_json, output)
-    if plot is not None:
-        plot_sobol(found, plot)
-        note(f"wrote {plot}")
+    _finish(asdict(found), sobol_table(found), rows, partial(plot_sobol, found), (plot, output, as_json))
 
 
 def _check(plot: Path | None, output: Path | None) -> None:
@@ -175,23 +166,25 @@ def _check(plot: Path | None, output: Path | None) -> None:
         check_output(output, FRAMES, "--output")
 
 
-def _finish(found: Any, table: Table, rows: list[dict[str, Any]], as_json: bool, output: Path | None) -> None:
-    """Print an evaluation, and write its rows."""
+def _finish(
+    content: dict[str, Any],
+    table: Table,
+    rows: Any,
+    draw: Callable[[Path], Any],
+    options: tuple[Path | None, Path | None, bool],
+) -> None:
+    """Print an evaluation, write its rows and draw its figure. options: --plot, --output and --json."""
     import pandas as pd
 
-    _show(as_json, asdict(found), table)
-    _write(output, pd.DataFrame(rows))
+    from msfp_gen.studies.assessment.rows import write_frame
 
-
-def _show(as_json: bool, content: dict[str, Any], table: Table) -> None:
+    plot, output, as_json = options
     if as_json:
         say(json.dumps(content, indent=2, allow_nan=False))
     else:
         show([table])
-
-
-def _write(path: Path | None, frame: Any) -> None:
-    from msfp_gen.studies.assessment.rows import write_frame
-
-    if path is not None:
-        note(f"wrote {write_frame(frame, path, '--output')}")
+    if output is not None:
+        note(f"wrote {write_frame(pd.DataFrame(rows), output, '--output')}")
+    if plot is not None:
+        draw(plot)
+        note(f"wrote {plot}")

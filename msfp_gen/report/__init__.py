@@ -1,7 +1,8 @@
-"""HTML report of a run: one file with tables, figures and an interactive view, without network (docs/report.md)."""
+"""HTML pages without network: a run with an interactive view (docs/report.md), and a fit (docs/fit.md)."""
 
 from msfp_gen.report.content import TitleBlock
+from msfp_gen.report.fit_page import fit_html, write_fit_report
 from msfp_gen.report.frames import FRAMES
 from msfp_gen.report.page import REPORT_SUFFIXES, report_html, write_report
 
-__all__ = ["FRAMES", "REPORT_SUFFIXES", "TitleBlock", "report_html", "write_report"]
+__all__ = ["FRAMES", "REPORT_SUFFIXES", "TitleBlock", "fit_html", "report_html", "write_fit_report", "write_report"]

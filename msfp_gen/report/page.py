@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from collections.abc import Callable, Iterator
-from importlib.resources import files
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.report.content import (
@@ -22,6 +19,7 @@ from msfp_gen.report.content import (
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, view
+from msfp_gen.report.template import asset, picture, render
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -39,7 +37,6 @@ FIGURES = {
     "energy": "Energy balance",
     "section": "Section at the largest displacement",
 }
-RESOLUTION = 110  # dots per inch of the figures
 EXPLANATION = (
     "Bodies are drawn to scale with the radii, heights and capacities of the bearing; the height and thickness of rims "
     "are chosen for the drawing, as they are not part of the data. The force through a surface acts along a straight "
@@ -77,17 +74,16 @@ def report_html(
         progress: called with the number of finished figures and of all figures.
         title: project, device, date, revision and code edition.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     from msfp_gen.scene.file.stored_motion import scene_attribute
 
     data = view(result, frames)
-    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     explanation = EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time))
-    return environment.from_string(_asset("page.html.jinja")).render(
+    return render(
+        "page.html.jinja",
         name=result.scene.name or "unnamed scene",
-        version=__version__,
+        kind="report",
         lead=_introduction(result),
         title_block=title.rows(result),
         terms=TERMS,
@@ -101,9 +97,8 @@ def report_html(
         figures=list(_pictures(result, progress)),
         speeds=SPEEDS,
         explanation=explanation,
-        style=Markup(_asset("page.css")),
         data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
-        scripts=[Markup(_asset(name)) for name in SCRIPTS],
+        scripts=[Markup(asset(name)) for name in SCRIPTS],
     )
 
 
@@ -116,22 +111,17 @@ def _introduction(result: Result) -> str:
     )
 
 
-def _pictures(result: Result, progress: Progress | None) -> Iterator[dict[str, Any]]:
-    """Title and PNG data of every figure of the report."""
+def _pictures(result: Result, progress: Progress | None) -> Iterator[dict[str, str]]:
+    """Every figure of the report, for its template."""
     from msfp_gen.figures import FIGURES as PLOTS
 
     for done, (name, title) in enumerate(FIGURES.items(), start=1):
-        picture = BytesIO()
-        PLOTS[name](result, None).savefig(picture, format="png", dpi=RESOLUTION)
+        drawn = picture(title, PLOTS[name](result, None))
         if progress is not None:
             progress(done, len(FIGURES))
-        yield {"title": title, "png": base64.b64encode(picture.getvalue()).decode("ascii")}
+        yield drawn
 
 
 def _escaped(text: str) -> str:
     """JSON with <, > and & escaped, so that no text in it can end the script element."""
     return re.sub(r"[<>&]", lambda found: f"\\u{ord(found[0]):04x}", text)
-
-
-def _asset(name: str) -> str:
-    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.results.history import ENERGY, LABELS, History, quantities
-from msfp_gen.results.reading import COUNTER, PROVENANCE
+from msfp_gen.results.reading import COUNTER, EDITION, PROVENANCE, edition
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
     return {
         "title": result.scene.name or "unnamed",
         "source": "msfp-gen",
+        EDITION: edition(),
         "status": result.status,
         "message": result.message,
         "notes": json.dumps([asdict(note) for note in result.notes]),

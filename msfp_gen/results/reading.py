@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import MISSING, fields
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,6 +27,7 @@ from msfp_gen.specification.contract import EVENT_KINDS, names
 
 COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
 DIGEST = "digest"  # attribute: of all values that are read
+EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
 WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
 # What h5py, json, tomllib and NumPy raise for content that they cannot read.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
@@ -36,18 +38,31 @@ Arrays = dict[str, Any]
 
 def read_result(path: str | Path, kind: type[R]) -> R:
     """The result in a file of `Result.to_netcdf`, as an instance of `kind`. Raises InputError for any other file."""
-    path = Path(path)
+    path, about = Path(path), dict[str, Attribute]()
     try:
         if not path.is_file():
             raise InputError("no such file; give the name of a result")
         with stored_groups(path) as root:
-            return _read(root, kind)
-    except InputError as error:
+            about |= root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
+            return _read(root, dict(about), kind)
+    except (InputError, *DAMAGE) as error:
+        if about.get("source") == "msfp-gen" and about.get(EDITION) != edition():
+            raise InputError(
+                f"path = {str(path)!r}: another version of msfp-gen wrote this result, which this one cannot read; run "
+                "its scene again (attribute scene)"
+            ) from error
+        if not isinstance(error, InputError):
+            raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
         raise InputError(f"path = {str(path)!r}: {error}") from None
     except MemoryError:
         raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
-    except DAMAGE as error:
-        raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
+
+
+def edition() -> str:
+    """A digest of the names that a file of this version has: of rows, energies, counters and labels."""
+    rows = [rows.names or (field,) for field, rows in quantities().items()]
+    table = [*rows, ENERGY, *LABELS.items(), [field.name for field in fields(Counters)], WORDS]
+    return sha256(json.dumps([list(each) for each in table]).encode()).hexdigest()[:12]
 
 
 def digest_of(attributes: dict[str, Attribute], arrays: Arrays) -> str:
@@ -60,8 +75,8 @@ def digest_of(attributes: dict[str, Attribute], arrays: Arrays) -> str:
     return digest(read, known)
 
 
-def _read(root: StoredGroup, kind: type[R]) -> R:
-    about = root.attributes(lambda name: name in ("source", DIGEST) or _is_read(name))
+def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[R]) -> R:
+    about.pop(EDITION, None)
     if about.pop("source", None) != "msfp-gen":
         raise InputError(f"no result of msfp-gen; {REMEDY}")
     if not all(isinstance(about.get(name), str) for name in WORDS):

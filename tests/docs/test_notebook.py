@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from support import ROOT
 
@@ -64,6 +66,36 @@ def test_every_cell_runs(path, tmp_path, monkeypatch):
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    assert "<xarray.Dataset>" in run.stdout and "(True, True)" in run.stdout.splitlines()[-1]
+    CHECKS[path.stem](run.stdout, code)
+    assert len(list(tmp_path.glob("figure-*.png"))) == FIGURES[path.stem]
+
+
+def check_earthquake(printed, code):
+    assert "<xarray.Dataset>" in printed and "(True, True)" in printed.splitlines()[-1]
     assert sum(".plot." in cell and "data[" in "".join(code) for cell in code) >= 3  # xarray draws its own data
-    assert len(list(tmp_path.glob("figure-*.png"))) == 4
+
+
+def check_design(printed, code):
+    """The optimum is the one that docs/design.md states and a scan confirms (benchmarks/design.py)."""
+    found = re.search(
+        r"friction (\S+), radius (\S+) m, shear (\S+), (\d+) iterations: Optimization terminated", printed
+    )
+    assert [float(value) for value in found.groups()[:3]] == pytest.approx([0.0836, 1.252, 0.1700], rel=2e-3)
+    assert int(found[4]) <= 12
+    (displacement, shear), (other, less) = np.array(re.findall(r"0\.\d+", printed.split("array(")[-1]), float).reshape(
+        2, 2
+    )
+    assert displacement == pytest.approx(0.2, rel=1e-3) == other, "both limits are reached"
+    assert less < shear == pytest.approx(float(found[3]), rel=1e-3), "the bound is the larger shear"
+
+
+def test_the_design_page_shows_the_code_of_its_notebook():
+    page = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^```python\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    code = "\n".join(sources(ROOT / "examples" / "design.ipynb"))
+    parts = [part for block in shown for part in block.strip().split("\n\n\n")]
+    assert len(parts) == 4 and all(part in code for part in parts)
+
+
+CHECKS = {"earthquake": check_earthquake, "design": check_design}
+FIGURES = {"earthquake": 4, "design": 1}

@@ -200,20 +200,19 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
                              double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent)
 {
     enum { SIZE = MSFP_LOCAL_SIZE * LANES };
-    msfp_surface_jacobians jacobians;
     int closed_form = 0;
 #if MSFP_CLOSED_FORM
     closed_form = seed->closed_form;
 #endif
-    msfp_rims(p, w, &jacobians);
-    const int status = closed_form ? msfp_surfaces(p, w, seed, g, &jacobians) : MSFP_OK;
+    msfp_rims(p, w, &w->jacobians);
+    const int status = closed_form ? msfp_surfaces(p, w, seed, g, &w->jacobians) : MSFP_OK;
     if (status)
         return status;
     msfp_contact_slopes(p, seed, w, (const double(*)[2])g, 0, slopes);
     for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r) /* row MOMENT, that of N, does not enter the tangent */
-        memcpy(jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
+        memcpy(w->jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
                SIZE * sizeof(double));
-    msfp_tangent(p, at, seed, w, &jacobians, tangent);
+    msfp_tangent(p, at, seed, w, tangent);
     return MSFP_OK;
 }
 

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.errors import InputError
 from msfp_gen.studies.calibration.fitted_test import FittedTest
 from msfp_gen.studies.calibration.intervals import CORRELATED, correlation_of, lag_one, spread_of, weak
 from msfp_gen.studies.calibration.measurement import Measurement, read_measurement
 from msfp_gen.studies.calibration.outcome import Estimate, Fit
-from msfp_gen.studies.calibration.residuals import Progress, Residuals, scenes_of
+from msfp_gen.studies.calibration.residuals import Evaluation, Progress, Residuals, scenes_of
+from msfp_gen.studies.calibration.search import least_squares
 from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 CONFIDENCE = 0.95
-TOLERANCE = 1e-5  # relative change of cost and values at which the fit ends; errors of runs hide smaller ones
 AT_BOUND = 1e-3  # of the range: distance from a bound within which a value is at it
+NOISY_RUNS = 1.0  # standard errors of the step that is left at the end, from which the fit has a note
 GIVES_WAY = 0.02  # of the largest displacement: movement of the rig from which the fit has a note
 
 
@@ -39,8 +42,8 @@ def fit(
 ) -> Fit:
     """Values of some parameters for which runs of a scene give the forces that tests have measured.
 
-    Every evaluation runs every test once, with the derivatives of its force (docs/gradients.md), and
-    `scipy.optimize.least_squares` makes the next step within the bounds (method "trf").
+    Every evaluation runs every test once, with the derivatives of its force (docs/gradients.md), in threads on all
+    cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf").
 
     Parameters
     ----------
@@ -57,7 +60,8 @@ def fit(
     columns
         Names of the columns: see `read_measurement`.
     progress
-        Called during a run with the number of the evaluation, its share that is done and the last deviation [N].
+        Called during the runs, in their threads, with the number of the evaluation, its share that is done and the
+        last deviation [N]. An exception in it ends the fit.
     max_evaluations
         At most so many evaluations.
 
@@ -74,33 +78,13 @@ def fit(
         A run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.
 
     """
-    from scipy.optimize import least_squares
-
     residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress)
-    start, low, high = _range(residuals)
-    first = residuals.at(start)
-    if first.failure is not None:
-        raise first.failure
-    found = least_squares(
-        lambda x: residuals.at(x).residuals,
-        start,
-        lambda x: residuals.at(x).jacobian,
-        bounds=(low, high),
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
-        gtol=None,
-        max_nfev=max_evaluations,
-    )
-    if found.status == 0:
-        raise RunError(
-            f"fit: not converged after {max_evaluations} evaluations; give tighter bounds, fewer parameters, or more "
-            "evaluations",
-            status="fit",
-        )
-    return _outcome(scene, residuals, found.x, (low, high))
+    start, low, high = search_range(residuals)
+    x, end = least_squares(residuals, start, low, high, max_evaluations)
+    return _outcome(scene, residuals, x, end, (low, high))
 
 
-def _range(residuals: Residuals) -> tuple[Array, Array, Array]:
+def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
     """Start, least and largest value of every unknown over its scale; offsets of force have no bounds."""
     values = np.array([(u.start, u.low, u.high) for u in residuals.unknowns]).reshape(-1, 3)
     offsets = np.tile([0.0, -np.inf, np.inf], (residuals.offsets, 1))
@@ -121,7 +105,7 @@ def start_fit(
     if isinstance(tests, str | Path | Measurement) or not tests:
         raise InputError(f"tests = {tests!r}: give a list of files or measurements")
     read = [test if isinstance(test, Measurement) else read_measurement(test, columns) for test in tests]
-    sampled = tuple(test.sampled() for test in read)
+    sampled = tuple(test.sampled() for test in _distinct(read))
     scenes = scenes_of(scene, sampled)
     unknowns = unknowns_of(scenes[0], parameters, bounds)
     if any(test.axial_load is not None for test in sampled):
@@ -131,24 +115,32 @@ def start_fit(
     return Residuals(sampled, scenes, unknowns, offset, progress)
 
 
-def _outcome(scene: Scene, residuals: Residuals, x: Array, limits: tuple[Array, Array]) -> Fit:
-    """The fit at x, with its intervals. limits: bounds of x."""
+def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
+    """The tests, with a number behind a name that an earlier one has, such as a file of another folder."""
+    names = [test.name for test in tests]
+    counts = [names[: i + 1].count(name) for i, name in enumerate(names)]
+    return [
+        replace(test, name=f"{test.name} ({count})") if count > 1 else test
+        for test, count in zip(tests, counts, strict=True)
+    ]
+
+
+def _outcome(scene: Scene, residuals: Residuals, x: Array, end: Evaluation, limits: tuple[Array, Array]) -> Fit:
+    """The fit at x, with its intervals. end: the evaluation there. limits: bounds of x."""
     from scipy.stats import t
 
-    end, scale, size = residuals.at(x), residuals.scale, len(residuals.unknowns)
-    if end.failure is not None:
-        raise end.failure
+    scale, size = residuals.scale, len(residuals.unknowns)
     names = [u.name for u in residuals.unknowns]
     names += [f"offset of {test.name}" for test in residuals.tests if residuals.with_offset]
     units = [u.unit for u in residuals.unknowns] + ["N"] * residuals.offsets
     starts = [u.start for u in residuals.unknowns] + [0.0] * residuals.offsets
     freedom = max(len(end.residuals) - len(x), 1)
-    spread = spread_of(end.jacobian, float(end.residuals @ end.residuals) / freedom, names)
+    spread = spread_of(end.jacobian, end.variance, names)
     deviation = np.sqrt(np.diag(spread.covariance)) * scale
     half = t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation
     values, correlation = x * scale, correlation_of(spread.covariance)
-    near = np.minimum(x - limits[0], limits[1] - x) < AT_BOUND * (limits[1] - limits[0])
-    near &= np.isfinite(limits[0])
+    near = _at_bound(x, end, *limits)
+    bounds = list(zip(*((limit * scale).tolist() for limit in limits), strict=True))
     estimates = tuple(
         Estimate(*row)
         for row in zip(
@@ -159,6 +151,7 @@ def _outcome(scene: Scene, residuals: Residuals, x: Array, limits: tuple[Array, 
             deviation.tolist(),
             (values - half).tolist(),
             (values + half).tolist(),
+            bounds,
             near.tolist(),
             strict=True,
         )
@@ -172,13 +165,21 @@ def _outcome(scene: Scene, residuals: Residuals, x: Array, limits: tuple[Array, 
         condition=spread.condition,
         tests=tests,
         unidentified=(*spread.unidentified, *lines),
-        notes=tuple(_notes(estimates, tests, float(scene.top.stiffness))),  # type: ignore[attr-defined]
+        notes=tuple(_notes(estimates, tests, float(scene.top.stiffness), end.step_in_errors(end.step(~near)))),  # type: ignore[attr-defined]
         evaluations=residuals.count,
     )
 
 
-def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
-    """What limits the fit. stiffness: of the rig [N/m]."""
+def _at_bound(x: Array, end: Evaluation, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Which unknowns are at a bound, or have their minimum beyond it."""
+    near = np.isfinite(low) & (np.minimum(x - low, high - x) < AT_BOUND * (high - low))
+    beyond = x + end.step(~near)
+    found: NDArray[np.bool_] = near | (beyond < low) | (beyond > high)
+    return found
+
+
+def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float, step_left: float) -> list[str]:
+    """What limits the fit. stiffness: of the rig [N/m]. step_left: in standard errors, at the end of the search."""
     bound = "is at its bound; its interval, and those of the others, have no meaning"
     lines = [f"{estimate.name} {bound}" for estimate in estimates if estimate.at_bound]
     for test in tests:
@@ -188,6 +189,11 @@ def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness
                 f"{test.measured.name}: the rig of the scene gives way by {100 * share:.2g} % of the displacement; "
                 "raise top.stiffness where the test measured the displacement across the bearing"
             )
+    if step_left > NOISY_RUNS:
+        lines.append(
+            f"the errors of the runs limit this fit: its last step would be {step_left:.2g} standard errors; give a "
+            "smaller solver.rtol"
+        )
     if (correlation := lag_one([test.residual for test in tests])) > CORRELATED:
         lines.append(
             f"residuals are correlated ({correlation:.2f}), so the model misses part of the tests and the intervals "

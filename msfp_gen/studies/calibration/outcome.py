@@ -29,6 +29,7 @@ class Estimate:
         value, start: after and before the fit [unit].
         deviation: standard deviation [unit]; infinite where the tests do not determine the value.
         low, high: 95 % interval [unit].
+        bounds: between which the value was sought [unit]; infinite for an offset.
         at_bound: whether the value is at one of its bounds, where the interval has no meaning.
     """
 
@@ -39,6 +40,7 @@ class Estimate:
     deviation: float
     low: float
     high: float
+    bounds: tuple[float, float] = (-np.inf, np.inf)
     at_bound: bool = False
 
     def __str__(self) -> str:
@@ -94,7 +96,7 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers in SI as plain values; None where a value is not determined."""
-        names = ("name", "unit", "value", "start", "deviation", "low", "high", "at_bound")
+        names = ("name", "unit", "value", "start", "deviation", "low", "high", "bounds", "at_bound")
         return {
             "estimates": [{n: _plain(getattr(e, n)) for n in names} for e in self.estimates],
             "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
@@ -138,4 +140,6 @@ class Fit:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,18 +1,23 @@
-"""Residuals of a fit and their exact Jacobian: one run with gradients for each test."""
+"""Residuals of a fit and their exact Jacobian: one run with gradients for each test, at the same time."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
+from msfp_gen.simulation.batch import Workers, raise_if_stopped, usable_cores
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
+from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
 from msfp_gen.studies.calibration.unknowns import Unknown, changed_scene
 
@@ -20,6 +25,9 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
+Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
+TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
+RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
 FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
 
 
@@ -35,6 +43,28 @@ class Evaluation:
     jacobian: Array
     forces: tuple[Array, ...] = ()
     failure: RunError | InputError | None = None
+
+    @property
+    def square(self) -> float:
+        """Sum of the squares of the residuals."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def variance(self) -> float:
+        """Of the residuals: their squares over rows less unknowns."""
+        rows, unknowns = self.jacobian.shape
+        return self.square / float(max(rows - unknowns, 1))
+
+    def step(self, free: NDArray[np.bool_]) -> Array:
+        """Step to the minimum of the linearised sum of squares, of the unknowns that are free, shape (k,)."""
+        step = np.zeros(len(free))
+        step[free] = np.linalg.lstsq(self.jacobian[:, free], -self.residuals, rcond=1 / SINGULAR)[0]
+        return step
+
+    def step_in_errors(self, step: Array) -> float:
+        """Length of a step of the unknowns in their standard errors (Bates and Watts 1981); step: shape (k,)."""
+        error = float(np.sqrt(len(step) * self.variance))
+        return float(np.linalg.norm(self.jacobian @ step) / error) if error else np.inf
 
 
 @dataclass(eq=False)
@@ -52,7 +82,8 @@ class Residuals:
     progress: Progress | None = None
     count: int = 0
     deviation: float = np.nan
-    _known: dict[bytes, Evaluation] = field(default_factory=dict)
+    _last: tuple[bytes, Evaluation] | None = None
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def largest(self) -> float:
@@ -73,22 +104,20 @@ class Residuals:
     def at(self, x: Array) -> Evaluation:
         """The evaluation at x; the last one is kept, since an optimiser asks for its Jacobian afterwards."""
         key = x.tobytes()
-        if key not in self._known:
+        if self._last is None or self._last[0] != key:
             self.count += 1
-            found = self._evaluate(x * self.scale)
-            self._known = {key: found}
-            if found.failure is None:
-                self.deviation = float(np.sqrt(np.mean(found.residuals**2))) * self.largest
-        return self._known[key]
+            self._last = key, self._evaluate(x * self.scale)
+            if self._last[1].failure is None:
+                self.deviation = float(np.sqrt(np.mean(self._last[1].residuals ** 2))) * self.largest
+        return self._last[1]
 
     def _evaluate(self, values: Array) -> Evaluation:
-        forces, residuals, blocks, size = [], [], [], len(self.unknowns)
-        for index, (test, scene) in enumerate(zip(self.tests, self.scenes, strict=True)):
-            try:
-                force, slopes = self._run(test, changed_scene(scene, self.unknowns, values[:size]), index)
-            except (RunError, InputError) as error:
+        size, forces, residuals, blocks = len(self.unknowns), [], [], []
+        for index, (test, run) in enumerate(zip(self.tests, self._runs(values[:size]), strict=True)):
+            if isinstance(run, RunError | InputError):
                 rows = sum(len(each.time) for each in self.tests)
-                return Evaluation(np.full(rows, FAILED), np.zeros((rows, len(values))), (), error)
+                return Evaluation(np.full(rows, FAILED), np.zeros((rows, len(values))), (), run)
+            force, slopes = run
             shift = np.zeros((len(force), self.offsets))
             if self.with_offset:
                 force = force + values[size + index]
@@ -98,17 +127,36 @@ class Residuals:
             blocks.append(test.weight * np.column_stack([slopes, shift]) * self.scale / self.largest)
         return Evaluation(np.concatenate(residuals), np.concatenate(blocks), tuple(forces))
 
-    def _run(self, test: Measurement, scene: Scene, index: int) -> tuple[Array, Array]:
-        """Force of a run at the times of a test, shape (T,), and its derivatives, shape (T, k)."""
-        paths = [member.path for unknown in self.unknowns for member in unknown.members]
+    def _runs(self, values: Array) -> list[Run]:
+        """Runs of all tests at these values, at the same time; the error of a run that fails."""
+        for spec in dict.fromkeys(scene.spec for scene in self.scenes):
+            build_model(spec.layout, spec.effects, gradients=True)
+        shares = np.zeros(len(self.tests))
 
-        def show(time: float, end: float) -> None:
-            assert self.progress is not None
-            self.progress(self.count, (index + time / end) / len(self.tests), self.deviation)
+        def run(index: int) -> Run:
+            def show(time: float, end: float) -> None:
+                raise_if_stopped(time, end)
+                if self.progress is not None:
+                    with self._lock:  # runs report from their own threads
+                        shares[index] = time / end
+                        self.progress(self.count, float(shares.mean()), self.deviation)
+
+            try:
+                return self._run(index, values, show)
+            except (RunError, InputError) as error:
+                return error
 
         if self.progress is not None:
-            show(0.0, 1.0)  # a short run does not report by itself
-        result = simulate(scene, gradients=paths, progress=None if self.progress is None else show)
+            self.progress(self.count, 0.0, self.deviation)  # a short run does not report by itself
+        with Workers(min(len(self.tests), usable_cores()), processes=False) as pool:
+            found = dict(pool.results(run, {index: (index,) for index in range(len(self.tests))}))
+        return [found[index] for index in range(len(self.tests))]
+
+    def _run(self, index: int, values: Array, show: Callable[[float, float], None]) -> tuple[Array, Array]:
+        """Force of a run at the times of a test, shape (T,), and its derivatives, shape (T, k)."""
+        test, scene = self.tests[index], changed_scene(self.scenes[index], self.unknowns, values)
+        paths = [member.path for unknown in self.unknowns for member in unknown.members]
+        result = simulate(scene, gradients=paths, progress=show)
         assert result.gradients is not None
         time, at = result.history.time, test.time - test.time[0]
         columns = dict(zip(paths, result.gradients.rows["top_force"][:, :, 0], strict=True))
@@ -129,6 +177,21 @@ def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:
     return tuple(_test_scene(scene, test) for test in tests)
 
 
+def _check_size(scene: Scene, test: Measurement) -> None:
+    """Raises InputError for a test that cannot be of this bearing, as with a wrong unit."""
+    travel = sum(surface.capacity for surface in scene.bearing.surfaces)
+    largest, ratio = np.abs(test.displacement).max(), np.abs(test.force).max() / scene.top.axial_load  # type: ignore[attr-defined]
+    if largest > TRAVEL * travel:
+        raise InputError(
+            f"{test.name}: displacement reaches {largest:.4g} m, and the surfaces slide by {travel:.4g} m at "
+            "most; check its unit and the bearing"
+        )
+    if not RATIOS[0] < ratio < RATIOS[1]:
+        raise InputError(
+            f"{test.name}: force reaches {ratio:.3g} of the axial load; check the unit of the force, and the load"
+        )
+
+
 def _test_scene(scene: Scene, test: Measurement) -> Scene:
     zeros = np.zeros(len(test.time))
     path = np.column_stack([test.displacement - test.displacement[0], zeros, zeros])
@@ -143,6 +206,7 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
         output_step=motion.duration / (len(test.time) - 1),
         top=scene.top if test.axial_load is None else replace(scene.top, axial_load=test.axial_load),  # type: ignore[call-arg]
     )
+    _check_size(made, test)
     made = replace(made, effects=made.modelled)  # so that no evaluation selects others
     for surface in undamped_surfaces(made, made.modelled)[:1]:
         raise InputError(UNDAMPED.format(surface=surface))

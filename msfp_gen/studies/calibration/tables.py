@@ -1,4 +1,4 @@
-"""Tables of a fit for the terminal."""
+"""Tables of a fit, for the terminal and for its page."""
 
 from __future__ import annotations
 
@@ -14,23 +14,41 @@ if TYPE_CHECKING:
 
 def fit_tables(found: Fit) -> list[Table]:
     """Estimates, correlations, tests, and what limits the fit."""
-    numbers = [str(i) for i in range(1, len(found.estimates) + 1)]
+    tables = [estimate_table(found)]
+    if len(found.estimates) > 1:
+        tables.append(correlation_table(found))
+    tables.append(residual_table(found))
+    remarks = [(text,) for text in (*found.unidentified, *found.notes)]
+    return [*tables, Table("what limits this fit", (), remarks)] if remarks else tables
+
+
+def estimate_table(found: Fit) -> Table:
+    """Values, intervals and starts."""
     columns = ("parameter", "value", "95 % interval", "start", "unit")
-    tables = [Table(f"fitted in {found.evaluations} evaluations", columns, [_row(e) for e in found.estimates])]
-    if len(numbers) > 1:
-        rows = [
-            (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
-            for estimate, line in zip(found.estimates, found.correlation, strict=True)
-        ]
-        title = f"correlation, in the same order; condition {found.condition:.3g}"
-        tables.append(Table(title, ("parameter", *numbers), rows))
+    return Table(f"fitted in {found.evaluations} evaluations", columns, [_row(e) for e in found.estimates])
+
+
+def correlation_table(found: Fit) -> Table:
+    """Correlations of the estimates, in their order."""
+    numbers = [str(i) for i in range(1, len(found.estimates) + 1)]
+    rows = [
+        (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
+        for estimate, line in zip(found.estimates, found.correlation, strict=True)
+    ]
+    return Table(
+        f"correlation, in the same order; condition {found.condition:.3g}",
+        ("parameter", *numbers),
+        rows,
+    )
+
+
+def residual_table(found: Fit) -> Table:
+    """Deviation of every test."""
     shares = [
         (test.measured.name, f"{test.deviation:.4g}", f"{100 * test.share:.2f}", str(len(test.force)))
         for test in found.tests
     ]
-    tables.append(Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares))
-    remarks = [(text,) for text in (*found.unidentified, *found.notes)]
-    return [*tables, Table("what limits this fit", (), remarks)] if remarks else tables
+    return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares)
 
 
 def _row(estimate: Estimate) -> tuple[str, ...]:

@@ -172,6 +172,19 @@ def test_a_value_that_was_changed_is_found(copy: Path) -> None:
     assert Result.from_netcdf(copy).history.top_force[1, 0]
 
 
+def test_a_file_of_another_version_that_cannot_be_read_says_so(copy: Path) -> None:
+    """A file that can be read is read; one that lacks a variable, or has another digest, is not called damaged."""
+    with h5py.File(copy, "r+") as file:
+        file.attrs["edition"] = "0" * 12
+    assert Result.from_netcdf(copy).status == "ok"
+    with h5py.File(copy, "r+") as file:
+        del file["gap"]
+    assert "another version of msfp-gen wrote this result" in refusal(copy)
+    with h5py.File(copy, "r+") as file:
+        del file.attrs["edition"]
+    assert "another version of msfp-gen wrote this result" in refusal(copy)
+
+
 def test_what_others_add_does_not_matter(copy: Path, saved: Path) -> None:
     with h5py.File(copy, "r+") as file:
         file.attrs["history"] = "made larger"

@@ -225,19 +225,45 @@ def test_scenes_that_are_no_test_are_refused() -> None:
         fit(start(), [], ["friction[0]"])
 
 
+def test_tests_of_another_size_than_the_bearing_are_refused() -> None:
+    """A wrong unit is named before a run."""
+    test = measured(0.05)
+    for changes, message in (
+        (
+            {"displacement": 1e3 * test.displacement},
+            "test 0.05: displacement reaches 50 m, .* slide by 0.173 m at most",
+        ),
+        ({"force": 1e3 * test.force}, r"force reaches 1.* of the axial load; check the unit"),
+        ({"force": 1e-3 * test.force}, r"force reaches 0\.000.* of the axial load"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fit(start(), [replace(test, **changes)], ["friction[0]"])  # type: ignore[arg-type]
+
+
+def test_tests_of_one_name_are_told_apart() -> None:
+    tests = [measured(0.05), measured(0.05), replace(measured(0.12), name="other")]
+    assert [test.name for test in start_fit(start(), tests, FRICTION).tests] == ["test 0.05", "test 0.05 (2)", "other"]
+
+
 def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, test = tmp_path / "scene.toml", written(tmp_path, measured(0.05))
     scene.write_text(scene_text(near()), encoding="utf-8")
     out = tmp_path / "out"
     command = ["fit", str(scene), str(test), "-p", "friction[0],friction[1]=friction[2]"]
     command += ["--bounds", "friction[0]=0.01:0.09", "--axial-load", "112e3", "--weights", "2", "--offset"]
-    assert main([*command, "--json", "-o", str(out)]) == 0
+    page = tmp_path / "fit.html"
+    assert main([*command, "--json", "-o", str(out), "--report", str(page)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["estimates"][0]["value"] == pytest.approx(TRUE[0], rel=0.02)
     assert {path.name for path in out.iterdir()} == {"scene.toml", "fit.json", "residuals.csv", "fit.png"}
     fitted = load_scene(out / "scene.toml")
     assert fitted.bearing.surfaces[0].friction == found["estimates"][0]["value"]
     assert fitted.motion == near().motion
+    assert f"{found['estimates'][0]['value']:.5g}" in page.read_text(encoding="utf-8")
+    assert (
+        found["estimates"][0]["bounds"] == pytest.approx([0.01, 0.09])
+        and found["estimates"][-1]["bounds"] == [None] * 2
+    )
     assert len((out / "residuals.csv").read_text().splitlines()) == ROWS + 1
     assert tomllib.loads((out / "scene.toml").read_text())["bearing"]["surfaces"][1]["friction"] != 0.0136
     assert main(command) == 0
@@ -251,6 +277,7 @@ def test_the_command_writes_a_scene_that_loads(tmp_path: Path, capsys: pytest.Ca
         (["--bounds", "friction[0]"], "--bounds = 'friction[0]'"),
         (["--column", "force"], "--column = 'force'"),
         (["--column", "load=x"], "columns: 'load' is no column"),
+        (["--report", "fit.pdf"], "--report = 'fit.pdf'"),
     ],
 )
 def test_wrong_options_write_nothing(
@@ -272,6 +299,17 @@ def test_a_value_at_its_bound_gets_a_note() -> None:
     found = fit(start(), [measured(0.12)], FRICTION[:1], bounds={"friction[0]": (0.035, 0.05)})
     assert found[PATHS[0]].at_bound and found[PATHS[0]].value == pytest.approx(0.035, rel=1e-2)
     assert any("at its bound" in note for note in found.notes)
+    assert found[PATHS[0]].value - 0.035 < 0.1 * found[PATHS[0]].deviation
+
+
+def test_the_search_ends_where_a_step_is_within_the_errors() -> None:
+    """Noise of 0.5 %: a few evaluations. Exact tests: the errors of the runs decide, which the fit says."""
+    found = fit(start(), [measured(0.12)], FRICTION)
+    assert found.evaluations < 8
+    time, displacement, force = loop(0.12)
+    exact = fit(start(), [Measurement("exact", time, displacement, force)], FRICTION)
+    assert all("errors of the runs" in note or "residuals are" in note for note in exact.notes), exact.notes
+    assert exact[PATHS[0]].value == pytest.approx(TRUE[0], rel=1e-3)
 
 
 def test_a_fit_that_does_not_converge_says_so() -> None:
