@@ -99,6 +99,8 @@ static const msfp_api table = {
     .gradient_events = msfp_gradient_events,
     .gradient_extremes = msfp_gradient_extremes,
 #endif
+    .port_new_loaded = msfp_api_port_new_loaded,
+    .port_beside = msfp_api_port_beside,
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

@@ -13,7 +13,22 @@ int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **po
         return wrong;
     msfp_options options = msfp_scene_options(scene);
     options.duration = options.start_time + 1.0;
-    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred);
+    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred, 0);
+    return *port ? (*port)->committed.status : MSFP_E_MEMORY;
+}
+
+int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message)
+{
+    static const double centred[MSFP_NB * MSFP_NQ] = { 0.0 };
+    if (!port)
+        return msfp_refuse(message, "port: give the address of a handle");
+    *port = NULL;
+    const int wrong = msfp_check_port_loaded(scene, message);
+    if (wrong)
+        return wrong;
+    msfp_options options = msfp_scene_options(scene);
+    options.duration = options.start_time + 1.0;
+    *port = msfp_port_new(&scene->bearing->parameters, &options, 0.0, scene->q ? scene->q : centred, 1);
     return *port ? (*port)->committed.status : MSFP_E_MEMORY;
 }
 
@@ -33,15 +48,41 @@ int msfp_api_port_wrench(const msfp_port *port, double *wrench)
     return MSFP_OK;
 }
 
-int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative)
+static int check_direction(const msfp_port *port, const double *direction)
 {
-    if (!direction || !derivative || !port->tried)
+    if (!port || !direction || !port->tried)
         return MSFP_E_ARGUMENT;
     if (!msfp_all_finite(direction, MSFP_ORDERS))
         return MSFP_E_FINITE;
-    if (direction[0] == 0.0 && direction[1] == 0.0 && direction[2] == 0.0)
+    return direction[0] == 0.0 && direction[1] == 0.0 && direction[2] == 0.0 ? MSFP_E_ARGUMENT : MSFP_OK;
+}
+
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative)
+{
+    const int wrong = check_direction(port, direction);
+    if (wrong)
+        return wrong;
+    if (!derivative)
         return MSFP_E_ARGUMENT;
     return msfp_port_derivative(port, direction, derivative);
+}
+
+int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
+                         double *wrenches)
+{
+    msfp_row found[2];
+    double pair[2][MSFP_PORT_FREEDOMS];
+    const int wrong = check_direction(port, direction);
+    if (wrong)
+        return wrong;
+    if (!step || freedom < 0 || freedom >= MSFP_PORT_FREEDOMS)
+        return MSFP_E_ARGUMENT;
+    const int status = msfp_port_beside(port, direction, freedom, step, found, pair);
+    if (status == MSFP_OK && rows)
+        memcpy(rows, found, sizeof found);
+    if (status == MSFP_OK && wrenches)
+        memcpy(wrenches, pair, sizeof pair);
+    return status;
 }
 
 int msfp_api_port_row(const msfp_port *port, double *row)

@@ -157,6 +157,12 @@ void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const 
     load->coefficients[2][0] -= axial_load;
 }
 
+void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *load)
+{
+    for (int i = 0; i < MSFP_END_FREEDOMS; ++i)
+        freedom_path(from->of[1], to->of[1], i, h, load->coefficients[i]);
+}
+
 #if MSFP_TOP_ROTATION
 void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support)
 {

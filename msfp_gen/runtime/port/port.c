@@ -47,11 +47,13 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 #endif
 }
 
-msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q)
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
+                         int loaded)
 {
     msfp_port *port = calloc(1, sizeof *port);
     if (!port)
         return NULL;
+    port->loaded = loaded;
     port->axial_load = axial_load;
     port->knots[0] = options->start_time;
     port->knots[1] = options->start_time + 1.0;
@@ -104,11 +106,15 @@ void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends
     port->knots[0] = run->now.t;
     port->knots[1] = t;
     msfp_base_path(&port->from, to, h, &port->motion);
+    attach_all(port, run); /* nothing of an earlier trial is left in the searches */
+    if (port->loaded) {
+        msfp_load_path(&port->from, to, h, &port->load);
+        return;
+    }
     msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
 #if MSFP_TOP_ROTATION
     msfp_support_path(&port->from, to, h, &port->support);
 #endif
-    attach_all(port, run); /* nothing of an earlier trial is left in the searches */
     move_anchor(port, run, to);
 }
 
@@ -192,6 +198,10 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
     for (int i = 0; i < 3; ++i)
         arm[i] = centre[i] - at->of[0][0][i];
     add_moment(arm, a, a + 3);
+    if (port->loaded) {
+        memcpy(b, at->of[1][0], sizeof at->of[1][0]);
+        return;
+    }
     /* The top plate exerts F and M on the interface, which hands them on to end B. */
     msfp_body_C_get(w->body[NB], centre);
     msfp_force_F_get(w->force[NB], b);
@@ -230,11 +240,11 @@ void msfp_port_revert(msfp_port *port)
 
 /* ---- snapshots: motion of the ends, its checksum, and the snapshot of the committed run with one row ---- */
 
-int msfp_valid_ends(const double *ends)
+int msfp_valid_ends(const double *ends, int loaded)
 {
     if (!msfp_all_finite(ends, sizeof(msfp_ends) / sizeof *ends))
         return 0;
-    for (int end = 0; end < MSFP_ENDS; ++end) {
+    for (int end = 0; end < MSFP_ENDS - loaded; ++end) {
         const double *turn = ends + end * MSFP_ORDERS * MSFP_END_FREEDOMS + 3;
         if (!(sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]) <= MSFP_LARGEST_TURN))
             return 0;
@@ -262,7 +272,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
         return MSFP_E_SNAPSHOT;
     memcpy(&from, snapshot, sizeof from);
     memcpy(&sum, (const char *)snapshot + sizeof from, sizeof sum);
-    if (sum != msfp_checksum(&from, sizeof from) || !msfp_valid_ends(&from.of[0][0][0]))
+    if (sum != msfp_checksum(&from, sizeof from) || !msfp_valid_ends(&from.of[0][0][0], port->loaded))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;
     found.rows = NULL; /* those of `committed` stay until the snapshot is accepted */
