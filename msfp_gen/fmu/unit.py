@@ -67,7 +67,7 @@ def write_fmu(
     target = check_output(path, SUFFIXES, "--output")
     if version not in VERSIONS:
         raise InputError(f"--fmi = {version!r}: give one of {', '.join(map(str, VERSIONS))}")
-    rest = _scene_of_unit(scene)
+    rest = scene_of_unit(scene)
     if exchange:
         _check_exchange(rest)
     unit = _unit(rest, target.stem, version, exchange)
@@ -83,7 +83,7 @@ def write_fmu(
     return WrittenUnit(target, model_name(rest.spec), unit.kinds, tuple(unit.variables))
 
 
-def _scene_of_unit(scene: Scene) -> Scene:
+def scene_of_unit(scene: Scene) -> Scene:
     """The scene with the effects of the unit, at rest; raises InputError."""
     if not isinstance(scene.top, MassTop):
         return scene_at_rest(scene.bearing, *parts_of_rig(scene), scene.solver)

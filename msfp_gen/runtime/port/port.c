@@ -10,9 +10,9 @@ enum { NB = MSFP_NB };
 static void attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
 {
     memset(history, 0, sizeof *history);
-    history->pieces = 1;
+    history->pieces = MSFP_PORT_PIECES;
     history->knots = knots;
-    history->coefficients = &polynomials->coefficients[0][0];
+    history->coefficients = &polynomials->coefficients[0][0][0];
 }
 
 /* The histories of a run are the polynomials of the port. */
@@ -57,6 +57,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->axial_load = axial_load;
     port->knots[0] = options->start_time;
     port->knots[1] = options->start_time + 1.0;
+    port->knots[2] = options->start_time + 2.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
     const int status = start(port, p, options, q);
     port->run = port->committed;
@@ -105,6 +106,7 @@ void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends
     run->options.duration = t;
     port->knots[0] = run->now.t;
     port->knots[1] = t;
+    port->knots[2] = t + h;
     msfp_base_path(&port->from, to, h, &port->motion);
     attach_all(port, run); /* nothing of an earlier trial is left in the searches */
     if (port->loaded) {

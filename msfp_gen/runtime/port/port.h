@@ -24,16 +24,18 @@ typedef struct {
     double of[MSFP_ENDS][MSFP_ORDERS][MSFP_END_FREEDOMS];
 } msfp_ends;
 
-/* Piecewise polynomials of one piece. */
+/* Piecewise polynomials: a trial, and what begins at its end. With the second piece the end of a trial is exactly the
+ * motion given, as in a run over several pieces. */
+enum { MSFP_PORT_PIECES = 2 };
 typedef struct {
-    double coefficients[6][MSFP_DEGREE + 1];
+    double coefficients[MSFP_PORT_PIECES][6][MSFP_DEGREE + 1];
 } msfp_polynomials;
 
 struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
     msfp_ends from, to; /* motion of the ends in those states */
-    double knots[2];    /* of the trial [s] */
+    double knots[MSFP_PORT_PIECES + 1]; /* of the trial, and any later one [s] */
     msfp_polynomials motion, load;
 #if MSFP_TOP_ROTATION
     msfp_polynomials support;
