@@ -168,6 +168,10 @@ def _structure3(structure: Xml.Element, unit: Unit) -> None:
         "InitialUnknown": unit.at(Block.OUTPUTS, Block.STATES, Block.DERIVATIVES),
         "EventIndicator": unit.at(Block.GAPS),
     }
+    # Some importers need the dependencies of all.
+    knowns, initial = (" ".join(map(str, unit.at(*blocks))) for blocks in ((Block.INPUTS, Block.STATES), (Block.INPUTS, Block.PARAMETERS)))
     for name, references in lists.items():
         for reference in references:
-            Xml.SubElement(structure, name, valueReference=str(reference))
+            element = Xml.SubElement(structure, name, valueReference=str(reference))
+            if name != "EventIndicator":
+                element.set("dependencies", initial if name == "InitialUnknown" else knowns)

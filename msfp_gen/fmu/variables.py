@@ -73,8 +73,8 @@ def variables(scene: Scene, exchange: bool) -> list[Variable]:
         if scene.spec.effects.rims:
             found += _gaps(scene.bearing.layout.surfaces)
     meaning = (
-        "false: inputs hold at the begin of a step, and the unit goes on with constant accelerations; true: they are "
-        "those at its end"
+        "false: inputs are those at the begin of a step, from which the unit goes on with accelerations that change as "
+        "since the last communication point; true: they are those at its end"
     )
     return [*found, Variable("inputs_at_step_end", Block.BOOLEANS, "-", meaning, place="INPUTS_AT_STEP_END")]
 
@@ -152,7 +152,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
         yield Variable("axial_load", Block.PARAMETERS, "N", meaning, scene.top.axial_load, place="AXIAL_LOAD")
     for name, unit, meaning, value in (
         ("rtol", "-", "bound of the relative error of a step", solver.rtol),
-        ("angle_tolerance", "rad", "bound of the absolute error of a step", solver.angle_tolerance),
+        ("angle_tolerance", "rad", "bound of the absolute error of a step; 0: rtol/100", solver.atol_angle or 0.0),
         ("max_step", "s", "longest step; 0: chosen", solver.max_step or 0.0),
         ("max_steps", "-", "largest number of steps in a communication step", float(solver.max_steps)),
     ):

@@ -53,8 +53,13 @@ enum {
 
 static void send(const fmu *f, fmu_status status, const char *category, const char *text)
 {
+    char format[2 * FMU_TEXT], *to = format;
+    for (; *text; *to++ = *text++) /* importers may format the text, or not */
+        if (*text == '%')
+            *to++ = '%';
+    *to = '\0';
     if (f->callback)
-        ((fmi2CallbackLogger)f->callback)(f->environment, f->name, (fmi2Status)status, category, "%s", text);
+        ((fmi2CallbackLogger)f->callback)(f->environment, f->name, (fmi2Status)status, category, format);
 }
 
 FMI2_EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }

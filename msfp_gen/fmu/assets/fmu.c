@@ -10,7 +10,7 @@ static const double time_tolerance = 1e-9; /* relative to max(1, t): a sum of co
 
 fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
 {
-    char text[640];
+    char text[FMU_TEXT];
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
@@ -181,20 +181,24 @@ fmu_status fmu_get_list(fmu *f, const double *list, size_t size, double *values,
 
 /* ---- steps ---- */
 
-/* Motion of the ends [end][order][6] at the end of a step of length h: the inputs, or what follows from them with
- * constant accelerations where they are those of its begin. */
-static void ends_after(const fmu *f, double h, double *ends)
+/* Motion of the ends [end][order][6] at the end of a step: the inputs; where they are those of its begin, what follows
+ * from them with accelerations that go on as since the last communication point. */
+static void extrapolate(const fmu *f, fmu_step_data *s)
 {
-    const double *given = f->values + FMU_INPUTS;
-    memcpy(ends, given, FMU_ENDS * sizeof *ends);
-    if (f->values[FMU_INPUTS_AT_STEP_END] != 0.0)
-        return;
-    for (int end = 0; end < 2; ++end)
-        for (int i = 0; i < 6; ++i) {
-            const double *x = given + end * 18 + i;
-            ends[end * 18 + i] = x[0] + h * (x[6] + 0.5 * h * x[12]);
-            ends[end * 18 + 6 + i] = x[6] + h * x[12];
-        }
+    const double *given = f->values + FMU_INPUTS, h = s->end - s->begin;
+    s->span = f->stepped ? f->last.end - f->last.begin : 0.0;
+    memcpy(s->ends, given, sizeof s->ends);
+    for (int k = 0; k < FMU_FREEDOMS; ++k) {
+        const int at = k / 6 * 18 + k % 6;
+        const double *x = given + at;
+        const double slope = s->span > 0.0 ? (x[12] - f->last.accelerations[k]) / s->span : 0.0;
+        s->accelerations[k] = x[12];
+        if (f->values[FMU_INPUTS_AT_STEP_END] != 0.0)
+            continue;
+        s->ends[at] = x[0] + h * (x[6] + h * (x[12] / 2.0 + h * slope / 6.0));
+        s->ends[at + 6] = x[6] + h * (x[12] + h * slope / 2.0);
+        s->ends[at + 12] = x[12] + h * slope;
+    }
 }
 
 fmu_status fmu_step(fmu *f, double time, double step, double *reached)
@@ -209,25 +213,22 @@ fmu_status fmu_step(fmu *f, double time, double step, double *reached)
         return fmu_fail(f, FMU_ERROR, "communication point = %.12g s: the unit is at %.12g s; go on from there", time, start);
     if (!(step > 0.0 && step < INFINITY))
         return fmu_fail(f, FMU_ERROR, "communication step = %.6g s: give a finite number above 0", step);
-    double ends[FMU_ENDS], row[FMU_ROW_SIZE], wrench[FMU_FREEDOMS];
+    fmu_step_data now = { .begin = start, .end = time + step };
+    double row[FMU_ROW_SIZE], wrench[FMU_FREEDOMS];
     const char *message = NULL;
-    ends_after(f, step, ends);
-    api->port_snapshot_write(f->port, f->before);
-    const int found = api->port_trial(f->port, time + step, ends, &message);
-    if (found != MSFP_OK) {
-        f->stepped = 0;
+    extrapolate(f, &now);
+    const int found = api->port_trial(f->port, now.end, now.ends, &message);
+    if (found != MSFP_OK)
         return fmu_failure(f, FMU_ERROR, "step", found, message);
-    }
     api->port_wrench(f->port, wrench);
     api->port_row(f->port, row);
+    api->port_snapshot_write(f->port, f->before);
     api->port_commit(f->port);
     f->stepped = 1;
-    f->begin = start;
-    f->end = time + step;
-    memcpy(f->ends, ends, sizeof f->ends);
+    f->last = now;
     memset(f->have, 0, sizeof f->have);
-    f->values[FMU_TIME] = *reached = f->end;
-    fmu_outputs(f, row, wrench, ends, f->values + FMU_OUTPUTS);
+    f->values[FMU_TIME] = *reached = now.end;
+    fmu_outputs(f, row, wrench, now.ends, f->values + FMU_OUTPUTS);
     return FMU_OK;
 }
 
@@ -236,7 +237,7 @@ fmu_status fmu_step(fmu *f, double time, double step, double *reached)
 /* How displacements, rates and accelerations at the end of a step change with an input of an order. */
 static void direction_of(const fmu *f, int order, double direction[FMU_ORDERS])
 {
-    const double h = f->end - f->begin;
+    const double h = f->last.end - f->last.begin, share = f->last.span > 0.0 ? h / f->last.span : 0.0;
     memset(direction, 0, FMU_ORDERS * sizeof *direction);
     direction[order] = 1.0;
     if (f->values[FMU_INPUTS_AT_STEP_END] != 0.0)
@@ -244,7 +245,7 @@ static void direction_of(const fmu *f, int order, double direction[FMU_ORDERS])
     if (order == 1)
         direction[0] = h;
     if (order == 2)
-        direction[0] = 0.5 * h * h, direction[1] = h;
+        direction[0] = h * h * (0.5 + share / 6.0), direction[1] = h * (1.0 + 0.5 * share), direction[2] = 1.0 + share;
 }
 
 /* Central differences, for which the two-port repeats the step; afterwards it is as it was, bit by bit. */
@@ -256,12 +257,12 @@ static fmu_status differentiate(fmu *f, int order)
     direction_of(f, order, direction);
     int status = api->port_snapshot_read(f->port, f->before, f->size);
     if (status == MSFP_OK)
-        status = api->port_trial(f->port, f->end, f->ends, &message);
+        status = api->port_trial(f->port, f->last.end, f->last.ends, &message);
     for (int freedom = 0; freedom < FMU_FREEDOMS && status == MSFP_OK; ++freedom) {
         status = api->port_beside(f->port, direction, freedom, &step, &rows[0][0], &wrenches[0][0]);
         for (int side = 0; side < 2 && status == MSFP_OK; ++side) {
             double ends[FMU_ENDS];
-            memcpy(ends, f->ends, sizeof ends);
+            memcpy(ends, f->last.ends, sizeof ends);
             for (int k = 0; k < FMU_ORDERS; ++k)
                 ends[freedom / 6 * 18 + 6 * k + freedom % 6] += (side ? step : -step) * direction[k];
             fmu_outputs(f, rows[side], wrenches[side], ends, outputs[side]);
@@ -271,7 +272,7 @@ static fmu_status differentiate(fmu *f, int order)
     }
     /* Back to the end of the step. */
     api->port_revert(f->port);
-    if (api->port_trial(f->port, f->end, f->ends, NULL) == MSFP_OK)
+    if (api->port_trial(f->port, f->last.end, f->last.ends, NULL) == MSFP_OK)
         api->port_commit(f->port);
     if (status != MSFP_OK)
         return fmu_failure(f, FMU_ERROR, "directional derivative", status, message);

@@ -15,8 +15,14 @@ typedef enum { FMU_INSTANTIATED, FMU_INITIALISING, FMU_RUNNING, FMU_EVENTS, FMU_
 /* Phases as bits, for fmu_allowed. */
 #define FMU_AT(phase) (1u << (phase))
 
-enum { FMU_ENDS = 36, FMU_ORDERS = 3, FMU_FREEDOMS = 12, FMU_STATES = FMU_DERIVATIVES - FMU_CONTINUOUS,
+enum { FMU_ENDS = 36, FMU_ORDERS = 3, FMU_FREEDOMS = 12, FMU_TEXT = 640, FMU_STATES = FMU_DERIVATIVES - FMU_CONTINUOUS,
        FMU_INDICATORS = FMU_BOOLEANS - FMU_GAPS };
+
+/* A step: its begin and end, the motion of the ends at its end, the accelerations given at its begin, and the span over
+ * which their slope was taken; 0: there was no step before. */
+typedef struct {
+    double begin, end, ends[FMU_ENDS], accelerations[FMU_FREEDOMS], span;
+} fmu_step_data;
 
 typedef struct fmu fmu;
 typedef void (*fmu_logger)(const fmu *f, fmu_status status, const char *category, const char *text);
@@ -38,7 +44,7 @@ struct fmu {
     int stepped;
     unsigned char *before;
     size_t size;
-    double begin, end, ends[FMU_ENDS];
+    fmu_step_data last;
     double plate[3]; /* where r_nn is at the start [m] */
     /* Derivatives of the outputs with respect to the ends, for each order of the inputs; computed when asked. */
     int have[FMU_ORDERS];

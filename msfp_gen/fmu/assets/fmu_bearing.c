@@ -77,7 +77,7 @@ fmu_status fmu_build(fmu *f)
     scene.start_time = values[FMU_TIME];
     scene.method = FMU_METHOD;
     scene.rtol = values[FMU_SOLVER_RTOL];
-    scene.atol_angle = values[FMU_SOLVER_ANGLE_TOLERANCE];
+    scene.atol_angle = values[FMU_SOLVER_ANGLE_TOLERANCE] != 0.0 ? values[FMU_SOLVER_ANGLE_TOLERANCE] : 0.01 * scene.rtol;
     scene.max_step = values[FMU_SOLVER_MAX_STEP];
     scene.max_steps = values[FMU_SOLVER_MAX_STEPS];
 #if FMU_UPLIFT

@@ -9,7 +9,8 @@ typedef struct {
     char token[40];
     uint64_t size, sum; /* of all bytes [-]; checksum of those after this field */
     int32_t phase, exchange, stepped, ready;
-    double begin, end, ends[FMU_ENDS], values[FMU_VALUES];
+    fmu_step_data last;
+    double values[FMU_VALUES];
 } head;
 
 static uint64_t checksum(const head *h)
@@ -33,9 +34,7 @@ void fmu_state_write(fmu *f, void *state)
     h->exchange = f->exchange;
     h->stepped = f->stepped;
     h->ready = f->ready;
-    h->begin = f->begin;
-    h->end = f->end;
-    memcpy(h->ends, f->ends, sizeof h->ends);
+    h->last = f->last;
     memcpy(h->values, f->values, sizeof h->values);
     if (f->size) {
         memcpy((char *)state + sizeof *h, f->before, f->size);
@@ -86,10 +85,8 @@ fmu_status fmu_state_read(fmu *f, const void *state)
         return fmu_fail(f, FMU_ERROR, "state: it is of another build of this unit");
     memcpy(f->before, (const char *)state + sizeof *h, size);
     memcpy(f->values, h->values, sizeof f->values);
-    memcpy(f->ends, h->ends, sizeof f->ends);
     memset(f->have, 0, sizeof f->have);
     f->stepped = h->stepped;
-    f->begin = h->begin;
-    f->end = h->end;
+    f->last = h->last;
     return FMU_OK;
 }

@@ -10,6 +10,8 @@
 #include "port.h"
 
 enum { NB = MSFP_NB, FREEDOMS = MSFP_PORT_FREEDOMS };
+/* A perturbation accelerates a supported mass by no more than its share of this [m/s^2]. */
+static const double mild_acceleration = 0.1;
 
 /* rtol of the repeated trials [-], and the slip that a perturbation causes, over the smallest yield displacement. */
 typedef struct {
@@ -18,7 +20,7 @@ typedef struct {
 static const precision precisions[] = { { 1e-7, 2e-3 }, { 1.0, 2e-2 } }; /* rtol is no larger than in the trial */
 
 /* Perturbation of a freedom of an end [m] or [rad] that causes no larger slip than `share` of a yield displacement; of a
- * load [N] or [N m] the share of the weight, acting at a radius. */
+ * load [N] or [N m] the force that accelerates the mass mildly, at an arm of a radius. */
 static double perturbation(const msfp_parameters *p, int freedom, double share, int load)
 {
     double yield = p->surface[0][MSFP_SURFACE_PARAMETERS_DY], radius = p->surface[0][MSFP_SURFACE_PARAMETERS_R];
@@ -27,7 +29,7 @@ static double perturbation(const msfp_parameters *p, int freedom, double share, 
         radius = fmax(radius, p->surface[j][MSFP_SURFACE_PARAMETERS_R]);
     }
     if (load) {
-        const double force = share * fmax(p->weight, p->top[MSFP_TOP_PARAMETERS_M]); /* also without gravity */
+        const double force = share * mild_acceleration * p->top[MSFP_TOP_PARAMETERS_M];
         return freedom < 3 ? force : force * radius;
     }
     return freedom < 3 ? share * yield : share * yield / radius;
@@ -60,6 +62,11 @@ static int beside(msfp_port *port, msfp_run *run, const double direction[MSFP_OR
     /* Rates and accelerations move the path inside the step less than displacements do. */
     const double path = fabs(direction[0]) + 0.2 * h * fabs(direction[1]) + 0.02 * h * h * fabs(direction[2]);
     *step = perturbation(&run->parameters, freedom, by.share, port->loaded && end) / path;
+    if (port->loaded && !end) { /* it feels the accelerations of the path */
+        const double most = 20.0 * fabs(direction[0]) + 8.0 * h * fabs(direction[1]) + h * h * fabs(direction[2]);
+        const double radius = freedom < 3 ? 1.0 : run->parameters.surface[0][MSFP_SURFACE_PARAMETERS_R];
+        *step = fmin(*step, by.share * mild_acceleration * h * h / (most * radius));
+    }
     for (int side = 0; side < 2; ++side) {
         msfp_ends to = port->to;
         for (int order = 0; order < MSFP_ORDERS; ++order)
