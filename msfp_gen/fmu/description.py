@@ -70,7 +70,8 @@ def build_description(unit: Unit) -> bytes:
 
 def _text(root: Xml.Element) -> bytes:
     Xml.indent(root)
-    return Xml.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    text: bytes = Xml.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def _interface(root: Xml.Element, unit: Unit, kind: str, version: int) -> None:
@@ -156,9 +157,10 @@ def _structure2(structure: Xml.Element, unit: Unit) -> None:
         "InitialUnknowns": unit.at(Block.OUTPUTS, Block.STATES, Block.DERIVATIVES),
     }
     for name, references in lists.items():
-        element = Xml.SubElement(structure, name) if references else None
-        for reference in references if element is not None else ():
-            Xml.SubElement(element, "Unknown", index=str(reference + 1))
+        if references:
+            element = Xml.SubElement(structure, name)
+            for reference in references:
+                Xml.SubElement(element, "Unknown", index=str(reference + 1))
 
 
 def _structure3(structure: Xml.Element, unit: Unit) -> None:
@@ -169,7 +171,10 @@ def _structure3(structure: Xml.Element, unit: Unit) -> None:
         "EventIndicator": unit.at(Block.GAPS),
     }
     # Some importers need the dependencies of all.
-    knowns, initial = (" ".join(map(str, unit.at(*blocks))) for blocks in ((Block.INPUTS, Block.STATES), (Block.INPUTS, Block.PARAMETERS)))
+    knowns, initial = (
+        " ".join(map(str, unit.at(*blocks)))
+        for blocks in ((Block.INPUTS, Block.STATES), (Block.INPUTS, Block.PARAMETERS))
+    )
     for name, references in lists.items():
         for reference in references:
             element = Xml.SubElement(structure, name, valueReference=str(reference))

@@ -17,7 +17,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from msfp_gen.common.output import check_output, write_bytes
-from msfp_gen.coupling.two_port import check_parts, parts_of_rig, scene_at_rest
+from msfp_gen.coupling.two_port import REST, check_parts, parts_of_rig, scene_at_rest
 from msfp_gen.embedding.rendering import render
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.fmu.content import model_content
@@ -98,8 +98,7 @@ def scene_of_unit(scene: Scene) -> Scene:
         )
     if scene.solver.method == "dopri5":
         raise InputError("solver.method = 'dopri5': the steps of a unit are implicit; give 'implicit' or 'esdirk4'")
-    rest = Motion([0.0, 1.0], [[[0.0] * 6] * 6])
-    return Scene(scene.bearing, rest, scene.top, effects=effects, solver=scene.solver, name=scene.name)
+    return Scene(scene.bearing, Motion(*REST), scene.top, effects=effects, solver=scene.solver, name=scene.name)
 
 
 def _check_exchange(scene: Scene) -> None:

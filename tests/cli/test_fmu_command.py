@@ -12,9 +12,7 @@ RIG = """
 bearing = "fenz-tfp"
 motion = { kind = "ramp", acceleration = 0.002, duration = 1.0 }
 """
-STIFF = (
-    'top = { kind = "rig", axial_load = 112e3, stiffness = 1e7, rotational_stiffness = 1e6, vertical_stiffness = 5e7 }\n'
-)
+STIFF = 'top = { kind = "rig", axial_load = 112e3, stiffness = 1e7, rotational_stiffness = 1e6, vertical_stiffness = 5e7 }\n'
 MASS = 'top = { kind = "mass", mass = 11e3, inertia = 5e3, height = 0.5 }\n'
 
 
@@ -28,7 +26,11 @@ MASS = 'top = { kind = "mass", mass = 11e3, inertia = 5e3, height = 0.5 }\n'
         ('top = { kind = "prescribed", force = [0, 0, -1e5] }\n', ["-o", "b.fmu"], "top.kind = 'prescribed'"),
         (STIFF.replace("1e7", "0.0"), ["-o", "b.fmu"], "stiffness"),
         (MASS + 'effects = { dimension = "planar" }\n', ["-o", "b.fmu"], "give 'spatial' and 'locked'"),
-        (MASS + 'effects = { sliders = "massless" }\n', ["-o", "b.fmu", "--type", "me"], "give 'inertial' and no uplift"),
+        (
+            MASS + 'effects = { sliders = "massless" }\n',
+            ["-o", "b.fmu", "--type", "me"],
+            "give 'inertial' and no uplift",
+        ),
         (MASS + 'solver = { method = "dopri5" }\n', ["-o", "b.fmu"], "give 'implicit' or 'esdirk4'"),
         (MASS + "stop = { displacement = 0.1 }\n", ["-o", "b.fmu"], "stop: the ends"),
     ],

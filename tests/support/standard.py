@@ -45,8 +45,9 @@ def plain(types: str) -> list[str]:
     """Types of arguments without their names, arrays as pointers."""
     found = []
     for argument in re.sub(r"\s+", " ", types).split(","):
-        kind = re.sub(r"\[\]$", "*", re.sub(r"(\w+)(\[\])?$", r"\2", argument.strip()))
-        found.append(re.sub(r" ", "", kind) or argument.strip())
+        words = argument.strip()
+        kind = re.sub(r"\w+(\[\])?$", r"\1", words) if re.search(r"[ *]\w+(\[\])?$", words) else words
+        found.append(kind.replace("[]", "*").replace(" ", ""))
     return [] if found in (["void"], [""]) else found
 
 
@@ -54,13 +55,14 @@ def declared(text: str, version: int) -> dict[str, tuple[str, list[str]]]:
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     pattern = rf"typedef\s+([\w* ]+?)\s*(fmi{version}\w+)TYPE\s*\((.*?)\);"
     return {
-        name: (kind.replace(" ", ""), plain(types))
-        for kind, name, types in re.findall(pattern, text, flags=re.DOTALL)
+        name: (kind.replace(" ", ""), plain(types)) for kind, name, types in re.findall(pattern, text, flags=re.DOTALL)
     }
 
 
 def defined(source: Path, version: int) -> dict[str, tuple[str, list[str]]]:
-    done = subprocess.run([*find_compiler().command, "-E", "-P", str(source)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [*find_compiler().command, "-E", "-P", str(source)], capture_output=True, text=True, check=True
+    )
     pattern = rf"\)\)\) ([\w* ]+?)\s*(fmi{version}\w+)\(((?:[^()]|\([^()]*\))*)\)\s*\{{"
     text = re.sub(r"\s+", " ", done.stdout)
     return {name: (kind.replace(" ", ""), plain(types)) for kind, name, types in re.findall(pattern, text)}

@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from support import Array
-from support.ends import BEARING, INTERFACE, LOAD
 
 from msfp_gen import Motion, Scene, Solver, Top
+from support import Array
+from support.ends import BEARING, INTERFACE, LOAD
 
 INPUTS = range(1, 37)  # value references
 MASS = 11e3  # supported [kg]

@@ -150,7 +150,10 @@ def test_failures_are_errors_with_a_message_and_leave_the_unit_where_it_was(unit
         with pytest.raises(FMICallException):
             at_work.step(TIMES[3], STEP, torn)
         assert "step: uplift at t = 0.0" in at_work.messages[-1]
-        for time, step, words in ((1.0, STEP, "the unit is at 0.06 s"), (TIMES[3], 0.0, "give a finite number above 0")):
+        for time, step, words in (
+            (1.0, STEP, "the unit is at 0.06 s"),
+            (TIMES[3], 0.0, "give a finite number above 0"),
+        ):
             with pytest.raises(FMICallException):
                 at_work.step(time, step)
             assert words in at_work.messages[-1]
