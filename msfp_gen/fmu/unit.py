@@ -105,7 +105,7 @@ def _check_exchange(scene: Scene) -> None:
     effects, top = scene.modelled, scene.top
     if not isinstance(top, MassTop):
         raise InputError(
-            f"--type me: top.kind = {top.kind!r}: Model Exchange is of a supported mass; give kind = 'mass', or --type cs"
+            f"--type me: top.kind = {top.kind!r}: Model Exchange is of a supported mass; give 'mass', or --type cs"
         )
     if effects.sliders != "inertial" or effects.uplift:
         raise InputError(

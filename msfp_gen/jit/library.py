@@ -77,8 +77,8 @@ def build_shared(
 ) -> dict[str, str]:
     """Build the model of `spec` and other C files as the shared library `name` in an empty folder.
 
-    others: file name -> text. exported: names that the library shows, as a pattern of the linker. Returns all files that
-    were compiled, name -> text; errors and `progress` as `build_library`.
+    others: file name -> text. exported: names that the library shows, as a pattern of the linker. Returns all files
+    that were compiled, name -> text; errors and `progress` as `build_library`.
     """
     from msfp_gen.generator import generate
 

@@ -12,7 +12,9 @@ RIG = """
 bearing = "fenz-tfp"
 motion = { kind = "ramp", acceleration = 0.002, duration = 1.0 }
 """
-STIFF = 'top = { kind = "rig", axial_load = 112e3, stiffness = 1e7, rotational_stiffness = 1e6, vertical_stiffness = 5e7 }\n'
+STIFF = """
+top = { kind = "rig", axial_load = 1e5, stiffness = 1e7, rotational_stiffness = 1e6, vertical_stiffness = 5e7 }
+"""
 MASS = 'top = { kind = "mass", mass = 11e3, inertia = 5e3, height = 0.5 }\n'
 
 
