@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from msfp_gen.specification.layout import ModelSpec
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
     ("argument", "an argument is missing or out of range; `message` names it"),
     ("snapshot", "these bytes are no snapshot of a run of this model and scene by this build"),

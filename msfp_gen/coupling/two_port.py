@@ -81,7 +81,7 @@ class TwoPort:
         require_type(bearing, Bearing, "bearing")
         require_type(interface, NodeTop, "interface")
         self.bearing, self.interface = bearing, interface
-        scene = _scene_at_rest(bearing, interface, axial_load, effects, Solver() if solver is None else solver)
+        scene = scene_at_rest(bearing, interface, axial_load, effects, Solver() if solver is None else solver)
         self.axial_load = 0.0 if axial_load is None else axial_load
         self.model: Model = build_model(bearing.layout, scene.modelled)
         self._port: Port = _compiled(scene, self.model, self.axial_load)
@@ -99,19 +99,7 @@ class TwoPort:
         spatial, inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with
         horizontal, vertical and rotational stiffness, or the scene has parts that a two-port has not.
         """
-        for name in ("load", "top_rotation", "initial_state", "stop"):
-            if getattr(scene, name) is not None:
-                raise InputError(f"{name}: the ends of a two-port give motion and load; leave it out of the scene")
-        top = scene.top
-        if not isinstance(top, RigTop):
-            raise InputError(
-                f"top.kind = {top.kind!r}: the interface of a two-port is that of a rig; give kind = 'rig'"
-            )
-        interface = NodeTop(**{field.name: getattr(top, field.name) for field in fields(NodeTop)})
-        effects = scene.effects
-        if isinstance(effects, Auto):
-            effects = effects.resolve(friction=scene.law[0])
-        return cls(scene.bearing, interface, top.axial_load, effects, scene.solver)
+        return cls(scene.bearing, *parts_of_rig(scene), scene.solver)
 
     @property
     def time(self) -> float:
@@ -221,7 +209,27 @@ class TwoPort:
         raise RunError(f"two-port: {reason}", status=name)
 
 
-def _scene_at_rest(
+def check_parts(scene: Scene) -> None:
+    """Raise InputError where a scene has parts that a two-port has not."""
+    for name in ("load", "top_rotation", "initial_state", "stop"):
+        if getattr(scene, name) is not None:
+            raise InputError(f"{name}: the ends of a two-port give motion and load; leave it out of the scene")
+
+
+def parts_of_rig(scene: Scene) -> tuple[NodeTop, float, Effects]:
+    """Interface, axial load and effects of the two-port of a scene; raises InputError as `TwoPort.of_scene`."""
+    check_parts(scene)
+    top = scene.top
+    if not isinstance(top, RigTop):
+        raise InputError(f"top.kind = {top.kind!r}: the interface of a two-port is that of a rig; give kind = 'rig'")
+    interface = NodeTop(**{field.name: getattr(top, field.name) for field in fields(NodeTop)})
+    effects = scene.effects
+    if isinstance(effects, Auto):
+        effects = effects.resolve(friction=scene.law[0])
+    return interface, top.axial_load, effects
+
+
+def scene_at_rest(
     bearing: Bearing, interface: NodeTop, axial_load: float | None, effects: Effects | None, solver: Solver
 ) -> Scene:
     """A scene of the bearing at rest between its ends, which makes all checks of a scene."""

@@ -35,6 +35,8 @@ PAGES = {
     "Makefile": f"{SHARE}/examples/Makefile",
     "CMakeLists.txt": f"{SHARE}/examples/CMakeLists.txt",
 }
+# The same of libraries with a model for two-ports.
+PORT_PAGES = {name: f"{SHARE}/examples/{name}" for name in ("two_port.c", "two_port.f90")}
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ def export_library(
 
 def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform, target: str | None) -> Tree:
     content = _content(models, platform, target)
-    texts = {path: render(name, content) for name, path in PAGES.items()}
+    pages = PAGES | (PORT_PAGES if content["port"] else {})
+    texts = {path: render(name, content) for name, path in pages.items()}
     texts |= {f"include/{name}": text for name, text in built.public.items()}
     for model, files in built.sources.items():
         texts |= {f"{SHARE}/src/{model}/{name}": text for name, text in files.items()}
@@ -101,20 +104,23 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
     """What the templates need."""
     from msfp_gen.generator.emit import word_enums  # it imports SymPy
 
+    found = [
+        {
+            "name": name,
+            "layout": spec.layout,
+            "effects": effects_text(spec),
+            "surface": [value.name for value in surface_values(spec)],
+            "example": values.example(spec),
+            "interface": values.interface(),
+        }
+        for name, spec in models.items()
+    ]
     return {
         "stamp": f"written by msfp-gen {__version__}",
         "version": __version__,
         "abi": ABI_VERSION,
-        "models": [
-            {
-                "name": name,
-                "layout": spec.layout,
-                "effects": effects_text(spec),
-                "surface": [value.name for value in surface_values(spec)],
-                "example": values.example(spec),
-            }
-            for name, spec in models.items()
-        ],
+        "models": found,
+        "port": next((each for each, spec in zip(found, models.values(), strict=True) if _has_ports(spec)), None),
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),
@@ -125,3 +131,10 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "flags": " ".join(FLAGS["c"]),
         "values": values,
     }
+
+
+def _has_ports(spec: ModelSpec) -> bool:
+    """Whether the example of a two-port runs with this model: one without uplift, which starts without separations."""
+    effects = spec.effects
+    spatial = effects.dimension == "spatial" and effects.spin == "locked"
+    return spatial and effects.top_rotation and not effects.uplift

@@ -7,8 +7,8 @@ from importlib.resources import files
 from typing import Any
 
 
-def render(name: str, content: dict[str, Any]) -> str:
-    """Text of the template `assets/<name>.jinja`; a name that `content` lacks is an error."""
+def render(name: str, content: dict[str, Any], package: str = __package__) -> str:
+    """Text of the template `assets/<name>.jinja` of a package; a name that `content` lacks is an error."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(
@@ -19,7 +19,7 @@ def render(name: str, content: dict[str, Any]) -> str:
     environment.filters["c"] = _number
     environment.filters["fortran"] = _fortran_number
     environment.filters["fortran_list"] = _fortran_list
-    text = files(__package__).joinpath("assets", f"{name}.jinja").read_text(encoding="utf-8")
+    text = files(package).joinpath("assets", f"{name}.jinja").read_text(encoding="utf-8")
     return environment.from_string(text).render(content)
 
 

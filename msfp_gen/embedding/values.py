@@ -12,6 +12,7 @@ GRAVITY = 9.8  # [m/s^2]
 LOAD = 500e3  # on the top plate, downwards [N]
 ACCELERATION, DURATION = 0.05, 2.0  # of the base along E1 [m/s^2], [s]: 0.1 m
 OUTPUT_STEP = 0.05  # [s]
+STROKE = 0.1  # of the upper end of a two-port [m]
 
 _BASE = {"height": 0.05, "centroid": 0.025}
 _SLIDER = {
@@ -27,6 +28,7 @@ _SURFACE = {
     "start_temperature": 20.0, **dict.fromkeys(COEFFICIENTS, 0.1),
 }  # fmt: skip
 _TOP = {"stiffness": 1e9, "damping": 1e4, "rotational_stiffness": 1e8, "rotational_damping": 1e4}
+_INTERFACE = _TOP | {"vertical_stiffness": 3e8, "vertical_damping": 1e5}
 
 
 class Example(NamedTuple):
@@ -51,3 +53,8 @@ def example(spec: ModelSpec) -> Example:
         # Over one surface the top plate must tilt: a rig that holds it level would hold the bearing.
         [0.0 if count == 1 and name.startswith("rotational") else _TOP.get(name, 0.0) for name in top],
     )
+
+
+def interface() -> list[float]:
+    """Values of the interface of a two-port: springs and dampers in all directions."""
+    return [_INTERFACE.get(name, 0.0) for name in contract.names(contract.TOP)]

@@ -6,7 +6,8 @@ architecture.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from msfp_gen.jit.compiler import (
     object_file,
     run_parallel,
 )
-from msfp_gen.jit.platforms import EXPORTS, Platform, find_tools
+from msfp_gen.jit.platforms import EXPORTS, Platform, find_platform, find_tools
 from msfp_gen.specification.layout import ModelSpec
 
 GENERATION_SHARE = 0.3  # of the build time, for the progress display; compilation takes the rest
@@ -55,11 +56,8 @@ def build_library(
     compiler, archiver = find_tools(platform)
     sources = _write_sources(specs, folder, progress)
     units = [f"{model}/{name}" for model, files in sources.items() for name in files if name.endswith(".c")]
-    log, flags = Log(folder), (*FLAGS["c"], *FLAGS["user"])
-    for done in run_parallel([[compile_step(name, compiler, flags)] for name in units], log.run):
-        share = GENERATION_SHARE + (1 - GENERATION_SHARE) * done / len(units)
-        progress(f"compiling {', '.join(sources)} ({done} of {len(units)} files)", share)
-    objects = [object_file(name) for name in units]
+    log = Log(folder)
+    objects = _compile(units, ", ".join(sources), compiler, log, progress)
     log.run(Step(STATIC, (*archiver, "rcs", STATIC, *objects)))
     # Versions of a function for several processors stay visible in spite of -fvisibility=hidden.
     (folder / EXPORTS).write_text(f"{{ global: {'; '.join(sources)}; local: *; }};\n", encoding="utf-8")
@@ -68,6 +66,46 @@ def build_library(
     public = {name: files[name] for model, files in sources.items() for name in ("msfp.h", f"{model}.h")}
     imports = folder / Path(platform.linker_name).name if platform.imports else None
     return BuiltLibrary(folder / STATIC, folder / shared, imports, public, sources)
+
+
+def build_shared(
+    spec: ModelSpec,
+    others: Mapping[str, str],
+    exported: str,
+    name: str,
+    folder: Path,
+    progress: Callable[[str, float], None],
+) -> dict[str, str]:
+    """Build the model of `spec` and other C files as the shared library `name` in an empty folder.
+
+    others: file name -> text. exported: names that the library shows, as a pattern of the linker. Returns all files
+    that were compiled, name -> text; errors and `progress` as `build_library`.
+    """
+    from msfp_gen.generator import generate
+
+    compiler, _ = find_tools(find_platform(None))
+    progress(f"deriving and emitting {spec.key}", 0.0)
+    files = {**runtime_sources(), **generate(spec).files, **others}
+    files = {each: text for each, text in sorted(files.items()) if each.endswith((".c", ".h"))}
+    for each, text in files.items():
+        (folder / each).write_text(text, encoding="utf-8", newline="\n")
+    log = Log(folder)
+    objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
+    (folder / EXPORTS).write_text(f"{{ global: {exported}; local: *; }};\n", encoding="utf-8")
+    options = ("-dynamiclib",) if sys.platform == "darwin" else ("-shared", f"-Wl,--version-script={EXPORTS}")
+    log.run(_link_step(compiler, options, objects, name))
+    return files
+
+
+def _compile(
+    units: Sequence[str], what: str, compiler: Compiler, log: Log, progress: Callable[[str, float], None]
+) -> list[str]:
+    """Compile C files in the folder of a log; returns the object files."""
+    flags = (*FLAGS["c"], *FLAGS["user"])
+    for done in run_parallel([[compile_step(name, compiler, flags)] for name in units], log.run):
+        share = GENERATION_SHARE + (1 - GENERATION_SHARE) * done / len(units)
+        progress(f"compiling {what} ({done} of {len(units)} files)", share)
+    return [object_file(name) for name in units]
 
 
 def _write_sources(

@@ -26,7 +26,7 @@ extern "C" {
 #endif
 
 /* Rises with every change of this file that a compiled program notices. */
-#define MSFP_ABI_VERSION 1
+#define MSFP_ABI_VERSION 2
 
 /* How a run or an evaluation ended. */
 enum msfp_status {
@@ -439,6 +439,18 @@ typedef struct msfp_api {
     int (*port_jump)(msfp_port *port, const double *ends);
     /* Why no shorter step cures the `status` of a step: a status, with its place. */
     int (*port_cause)(msfp_port *port, int status, msfp_progress *cause);
+
+    /* ---- further functions of the two-port ---- */
+    /* A two-port whose upper end is free: force in, motion out. The top of the bearing is a supported mass; ends[1] is the
+     * force [N] and the moment [N m] on the top plate at r_nn beside the weight, with two derivatives, and the wrench of
+     * end 1 is that load. Motions are in the row. The model is in space, with locked spin, without top rotation. The rest
+     * is as of port_new. */
+    int (*port_new_loaded)(const msfp_scene *scene, msfp_port **port, const char **message);
+    /* The rows [2][row_size] and wrenches [2][2][6] at the end of the last trial, its steps held, with one freedom of its
+     * ends, 0..11, moved by -step and by +step along the direction of port_derivative: differences give the derivative of
+     * all that follows from them. step receives the size; rows and wrenches may be NULL. Returns as port_derivative. */
+    int (*port_beside)(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
+                       double *wrenches);
 } msfp_api;
 
 #ifdef __cplusplus

@@ -79,10 +79,12 @@ def vertical(port: int, mass: float, stiffness: float, load: float, step: float,
     return found
 
 
-def path(port: int, native: list[object] | None, frictions: list[float], load: float, rows: list[list[float]]) -> Any:
+def path(
+    port: int, native: list[object] | None, frictions: list[float], load: float, rows: list[list[float]], parts: int = 1
+) -> Any:
     """Horizontal forces, shape (rows, 2), under imposed displacements, of a served or a native triple pendulum.
 
-    Vertically the served one is held, with a soft interface that keeps its load; the native one has the load itself.
+    parts: steps of the analysis from row to row. Vertically the served one is held, with a soft interface that keeps its load; the native one has the load itself.
     """
     ops = opensees()
     pair(ops)
@@ -108,10 +110,10 @@ def path(port: int, native: list[object] | None, frictions: list[float], load: f
         ops.timeSeries("Path", 10 + axis, "-dt", 1.0, "-values", *values)
         ops.pattern("Plain", 10 + axis, 10 + axis)
         ops.sp(2, axis + 1, 1.0)
-    settings(ops, ("LoadControl", 1.0), "Static", 1e-6 * load)
+    settings(ops, ("LoadControl", 1.0 / parts), "Static", 1e-6 * load)
     found = []
     for _ in rows:
-        assert ops.analyze(1) == 0
+        assert ops.analyze(parts) == 0
         ops.reactions()
         found.append([-ops.nodeReaction(1, axis) for axis in (1, 2)])
     ops.wipe()

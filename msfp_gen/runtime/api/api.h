@@ -18,6 +18,7 @@ int msfp_check_bearing(double gravity, const double *bodies, const double *surfa
                        const char **message);
 int msfp_check_scene(const msfp_scene *scene, const char **message);
 int msfp_check_port(const msfp_scene *scene, double axial_load, const char **message);
+int msfp_check_port_loaded(const msfp_scene *scene, const char **message);
 /* Also the status of a two-port that has failed at its start. */
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message);
 /* Sets *message and returns MSFP_E_ARGUMENT; message: NULL where nothing is asked. */
@@ -70,6 +71,9 @@ int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **po
 int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const char **message);
 int msfp_api_port_wrench(const msfp_port *port, double *wrench);
 int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
+int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message);
+int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
+                         double *wrenches);
 int msfp_api_port_row(const msfp_port *port, double *row);
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
 void msfp_api_port_counts(const msfp_port *port, int64_t *counts);

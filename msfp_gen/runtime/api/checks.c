@@ -195,15 +195,9 @@ static int centred(const double *q)
     return 1;
 }
 
-int msfp_check_port(const msfp_scene *s, double axial_load, const char **message)
+/* What both kinds of two-port ask of a scene. */
+static int check_ends(const msfp_scene *s, const char **message)
 {
-    if (message)
-        *message = NULL;
-    REQUIRE(s, "scene: give a scene");
-    REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
-    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && MSFP_TOP_ROTATION,
-            "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin");
-    REQUIRE(natural(axial_load, 0), "axial_load: give a finite number of at least 0 [N]");
     REQUIRE(fabs(s->start_time) < INFINITY, "start_time: give a finite time [s]");
     REQUIRE(s->method != MSFP_METHOD_DOPRI5, "method: give MSFP_METHOD_IMPLICIT or MSFP_METHOD_ESDIRK4");
     REQUIRE(!s->motion.pieces && !s->load.pieces && !s->support.pieces && !s->jump_count,
@@ -215,8 +209,33 @@ int msfp_check_port(const msfp_scene *s, double axial_load, const char **message
     REQUIRE(!s->v && !s->f && !s->foot && !s->heat && !s->origin && !s->monitor_heat,
             "v, f, foot, heat, origin, monitor_heat: leave them out; a two-port starts at rest");
     REQUIRE(centred(s->q), "q: give zero angles and finite separations; a two-port starts centred");
-    const int status = check_solver(s, message);
+    return check_solver(s, message);
+}
+
+int msfp_check_port(const msfp_scene *s, double axial_load, const char **message)
+{
+    if (message)
+        *message = NULL;
+    REQUIRE(s, "scene: give a scene");
+    REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
+    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && MSFP_TOP_ROTATION,
+            "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin");
+    REQUIRE(natural(axial_load, 0), "axial_load: give a finite number of at least 0 [N]");
+    const int status = check_ends(s, message);
     return status ? status : check_interface(s->bearing->parameters.top, message);
+}
+
+int msfp_check_port_loaded(const msfp_scene *s, const char **message)
+{
+    if (message)
+        *message = NULL;
+    REQUIRE(s, "scene: give a scene");
+    REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
+    REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && !MSFP_TOP_ROTATION,
+            "bearing: give one of a model in space, with locked spin and without top rotation");
+    const double *top = s->bearing->parameters.top;
+    REQUIRE(top[MSFP_TOP_PARAMETERS_M] > 0.0, "bearing: top: give the supported mass above 0");
+    return check_ends(s, message);
 }
 
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message)
@@ -227,7 +246,7 @@ int msfp_check_trial(const msfp_port *port, double time, const double *ends, con
     REQUIRE(port, "port: give a two-port of port_new");
     if (port->committed.status)
         return port->committed.status;
-    REQUIRE(ends && msfp_valid_ends(ends), "ends: give finite numbers [2][3][6], rotations of at most 1.5 rad");
+    REQUIRE(ends && msfp_valid_ends(ends, port->loaded), "ends: give finite numbers [2][3][6], rotations of at most 1.5 rad");
     const double start = port->committed.now.t, *from = &port->from.of[0][0][0];
     REQUIRE(time == start || (time < INFINITY && time - start >= shortest * fmax(1.0, fabs(start))),
             "time: give a finite time after that of the committed state [s]");

@@ -109,6 +109,8 @@ static const msfp_api table = {
     .port_step_commit = msfp_port_step_commit,
     .port_jump = msfp_api_port_jump,
     .port_cause = msfp_api_port_cause,
+    .port_new_loaded = msfp_api_port_new_loaded,
+    .port_beside = msfp_api_port_beside,
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

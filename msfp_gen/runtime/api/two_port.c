@@ -14,7 +14,22 @@ int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **po
         return wrong;
     msfp_options options = msfp_scene_options(scene);
     options.duration = options.start_time + 1.0;
-    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred);
+    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred, 0);
+    return *port ? (*port)->committed.status : MSFP_E_MEMORY;
+}
+
+int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message)
+{
+    static const double centred[MSFP_NB * MSFP_NQ] = { 0.0 };
+    if (!port)
+        return msfp_refuse(message, "port: give the address of a handle");
+    *port = NULL;
+    const int wrong = msfp_check_port_loaded(scene, message);
+    if (wrong)
+        return wrong;
+    msfp_options options = msfp_scene_options(scene);
+    options.duration = options.start_time + 1.0;
+    *port = msfp_port_new(&scene->bearing->parameters, &options, 0.0, scene->q ? scene->q : centred, 1);
     return *port ? (*port)->committed.status : MSFP_E_MEMORY;
 }
 
@@ -34,15 +49,41 @@ int msfp_api_port_wrench(const msfp_port *port, double *wrench)
     return MSFP_OK;
 }
 
-int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative)
+static int check_direction(const msfp_port *port, const double *direction)
 {
-    if (!direction || !derivative || !port->tried)
+    if (!port || !direction || !port->tried)
         return MSFP_E_ARGUMENT;
     if (!msfp_all_finite(direction, MSFP_ORDERS))
         return MSFP_E_FINITE;
-    if (direction[0] == 0.0 && direction[1] == 0.0 && direction[2] == 0.0)
+    return direction[0] == 0.0 && direction[1] == 0.0 && direction[2] == 0.0 ? MSFP_E_ARGUMENT : MSFP_OK;
+}
+
+int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative)
+{
+    const int wrong = check_direction(port, direction);
+    if (wrong)
+        return wrong;
+    if (!derivative)
         return MSFP_E_ARGUMENT;
     return msfp_port_derivative(port, direction, derivative);
+}
+
+int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
+                         double *wrenches)
+{
+    msfp_row found[2];
+    double pair[2][MSFP_PORT_FREEDOMS];
+    const int wrong = check_direction(port, direction);
+    if (wrong)
+        return wrong;
+    if (!step || freedom < 0 || freedom >= MSFP_PORT_FREEDOMS)
+        return MSFP_E_ARGUMENT;
+    const int status = msfp_port_beside(port, direction, freedom, step, found, pair);
+    if (status == MSFP_OK && rows)
+        memcpy(rows, found, sizeof found);
+    if (status == MSFP_OK && wrenches)
+        memcpy(wrenches, pair, sizeof pair);
+    return status;
 }
 
 int msfp_api_port_row(const msfp_port *port, double *row)
@@ -96,7 +137,7 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 {
     if (port->committed.status)
         return port->committed.status;
-    if (!(step > 0.0 && step < INFINITY) || !expected || !msfp_all_finite(expected, 2))
+    if (port->loaded || !(step > 0.0 && step < INFINITY) || !expected || !msfp_all_finite(expected, 2))
         return MSFP_E_ARGUMENT;
     msfp_port_step_begin(port, step, expected);
     return MSFP_OK;
@@ -108,7 +149,7 @@ int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *
     if (now < 0 || stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages ||
         !wrench)
         return MSFP_E_ARGUMENT;
-    if (!ends || !msfp_valid_ends(ends))
+    if (!ends || !msfp_valid_ends(ends, 0))
         return MSFP_E_FINITE;
     return msfp_port_stage(port, stage, ends, wrench);
 }
@@ -127,7 +168,7 @@ int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
 
 int msfp_api_port_jump(msfp_port *port, const double *ends)
 {
-    return ends && msfp_valid_ends(ends) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
+    return !port->loaded && ends && msfp_valid_ends(ends, 0) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)

@@ -136,9 +136,11 @@ void msfp_end_turns(const double rotation[2][3], double turns[3][3], double deri
 
 /* ---- polynomials of a step ---- */
 
-/* The polynomial c of degree five over the length h, from values and derivatives at its ends. */
-static void through(const double from[MSFP_ORDERS], const double to[MSFP_ORDERS], double h, double c[MSFP_DEGREE + 1])
+/* The polynomial of degree five over the length h, from values and derivatives at its ends, and what begins there. */
+static void through(const double from[MSFP_ORDERS], const double to[MSFP_ORDERS], double h, int channel,
+                    msfp_polynomials *path)
 {
+    double *c = path->coefficients[0][channel], *then = path->coefficients[1][channel];
     const double moved = to[0] - from[0], v0 = h * from[1], v1 = h * to[1], a0 = h * h * from[2], a1 = h * h * to[2];
     const double h3 = 2.0 * h * h * h;
     c[0] = from[0];
@@ -147,23 +149,27 @@ static void through(const double from[MSFP_ORDERS], const double to[MSFP_ORDERS]
     c[3] = (20.0 * moved - 8.0 * v1 - 12.0 * v0 - 3.0 * a0 + a1) / h3;
     c[4] = (-30.0 * moved + 14.0 * v1 + 16.0 * v0 + 3.0 * a0 - 2.0 * a1) / (h3 * h);
     c[5] = (12.0 * moved - 6.0 * (v1 + v0) - a0 + a1) / (h3 * h * h);
+    memset(then, 0, sizeof path->coefficients[1][channel]);
+    then[0] = to[0];
+    then[1] = to[1];
+    then[2] = 0.5 * to[2];
 }
 
-/* That polynomial of one freedom of an end. */
+/* Those polynomials of one freedom of an end. */
 static void freedom_path(const double from[MSFP_ORDERS][MSFP_END_FREEDOMS], const double to[MSFP_ORDERS][MSFP_END_FREEDOMS],
-                         int freedom, double h, double c[MSFP_DEGREE + 1])
+                         int freedom, double h, msfp_polynomials *path)
 {
     double start[MSFP_ORDERS], end[MSFP_ORDERS];
     for (int order = 0; order < MSFP_ORDERS; ++order) {
         start[order] = from[order][freedom];
         end[order] = to[order][freedom];
     }
-    through(start, end, h, c);
+    through(start, end, h, freedom, path);
 }
 
-/* Polynomials of psi, theta, phi of an end. */
+/* Polynomials of psi, theta, phi of an end, from a channel on. */
 static void angle_paths(const double from[MSFP_ORDERS][MSFP_END_FREEDOMS], const double to[MSFP_ORDERS][MSFP_END_FREEDOMS],
-                        double h, double c[3][MSFP_DEGREE + 1])
+                        double h, int channel, msfp_polynomials *path)
 {
     double rotation[MSFP_ORDERS][3], start[MSFP_ORDERS][3], end[MSFP_ORDERS][3], one[MSFP_ORDERS], other[MSFP_ORDERS];
     for (int order = 0; order < MSFP_ORDERS; ++order)
@@ -177,15 +183,15 @@ static void angle_paths(const double from[MSFP_ORDERS][MSFP_END_FREEDOMS], const
             one[order] = start[order][i];
             other[order] = end[order][i];
         }
-        through(one, other, h, c[i]);
+        through(one, other, h, channel + i, path);
     }
 }
 
 void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *motion)
 {
     for (int i = 0; i < 3; ++i)
-        freedom_path(from->of[0], to->of[0], i, h, motion->coefficients[i]);
-    angle_paths(from->of[0], to->of[0], h, motion->coefficients + 3);
+        freedom_path(from->of[0], to->of[0], i, h, motion);
+    angle_paths(from->of[0], to->of[0], h, 3, motion);
 }
 
 /* The force k u + c du/dt by which springs with moving ends differ from those of the top, whose ends are fixed. */
@@ -197,20 +203,30 @@ void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const 
     const double damping[3] = { top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_CV] };
     memset(load, 0, sizeof *load);
     for (int i = 0; i < 3; ++i) {
-        double path[MSFP_DEGREE + 2] = { 0.0 }, *out = load->coefficients[i];
-        freedom_path(from->of[1], to->of[1], i, h, path);
-        path[0] -= i < 2 ? to->of[1][0][i] : 0.0;
-        for (int k = 0; k <= MSFP_DEGREE; ++k)
-            out[k] = stiffness[i] * path[k] + damping[i] * (k + 1) * path[k + 1];
+        freedom_path(from->of[1], to->of[1], i, h, load);
+        for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) {
+            double *out = load->coefficients[piece][i];
+            out[0] -= i < 2 ? to->of[1][0][i] : 0.0;
+            for (int k = 0; k <= MSFP_DEGREE; ++k)
+                out[k] = stiffness[i] * out[k] + (k < MSFP_DEGREE ? damping[i] * (k + 1) * out[k + 1] : 0.0);
+        }
     }
-    load->coefficients[2][0] -= axial_load;
+    for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece)
+        load->coefficients[piece][2][0] -= axial_load;
+}
+
+void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *load)
+{
+    for (int i = 0; i < MSFP_END_FREEDOMS; ++i)
+        freedom_path(from->of[1], to->of[1], i, h, load);
 }
 
 #if MSFP_TOP_ROTATION
 void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support)
 {
     memset(support, 0, sizeof *support);
-    angle_paths(from->of[1], to->of[1], h, support->coefficients);
-    memset(support->coefficients[2], 0, sizeof support->coefficients[2]); /* the interface does not transmit torsion */
+    angle_paths(from->of[1], to->of[1], h, 0, support);
+    for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) /* the interface does not transmit torsion */
+        memset(support->coefficients[piece][2], 0, sizeof support->coefficients[piece][2]);
 }
 #endif

@@ -10,9 +10,9 @@ enum { NB = MSFP_NB };
 static void attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
 {
     memset(history, 0, sizeof *history);
-    history->pieces = 1;
+    history->pieces = MSFP_PORT_PIECES;
     history->knots = knots;
-    history->coefficients = &polynomials->coefficients[0][0];
+    history->coefficients = &polynomials->coefficients[0][0][0];
 }
 
 /* The histories of a run are the polynomials of the port. */
@@ -47,15 +47,18 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 #endif
 }
 
-msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q)
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
+                         int loaded)
 {
     msfp_port *port = calloc(1, sizeof *port);
     if (!port)
         return NULL;
+    port->loaded = loaded;
     port->axial_load = axial_load;
     port->step.stage = MSFP_NO_STEP;
     port->knots[0] = options->start_time;
     port->knots[1] = options->start_time + 1.0;
+    port->knots[2] = options->start_time + 2.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
     const int status = start(port, p, options, q);
     port->run = port->committed;
@@ -102,12 +105,17 @@ void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends
     run->options.duration = t;
     port->knots[0] = run->now.t;
     port->knots[1] = t;
+    port->knots[2] = t + h;
     msfp_base_path(&port->from, to, h, &port->motion);
+    attach_all(port, run); /* nothing of an earlier trial is left in the searches */
+    if (port->loaded) {
+        msfp_load_path(&port->from, to, h, &port->load);
+        return;
+    }
     msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
 #if MSFP_TOP_ROTATION
     msfp_support_path(&port->from, to, h, &port->support);
 #endif
-    attach_all(port, run); /* nothing of an earlier trial is left in the searches */
     /* The springs are fixed where end B is at the end: the load that its motion adds stays small beside the axial load. */
     run->now.energy += msfp_port_move_anchor(port, run, port->committed.rows[0].top, port->from.of[1][0], to->of[1][0]);
 }
@@ -194,6 +202,10 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
     for (int i = 0; i < 3; ++i)
         arm[i] = centre[i] - at->of[0][0][i];
     add_moment(arm, a, a + 3);
+    if (port->loaded) {
+        memcpy(b, at->of[1][0], sizeof at->of[1][0]);
+        return;
+    }
     /* The top plate exerts F and M on the interface, which hands them on to end B. */
     msfp_body_C_get(w->body[NB], centre);
     msfp_force_F_get(w->force[NB], b);
@@ -234,11 +246,11 @@ void msfp_port_revert(msfp_port *port)
 
 /* ---- snapshots: what the port adds, its checksum, and the snapshot of the committed run with one row ---- */
 
-int msfp_valid_ends(const double *ends)
+int msfp_valid_ends(const double *ends, int loaded)
 {
     if (!msfp_all_finite(ends, sizeof(msfp_ends) / sizeof *ends))
         return 0;
-    for (int end = 0; end < MSFP_ENDS; ++end) {
+    for (int end = 0; end < MSFP_ENDS - loaded; ++end) {
         const double *turn = ends + end * MSFP_ORDERS * MSFP_END_FREEDOMS + 3;
         if (!(sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]) <= MSFP_LARGEST_TURN))
             return 0;
@@ -276,7 +288,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
         return MSFP_E_SNAPSHOT;
     memcpy(&h, snapshot, sizeof h);
     memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
-    if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0]) ||
+    if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
         !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;

@@ -4,6 +4,9 @@
  * is [order][u_1..3 [m], rotation vector [rad]]: values, first and second derivatives. A wrench is force [N] and moment
  * [N m] that an end exerts on the bearing, about the present position of that end. End 0 is A, end 1 is B.
  *
+ * In a loaded two-port end B is free: in place of its motion stand the force [N] and the moment [N m] on the top plate at
+ * r_nn, with two derivatives, and its wrench is that load.
+ *
  * A trial goes from the committed state to a given motion of the ends at a later time, with the step control of a run
  * in between. It depends on nothing else, so that trials may be repeated in any order.
  */
@@ -22,9 +25,11 @@ typedef struct {
     double of[MSFP_ENDS][MSFP_ORDERS][MSFP_END_FREEDOMS];
 } msfp_ends;
 
-/* Piecewise polynomials of one piece. */
+/* Piecewise polynomials: a trial, and what begins at its end. With the second piece the end of a trial is exactly the
+ * motion given, as in a run over several pieces. */
+enum { MSFP_PORT_PIECES = 2 };
 typedef struct {
-    double coefficients[6][MSFP_DEGREE + 1];
+    double coefficients[MSFP_PORT_PIECES][6][MSFP_DEGREE + 1];
 } msfp_polynomials;
 
 /* A step by stages from the committed state: those of `committed.now` and `next`. */
@@ -43,11 +48,12 @@ struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
     msfp_ends from, to; /* motion of the ends in those states */
-    double knots[2];    /* of the trial [s] */
+    double knots[MSFP_PORT_PIECES + 1]; /* of the trial, and any later one [s] */
     msfp_polynomials motion, load;
 #if MSFP_TOP_ROTATION
     msfp_polynomials support;
 #endif
+    int loaded;        /* end B is free */
     double axial_load; /* that the interface carries at rest [N] */
     double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
@@ -60,9 +66,10 @@ struct msfp_port {
 /* ---- port.c ---- */
 
 /* A bearing at rest under the axial load [N], both ends at u = 0. The top's springs of `p` are the interface. q: as in
- * msfp_run_start, without tilts. The status is that of `committed`. The port is released by msfp_port_free, also after a
+ * msfp_run_start, without tilts. loaded: end B is free, and the axial load is zero. The status is that of `committed`. The port is released by msfp_port_free, also after a
  * failure; NULL: no memory. */
-msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q);
+msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
+                         int loaded);
 void msfp_port_free(msfp_port *port);
 /* Go from the committed state to the time `t` [s], not before it, at which the ends are at `to` [end][order][6]. At the
  * committed time `to` is the committed motion. Returns MSFP_OK, or a status: see port->run. */
@@ -81,7 +88,7 @@ void msfp_port_snapshot_write(const msfp_port *port, void *snapshot);
 /* Returns MSFP_OK, or MSFP_E_MEMORY or MSFP_E_SNAPSHOT, after which nothing has changed. */
 int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
 /* Whether the motion of the ends [end][order][6] is finite and no end is turned by more than MSFP_LARGEST_TURN. */
-int msfp_valid_ends(const double *ends);
+int msfp_valid_ends(const double *ends, int loaded);
 /* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
@@ -123,6 +130,8 @@ void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_p
  * is at the end of the step, and vertically at rest; and the axial load [N]. */
 void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const msfp_ends *to, double h,
                          double axial_load, msfp_polynomials *load);
+/* Load on the top plate of a loaded two-port over a step. */
+void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *load);
 #if MSFP_TOP_ROTATION
 /* Rotation psi, theta of end B over a step. */
 void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support);
@@ -140,5 +149,10 @@ void msfp_end_turns(const double rotation[2][3], double turns[3][3], double deri
  * held. direction: how displacements, rates and accelerations change together; (1, 0, 0) gives the tangent. Returns
  * MSFP_OK or a status, after which `derivative` is as it was. */
 int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative);
+/* The rows and wrenches [2][12] at the end of the last trial, its steps held, with freedom `column` moved along
+ * `direction` by minus and plus a step: differences give the derivative of anything that follows from them. Returns
+ * MSFP_OK or a status. */
+int msfp_port_beside(msfp_port *port, const double direction[MSFP_ORDERS], int column, double *step, msfp_row rows[2],
+                     double wrenches[2][MSFP_PORT_FREEDOMS]);
 
 #endif

@@ -217,6 +217,7 @@ static void set_histories(msfp_port *port, const msfp_ends *to, double h)
     msfp_run *run = &port->committed;
     port->knots[0] = run->now.t;
     port->knots[1] = run->now.t + h;
+    port->knots[2] = run->now.t + 2.0 * h;
     msfp_base_path(&port->from, to, h, &port->motion);
     msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
     run->motion.held = run->load.held = 0;

@@ -13,17 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 from support import ROOT, Array
+from support.example import example_bearing
 from support.replay import REPLAY, inputs
 
 from msfp_gen import (
-    Bearing,
-    Body,
     Effects,
     Layout,
     Motion,
     Scene,
     Solver,
-    Surface,
     Top,
     build_model,
     cli,
@@ -88,23 +86,10 @@ def values_header(prefix: Path, folder: Path) -> None:
 def example_scene() -> Scene:
     """The triple pendulum of the example as a scene."""
     found = values.example(ModelSpec(Layout.tfp(), Effects()))
-    bodies = [dict(zip(contract.names(contract.BODY), row, strict=True)) for row in found.bodies]
-    surfaces = [dict(zip(contract.names(contract.SURFACE), row, strict=True)) for row in found.surfaces]
-    inertia = ("inertia_transverse", "inertia_axial")
-    bearing = Bearing(
-        layout=Layout.tfp(),
-        base_height=bodies[0]["height"],
-        gravity=values.GRAVITY,
-        surfaces=[Surface(**row) for row in surfaces],
-        bodies=[
-            Body(**{k: v for k, v in row.items() if k not in inertia}, inertia=(row[inertia[0]], row[inertia[1]]))
-            for row in bodies[1:]
-        ],
-    )
     names = ("stiffness", "damping", "rotational_stiffness", "rotational_damping")
     top = dict(zip(contract.names(contract.TOP), found.top, strict=True))
     return Scene(
-        bearing=bearing,
+        bearing=example_bearing(),
         motion=Motion.ramp(values.ACCELERATION, values.DURATION),
         top=Top.rig(axial_load=values.LOAD, **{name: top[name] for name in names}),
         effects=Effects(),

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from support import ROOT
 from support.ends import BEARING, INTERFACE, LOAD, port, swing
+from support.example import example_bearing
 
-from msfp_gen import Solver, cli
+from msfp_gen import Solver, Top, TwoPort, cli
+from msfp_gen.embedding import values
 from msfp_gen.jit.compiler import find_compiler
 from msfp_gen.model.marshalling import bodies_and_surfaces, top_values
 
@@ -68,6 +70,36 @@ def test_what_it_refuses_is_named(program: Path) -> None:
     assert {what: status for what, status, _ in lines if "=" not in what} == dict.fromkeys(
         ("no handle", "nothing to commit", "no trial", "no duration", "no direction", "reverted"), "argument"
     )
+
+
+def printed(folder: Path, target: str, **flags: str) -> np.ndarray:
+    """The numbers that an example of the exported library prints."""
+    given = [f"{name}={value}" for name, value in flags.items()]
+    done = subprocess.run(["make", "-s", *given, target], cwd=folder, capture_output=True, text=True)
+    *lines, last = done.stdout.splitlines()
+    assert (done.returncode, done.stderr, last) == (0, "", "ok: the run reached its end"), done.stdout + done.stderr
+    return np.array([line.split() for line in lines[1:]], dtype=float)
+
+
+@pytest.mark.skipif(not all(map(shutil.which, ("make", "pkg-config"))), reason="make or pkg-config is not installed")
+def test_the_examples_of_the_library_print_what_python_computes(program: Path) -> None:
+    """In C, and where there is a compiler in Fortran."""
+    folder = program.parent / "msfp/share/msfp/examples"
+    found = printed(folder, "run-port", CFLAGS=" ".join(STRICT))
+    two_port = TwoPort(example_bearing(), Top.node(1e9, 3e8, 1e8, 1e4, 1e5, 1e4), values.LOAD)
+    w, u = np.pi, 0.5 * values.STROKE
+    for i, row in enumerate(found):
+        t, upper = 0.05 * (i + 1), np.zeros((3, 6))
+        upper[:, 0] = u * (1 - np.cos(w * t)), u * w * np.sin(w * t), u * w**2 * np.cos(w * t)
+        response = two_port.trial(t, np.zeros((3, 6)), upper)
+        wrench = response.wrench[1]
+        expected = [t, 1e3 * upper[0, 0], 1e-3 * wrench[0], 1e-3 * wrench[2], 1e-6 * response.tangent[6, 6]]
+        assert row == pytest.approx(expected, abs=1e-4)
+        two_port.commit()
+    assert len(found) == 40 and found[:, 2].max() > 50
+    if shutil.which("gfortran"):
+        flags = "-std=f2018 -O1 -Wall -Werror -pedantic -fcheck=all"
+        assert np.array_equal(printed(folder, "run-port-fortran", FFLAGS=flags), found)
 
 
 @pytest.mark.slow

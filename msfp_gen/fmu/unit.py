@@ -1,0 +1,183 @@
+"""`write_fmu`: a scene as a Functional Mock-up Unit."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import platform
+import re
+import shutil
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+
+from msfp_gen.common.output import check_output, write_bytes
+from msfp_gen.coupling.two_port import REST, check_parts, parts_of_rig, scene_at_rest
+from msfp_gen.embedding.rendering import render
+from msfp_gen.errors import CompileError, InputError
+from msfp_gen.fmu.content import model_content
+from msfp_gen.fmu.description import Unit, build_description, model_description
+from msfp_gen.fmu.variables import Variable, variables
+from msfp_gen.generator.interface import effects_text, model_name
+from msfp_gen.jit.library import build_shared
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.top import MassTop
+from msfp_gen.specification.layout import Auto
+from msfp_gen.version import __version__
+
+VERSIONS = (2, 3)
+KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}  # in the order of the schema
+SUFFIXES = (".fmu",)
+WRITTEN = ("fmu.c", "fmu_bearing.c", "fmu_state.c", "fmu_exchange.c", "fmu.h")
+DATE = (1980, 1, 1, 0, 0, 0)  # of the files in the archive: the same scene gives the same bytes
+_SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("win", ".dll")}
+_MACHINES = {"AMD64": "x86_64", "arm64": "aarch64"}
+
+
+@dataclass(frozen=True)
+class WrittenUnit:
+    """A unit that was written. kinds: "CoSimulation", "ModelExchange". inputs, outputs, parameters: their numbers."""
+
+    path: Path
+    model: str
+    kinds: tuple[str, ...]
+    variables: tuple[Variable, ...]
+
+
+def write_fmu(
+    scene: Scene,
+    path: Path | str,
+    *,
+    version: int = 2,
+    exchange: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> WrittenUnit:
+    """Write the unit of a scene: motion in and wrench out of a rig, or force in and motion out of a supported mass.
+
+    The values of the scene are the start values of its parameters; its motion and duration are not used. version: 2 or
+    3, of FMI. exchange: also for Model Exchange, of a supported mass. progress: called with a text and the completed
+    share, 0 to 1. Raises InputError: the scene has parts that a unit has not, the file cannot be written; CompileError.
+    """
+    target = check_output(path, SUFFIXES, "--output")
+    if version not in VERSIONS:
+        raise InputError(f"--fmi = {version!r}: give one of {', '.join(map(str, VERSIONS))}")
+    rest = scene_of_unit(scene)
+    if exchange:
+        _check_exchange(rest)
+    unit = _unit(rest, target.stem, version, exchange)
+    folder = Path(tempfile.mkdtemp(prefix="msfp-gen-fmu-"))
+    try:
+        content = _files(rest, unit, version, exchange, folder, progress or (lambda _, __: None))
+    except BaseException as error:
+        if not (isinstance(error, CompileError) and error.log):  # else the folder stays, with the log
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    shutil.rmtree(folder)
+    write_bytes(target, [_archive(content)])
+    return WrittenUnit(target, model_name(rest.spec), unit.kinds, tuple(unit.variables))
+
+
+def scene_of_unit(scene: Scene) -> Scene:
+    """The scene with the effects of the unit, at rest; raises InputError."""
+    if not isinstance(scene.top, MassTop):
+        return scene_at_rest(scene.bearing, *parts_of_rig(scene), scene.solver)
+    check_parts(scene)
+    effects = scene.effects
+    if isinstance(effects, Auto):
+        effects = effects.resolve(friction=scene.law[0])
+    if effects.dimension != "spatial" or effects.spin != "locked":
+        raise InputError(
+            f"effects: dimension = {effects.dimension!r}, spin = {effects.spin!r}: a unit moves in space, and its ends "
+            "transmit no torsion; give 'spatial' and 'locked'"
+        )
+    if scene.solver.method == "dopri5":
+        raise InputError("solver.method = 'dopri5': the steps of a unit are implicit; give 'implicit' or 'esdirk4'")
+    return Scene(scene.bearing, Motion(*REST), scene.top, effects=effects, solver=scene.solver, name=scene.name)
+
+
+def _check_exchange(scene: Scene) -> None:
+    effects, top = scene.modelled, scene.top
+    if not isinstance(top, MassTop):
+        raise InputError(
+            f"--type me: top.kind = {top.kind!r}: Model Exchange is of a supported mass; give 'mass', or --type cs"
+        )
+    if effects.sliders != "inertial" or effects.uplift:
+        raise InputError(
+            f"--type me: effects.sliders = {effects.sliders!r}, uplift = {effects.uplift}: Model Exchange needs the "
+            "rates of all bodies; give 'inertial' and no uplift, or --type cs"
+        )
+    if top.vertical_stiffness is not None or (effects.law is not None and effects.law.depends_on_temperature):
+        raise InputError(
+            "--type me: a vertical spring below the mass, and friction that depends on temperature, have states that "
+            "Model Exchange does not give; leave them out, or --type cs"
+        )
+
+
+def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
+    found = variables(scene, exchange)
+    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {found!r}"
+    digest = hashlib.sha256(what.encode())
+    for text in _written(version).values():
+        digest.update(text.encode())
+    inout = "force in, motion of a supported mass out" if isinstance(scene.top, MassTop) else "motion in, wrench out"
+    return Unit(
+        name=name,
+        identifier=re.sub(r"^(?=\d)|\W", "_", name, flags=re.ASCII),
+        token=f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}",
+        text=f"Multi-stage friction pendulum bearing (PEER 2017/07), {inout}; {effects_text(scene.spec)}",
+        kinds=tuple(kind for short, kind in KINDS.items() if short == "cs" or exchange),
+        tolerance=scene.solver.rtol,
+        variables=found,
+        sources=(),
+    )
+
+
+def _written(version: int) -> dict[str, str]:
+    """The C files of the unit that are the same for every scene."""
+    folder = files(__package__).joinpath("assets")
+    names = (*WRITTEN, f"fmi{version}.c")
+    return {name: folder.joinpath(name).read_text(encoding="utf-8") for name in names}
+
+
+def _files(
+    scene: Scene, unit: Unit, version: int, exchange: bool, folder: Path, progress: Callable[[str, float], None]
+) -> dict[str, bytes]:
+    """Content of the archive."""
+    content = model_content(scene, unit, exchange)
+    others = _written(version)
+    for name in ("fmu_model.h", "fmu_model.c"):
+        others[name] = render(name, content, __package__)
+    system, suffix = _SYSTEMS.get(sys.platform, ("linux", ".so"))
+    library = f"{unit.identifier}{suffix}"
+    sources = build_shared(scene.spec, others, f"fmi{version}*", library, folder, progress)
+    unit = replace(unit, sources=tuple(name for name in sources if name.endswith(".c")))
+    found = {"modelDescription.xml": model_description(unit, version)}
+    found[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
+    found |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    if version == 3:
+        found["sources/buildDescription.xml"] = build_description(unit)
+    page = {"unit": unit, "scene": scene, "stamp": content["stamp"], "effects": effects_text(scene.spec)}
+    found["documentation/index.html"] = render("index.html", page, __package__).encode()
+    return found
+
+
+def _platform(system: str, version: int) -> str:
+    """Name of the folder of the binary of this machine."""
+    machine = _MACHINES.get(platform.machine(), platform.machine())
+    if version == 2 and machine == "x86_64":
+        return f"{system}64"
+    return f"{machine}-{'windows' if system == 'win' else system}"
+
+
+def _archive(content: dict[str, bytes]) -> bytes:
+    found = io.BytesIO()
+    with zipfile.ZipFile(found, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
+    return found.getvalue()
