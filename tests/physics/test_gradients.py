@@ -131,6 +131,12 @@ def test_differences_with_the_same_steps_in_a_triple_pendulum(method: str) -> No
     check_frozen(triple(3.0, method=method), [*STACK, *RIG])
 
 
+def test_the_load_before_a_jump_counts_in_the_step_that_ends_there() -> None:
+    """A side load that jumps twice within a run, and a base that is set moving."""
+    load = Load.from_arrays([0.0, 0.2, 0.2, 0.5, 0.5, 0.7], np.outer([1.0, 1.0, -1.0, -1.0, 2.0, 2.0], [4e3, 0.0, 2e3]))
+    check_frozen(replace(triple(0.7), load=load), ["load.scale", "motion.scale"])
+
+
 @pytest.mark.slow
 def test_differences_with_the_same_steps_in_a_double_pendulum_below_a_mass() -> None:
     check_frozen(double(), [*STACK, *MASS], 5e-5)
