@@ -209,6 +209,20 @@ def test_rotated_turns_the_horizontal_channels():
         Motion.from_arrays(TIME, WAVY, WAVY).rotated(0.1)
 
 
+@pytest.mark.parametrize("shift", [1e-15, -1e-15, 5e-10, -5e-10])
+def test_durations_that_differ_by_rounding_add(shift):
+    """Sums of steps in floating point: their ends are one time, in a sum of either order."""
+    time, wave = np.linspace(0.0, 2.0, 21), np.sin(np.linspace(0, np.pi, 21))[:, None] ** 3
+    one = Motion.from_arrays(time, wave * [0.01, 0.0, 0.0])
+    other = Motion.from_arrays(time * (1 + shift / 2), wave * [0.0, 0.02, 0.0])
+    for first, second in ((one, other), (other, one)):
+        both = first + second
+        assert both.duration == first.duration
+        np.testing.assert_allclose(both.displacement(1.0), [0.01, 0.02, 0.0], atol=1e-9)
+    with pytest.raises(InputError, match="lengthen the shorter one"):
+        one + Motion.from_arrays(time * (1 + 1e-8), wave * [0.01, 0.0, 0.0])
+
+
 def test_sum_adds(every):
     t = np.linspace(0, 6, 99)
     x, y = Motion.from_arrays(TIME, WAVY), Motion.from_acceleration(np.linspace(0, 6, 13), np.ones((13, 3)))
