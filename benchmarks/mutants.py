@@ -71,6 +71,7 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
     "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),
     "*/runtime/port/*": ("tests/unit/coupling/test_two_port.py", "tests/physics/test_two_port.py"),
+    "*/runtime/api/two_port.c": ("tests/unit/coupling/test_two_port.py", "tests/unit/embedding/test_two_port_in_c.py"),
     "*/runtime/api/*": ("tests/unit/test_python_users.py", "tests/unit/embedding/test_library.py"),
 }
 GOLDEN = "tests/unit/generator/test_golden.py"

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "acceleration": "from_acceleration"}
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Motion(Trajectory):
     """Motion of the ground and of the base, twice continuously differentiable except at declared `jumps`.
 

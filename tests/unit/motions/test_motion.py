@@ -10,6 +10,7 @@ import pytest
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Load
 from msfp_gen.motions.records import bundled, read_record
 
 TIME = np.linspace(0.0, 6.0, 61)
@@ -221,6 +222,14 @@ def test_durations_that_differ_by_rounding_add(shift):
         np.testing.assert_allclose(both.displacement(1.0), [0.01, 0.02, 0.0], atol=1e-9)
     with pytest.raises(InputError, match="lengthen the shorter one"):
         one + Motion.from_arrays(time * (1 + 1e-8), wave * [0.01, 0.0, 0.0])
+
+
+def test_histories_print_in_one_line():
+    """Not their arrays, of which a record has thousands of numbers."""
+    assert (
+        repr(Motion.from_arrays(TIME, WAVY, name="wavy")) == f"Motion wavy: {TIME[-1]:.6g} s in {len(TIME) - 1} pieces"
+    )
+    assert repr(Load.constant((1.0, 0.0, 0.0))) == "Load without a name: 1 s in 1 pieces"
 
 
 def test_sum_adds(every):
