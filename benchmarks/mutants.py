@@ -54,7 +54,11 @@ CHOSEN: dict[str, tuple[str, ...]] = {
     "generator/latex.py": ("tests/unit/generator",),
     "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
     "generator/assembled.py": ("tests/unit/generator",),
-    "generator/hysteresis.py": (EQUATIONS, "tests/physics/test_hysteresis.py"),
+    "generator/hysteresis.py": (
+        EQUATIONS,
+        "tests/physics/test_friction_laws.py",
+        "tests/physics/test_hysteresis.py",
+    ),
     "generator/heat.py": ("tests/physics/test_friction_laws.py",),
     "generator/laws.py": ("tests/physics/test_friction_laws.py",),
     "generator/seat.py": ("tests/physics/test_uplift.py",),
