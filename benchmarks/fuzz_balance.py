@@ -89,7 +89,7 @@ def worst_row(scene: Scene, sequence: RunSequence, history: History) -> float:
 def halved(scene: Scene, whole: Result) -> dict[str, Any]:
     """The run again with half of its longest step. Where the two differ, one of a smaller tolerance decides."""
     longest = float(np.diff(whole.history.time, prepend=0.0).max())
-    solver = replace(scene.solver, max_step=0.5 * longest)
+    solver = replace(scene.solver, max_step=0.5 * longest, first_step=None)
     half = succeeded(replace(scene, solver=solver))
     if half is None:
         return {"halved": None, "verdict": "failed"}

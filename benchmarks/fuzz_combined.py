@@ -30,6 +30,7 @@ COMBINED: list[tuple[Layers, dict[str, Any]]] = [
     ((5, 2, 2), PLANAR | MASSLESS),
     ((5, 2, 2), {"friction": "velocity"}),
     ((5, 2, 2), PLANAR | {"friction": "pvt"}),
+    ((5, 2, 2), {"friction": "pvt", "bouc_wen": "plastic"}),
     ((5, 2, 2), {"friction": "custom", "friction_law": BOUNDED}),
     ((5, 2, 2), PLANAR | {"friction": "custom", "friction_law": FADING}),
     ((5, 2, 2), PLANAR | {"uplift": True}),
@@ -46,7 +47,20 @@ SHARE_SELECTED = 0.2  # scenes whose effects are selected automatically
 SHARE_TOML = 0.25  # scenes that go through TOML text with units
 LONGEST = 8.0  # [s]
 ATTEMPTS = 50
-UNITS = {"radius": (1e3, "mm"), "capacity": (1e2, "cm"), "height": (1e3, "mm"), "axial_load": (1e-3, "kN")}
+SHARE_HEATED = 0.3  # of the scenes whose effects are selected, with parameters of a law of pressure and temperature
+UNITS = {
+    "radius": (1e3, "mm"),
+    "capacity": (1e2, "cm"),
+    "height": (1e3, "mm"),
+    "yield_displacement": (1e6, "um"),
+    "axial_load": (1e-3, "kN"),
+    "stiffness": (1e-6, "kN/mm"),
+    "rotational_stiffness": (1e-3, "kN*m/rad"),
+    "rim_stiffness": (1e-6, "MN/m"),
+    "mass": (1e3, "g"),
+    "duration": (1e3, "ms"),
+    "output_step": (1e3, "ms"),
+}
 
 
 def case(seed: int, number: int) -> Case:
@@ -65,7 +79,8 @@ def a_scene(draw: Draw, name: str) -> Scene:
     selected = draw.chance(SHARE_SELECTED)
     layout, words = draw.one(SELECTED if selected else COMBINED)
     effects = Effects(**words)
-    bearing = a_bearing(draw, layout, effects.friction, (0.35, 0.8) if layout[0] < 10 else (0.8, 0.95))
+    law = "pvt" if selected and draw.chance(SHARE_HEATED) else effects.friction
+    bearing = a_bearing(draw, layout, law, (0.35, 0.8) if layout[0] < 10 else (0.8, 0.95))
     bearing = lawful(draw, bearing, effects)
     axis = draw.one([0.0, draw.flat(0.0, 3.1)])
     plane = axis if effects.dimension == "planar" or draw.chance(0.2) else None
@@ -77,9 +92,9 @@ def a_scene(draw: Draw, name: str) -> Scene:
         motion,
         top,
         Auto(**words) if selected else effects,
-        Solver(rtol=draw.decades((1e-5, 1e-3)), max_steps=100_000),
+        a_solver(draw),
         duration=draw.one([None, draw.flat(0.3, 1.0) * motion.duration]),
-        initial_state=None if isinstance(top, RigTop) or not draw.chance(0.3) else a_state(draw, bearing, plane),
+        initial_state=a_state(draw, bearing, top, plane) if draw.chance(0.3) else None,
         output_step=draw.one([None, None, 0.01, 0.0137]),
         stop=draw.one([None] * 6 + [Stop(displacement=0.5 * reach(bearing)), Stop(all_rims=True)]),
         load=a_load(draw, load_of(top), motion.duration, plane) if draw.chance(0.7) else None,
@@ -230,12 +245,27 @@ def a_rotation(draw: Draw, duration: float) -> Rotation:
     return draw.one(kinds) + draw.one(kinds) if draw.chance(0.3) else draw.one(kinds)
 
 
-def a_state(draw: Draw, bearing: Bearing, plane: float | None) -> InitialState:
-    """A displaced and partly sheared start, at rest; not of rigs, whose springs would throw it."""
-    share = [0.3 * s.capacity / s.radius * draw.flat(-1, 1) for s in bearing.surfaces]
+def a_solver(draw: Draw) -> Solver:
+    """Both implicit methods, some with a longest or a first step."""
+    return Solver(
+        draw.one(["implicit"] * 5 + ["esdirk4"]),
+        draw.decades((1e-5, 1e-3)),
+        max_step=draw.decades((0.01, 1.0)) if draw.chance(0.1) else None,
+        first_step=draw.decades((1e-7, 0.1)) if draw.chance(0.1) else None,
+        max_steps=100_000,
+    )
+
+
+def a_state(draw: Draw, bearing: Bearing, top: Top, plane: float | None) -> InitialState:
+    """A displaced and partly sheared start, some of them moving; nearly centred under a rig, whose springs would throw it."""
+    most, rate = 0.3, draw.decades((1e-3, 0.3)) if draw.chance(0.3) else 0.0
+    if isinstance(top, RigTop):  # springs of about the axial load
+        most *= min(1.0, top.axial_load / (top.stiffness * reach(bearing)))
+    share = [most * s.capacity / s.radius * draw.flat(-1, 1) for s in bearing.surfaces]
     q = [(0.0, x, 0.0) if plane is not None else (x * draw.flat(-1, 1), x, 0.0) for x in share]
+    v = [(0.0 if plane is not None else rate * draw.flat(-1, 1), rate * draw.flat(-1, 1), 0.0) for _ in share]
     h = [(draw.flat(-0.6, 0.6), 0.0 if plane is not None else draw.flat(-0.6, 0.6)) for _ in share]
-    return InitialState(q, [(0.0, 0.0, 0.0)] * len(q), h)
+    return InitialState(q, v, h)
 
 
 # ---- text

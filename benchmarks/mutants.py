@@ -3,10 +3,11 @@
     python benchmarks/mutants.py --count 100 --seed 1
 
 Mutants are drawn evenly from the parts of PARTS: generator, runtime (C), simulation and results. Each is made in a copy
-of the checkout. First the test files run that import the changed module, then those of its part, until the first
-failure. They are a choice of the fast suite, since a change of generator or runtime builds every model anew; --suite
-runs all of it, --quick only the first. A mutant that survives and changes a number asks for a test; --output writes the
-list as JSON. The exit code is 1 if the tests fail without a mutant.
+of the checkout. First the test files run that import the changed module, or those of CHOSEN for its folder or file, then
+those of its part, until the first failure. They are a choice of the fast suite, since a change of generator or runtime
+builds every model anew; --suite runs all of it, --quick only the first. Golden files are left out: they hold the text
+of the generator, so that any change fails and none is judged. A mutant that survives and changes a number asks for a
+test; --output writes the list as JSON and goes on with one that was begun. The exit code is 1 if the tests fail without a mutant.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -39,24 +41,44 @@ class Part:
     builds: bool = False
 
 
+EQUATIONS = "tests/physics/test_equations.py"
+RUNS = "tests/physics/test_runs.py"
 PARTS = {
-    "generator": Part("generator/*.py", ("tests/unit/generator", "tests/physics/test_equations.py"), True),
-    "runtime": Part(
-        "msfp_gen/runtime/**/*.c",
-        (
-            "tests/physics/test_runs.py",
-            "tests/hard/test_convergence.py",
-            "tests/physics/test_loads.py",
-            "tests/hard/test_rims.py",
-            "tests/hard/test_ladder.py",
-            "tests/physics/test_quasistatic.py",
-            "tests/physics/test_uplift.py",
-        ),
-        True,
-    ),
+    "generator": Part("generator/*.py", (EQUATIONS, "tests/unit/generator"), True),
+    "runtime": Part("msfp_gen/runtime/**/*.c", (RUNS, "tests/physics/test_loads.py"), True),
     "simulation": Part("msfp_gen/simulation/*.py", ("tests/unit/simulation",)),
     "results": Part("msfp_gen/results/**/*.py", ("tests/unit/results", "tests/unit/simulation/test_stream.py")),
 }
+# Pattern of files that no test imports -> the tests of what they compute, those first that build few models.
+CHOSEN: dict[str, tuple[str, ...]] = {
+    "generator/latex.py": ("tests/unit/generator",),
+    "generator/interface.py": ("tests/unit/generator", "tests/unit/embedding/test_library.py"),
+    "generator/assembled.py": ("tests/unit/generator",),
+    "generator/hysteresis.py": (
+        EQUATIONS,
+        "tests/physics/test_friction_laws.py",
+        "tests/physics/test_hysteresis.py",
+    ),
+    "generator/heat.py": ("tests/physics/test_friction_laws.py",),
+    "generator/laws.py": ("tests/physics/test_friction_laws.py",),
+    "generator/seat.py": ("tests/physics/test_uplift.py",),
+    "generator/top*.py": (EQUATIONS, "tests/physics/test_vertical_compliance.py"),
+    "generator/gradients.py": ("tests/physics/test_gradients.py",),
+    "generator/columns.py": (EQUATIONS, "tests/physics/test_gradients.py"),
+    "*/runtime/equations/heat.c": ("tests/physics/test_friction_laws.py",),
+    "*/runtime/equations/*uplift.c": ("tests/physics/test_uplift.py",),
+    "*/runtime/equations/contact_unilateral.c": ("tests/physics/test_uplift.py",),
+    "*/runtime/equations/*": (EQUATIONS, "tests/physics/test_reference.py"),
+    "*/runtime/steppers/quasistatic.c": ("tests/physics/test_quasistatic.py",),
+    "*/runtime/steppers/*": ("tests/hard/test_convergence.py", "tests/unit/runtime/test_esdirk.py"),
+    "*/runtime/run/monitors.c": ("tests/unit/simulation/test_auto.py", "tests/physics/test_friction_laws.py"),
+    "*/runtime/run/*": (RUNS, "tests/hard/test_limits.py", "tests/hard/test_rims.py", "tests/hard/test_ladder.py"),
+    "*/runtime/gradients/*": ("tests/physics/test_gradients.py", "tests/unit/simulation/test_gradients.py"),
+    "*/runtime/port/*": ("tests/unit/coupling/test_two_port.py", "tests/physics/test_two_port.py"),
+    "*/runtime/api/two_port.c": ("tests/unit/coupling/test_two_port.py", "tests/unit/embedding/test_two_port_in_c.py"),
+    "*/runtime/api/*": ("tests/unit/test_python_users.py", "tests/unit/embedding/test_library.py"),
+}
+GOLDEN = "tests/unit/generator/test_golden.py"
 PATIENCE = 5.0  # a mutant may take that many times longer than the tests without one; a hang is seen
 
 
@@ -68,7 +90,7 @@ class Mutant:
     path: str
     line: int
     start: int
-    end: int
+    stop: int
     before: str
     after: str
 
@@ -76,7 +98,7 @@ class Mutant:
         return f"{self.path}:{self.line}: {self.before} -> {self.after}"
 
     def applied(self, text: str) -> str:
-        return text[: self.start] + self.after + text[self.end :]
+        return text[: self.start] + self.after + text[self.stop :]
 
 
 # ---- changes
@@ -170,8 +192,10 @@ def drawn(count: int, seed: int, parts: list[str]) -> list[Mutant]:
     return [mutants[i] for i in range(longest) for mutants in found if i < len(mutants)][:count]
 
 
-def importing(path: str) -> tuple[str, ...]:
-    """Files of unit tests and hard cases that import the module at a path; of runtime and generator none is named."""
+def near(path: str) -> tuple[str, ...]:
+    """Tests of the module at a path: those of CHOSEN, else the files of unit tests and hard cases that import it."""
+    if chosen := next((tests for pattern, tests in CHOSEN.items() if fnmatch(path, pattern)), None):
+        return chosen
     module = path.removesuffix(".py").replace("/", ".")
     name = re.compile(
         rf"from {re.escape(module)} import|{re.escape(module.rpartition('.')[0])} import .*\b{Path(path).stem}\b"
@@ -185,10 +209,10 @@ def importing(path: str) -> tuple[str, ...]:
 
 
 class Copy:
-    """A copy of the tracked files, in which one mutant at a time is tested."""
+    """A copy of the tracked files, in which one mutant at a time is tested, up to a limit of time [s] or a measured one."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.times = folder, dict[tuple[str, ...], float]()
+    def __init__(self, folder: Path, limit: float | None) -> None:
+        self.folder, self.limit, self.times = folder, limit, dict[tuple[str, ...], float]()
         listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
         for name in filter(None, listed.split("\0")):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -197,6 +221,7 @@ class Copy:
     def tested(self, part: str, tests: tuple[str, ...], limit: float | None) -> str:
         """How tests end: "passed", "failed" or "hung"."""
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-m", "not slow", "-p", "no:cacheprovider"]
+        command += [f"--ignore={GOLDEN}"] if GOLDEN not in tests else []
         cache = self.folder / "models" if PARTS[part].builds else ROOT / "build" / "models"
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "MSFP_GEN_CACHE": str(cache)}
         with subprocess.Popen(
@@ -217,24 +242,30 @@ class Copy:
         if self.tested(part, tests, None) != "passed":
             raise RuntimeError(f"{' '.join(tests)} fail without a mutant")
         self.times[tests] = time.perf_counter() - begin
-        shutil.rmtree(self.folder / "models", ignore_errors=True)
+        self.forget()
+
+    def forget(self) -> None:
+        """Delete the models of a mutant; what Cython made of the wrapper stays."""
+        for entry in (self.folder / "models").glob("msfp_*"):
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
     def end_of(self, mutant: Mutant, stages: list[tuple[str, ...]]) -> str:
         """How the tests end with a mutant: those of each stage, until one fails."""
-        for tests in stages:
+        for tests in filter(None, stages if self.limit is None else []):
             self.measure(mutant.part, tests)
         file = self.folder / mutant.path
         text = file.read_text(encoding="utf-8")
         file.write_text(mutant.applied(text), encoding="utf-8")
         try:
-            for tests in stages:
-                end = self.tested(mutant.part, tests, 60.0 + PATIENCE * self.times[tests])
+            for tests in filter(None, stages):
+                limit = 60.0 + PATIENCE * self.times[tests] if self.limit is None else self.limit
+                end = self.tested(mutant.part, tests, limit)
                 if end != "passed":
                     return end
             return "survived"
         finally:
             file.write_text(text, encoding="utf-8")
-            shutil.rmtree(self.folder / "models", ignore_errors=True)
+            self.forget()
 
 
 def main(words: list[str] | None = None) -> int:
@@ -247,6 +278,7 @@ def main(words: list[str] | None = None) -> int:
     group.add_argument("--suite", action="store_true", help="the whole fast suite for every mutant")
     group.add_argument("--quick", action="store_true", help="only the tests that import the changed module")
     parser.add_argument("--list", action="store_true", help="print the mutants, and test none")
+    parser.add_argument("--limit", type=float, help="time of a stage of tests [s], in place of one measured beforehand")
     parser.add_argument("--output", type=Path, help="JSON file for the mutants and how their tests ended")
     given = parser.parse_args(words)
     mutants = drawn(given.count, given.seed, given.part or list(PARTS))
@@ -254,13 +286,15 @@ def main(words: list[str] | None = None) -> int:
         print(*mutants, sep="\n")
         return 0
     rows: list[dict[str, object]] = []
+    if given.output is not None and given.output.exists():
+        rows = json.loads(given.output.read_text(encoding="utf-8"))
+    mutants = [mutant for mutant in mutants if not any(asdict(mutant).items() <= row.items() for row in rows)]
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        copy = Copy(Path(folder))
+        copy = Copy(Path(folder), given.limit)
         for mutant in mutants:
-            near, part = importing(mutant.path), PARTS[mutant.part].tests
-            stages = (
-                [("tests",)] if given.suite else [near or part] if given.quick else [near, part] if near else [part]
-            )
+            first, rest = near(mutant.path), PARTS[mutant.part].tests
+            rest = tuple(name for name in rest if name not in first)
+            stages = [("tests",)] if given.suite else [first or rest] if given.quick else [first, rest]
             try:
                 rows.append({**asdict(mutant), "end": copy.end_of(mutant, stages)})
             except RuntimeError as error:

@@ -13,6 +13,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise, samples, waveforms
 from msfp_gen.motions.checks import positive
 from msfp_gen.motions.piecewise import Pieces
+from msfp_gen.motions.time_grid import matched, snapped
 from msfp_gen.motions.trajectory import CHANNELS, Trajectory
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 _BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "acceleration": "from_acceleration"}
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Motion(Trajectory):
     """Motion of the ground and of the base, twice continuously differentiable except at declared `jumps`.
 
@@ -98,9 +99,16 @@ class Motion(Trajectory):
         )
 
     def __add__(self, other: Motion) -> Motion:
-        """Sum of two motions on their merged knots. Raises InputError unless both have the same duration (`held`)."""
+        """Sum of two motions on their merged knots. Raises InputError unless both have the same duration (`held`).
+
+        Durations that differ by less than any step are the same; the sum has that of the first.
+        """
         if not isinstance(other, Motion):
             return NotImplemented
+        end = self.knots[-1:]
+        if other.duration != self.duration and matched(other.knots[-1:], end) == end:
+            knots, coefficients = snapped(other.knots, other.coefficients, end)
+            other = replace(other, knots=knots, coefficients=coefficients, jumps=matched(other.jumps, end))
         if self.duration != other.duration:
             raise InputError(
                 f"motion: durations {self.duration:g} s and {other.duration:g} s differ; "

@@ -161,3 +161,8 @@ def azimuth(knots: Array, horizontal: Array) -> float | None:
     angle = float(np.arctan2(directions[0, 1], directions[0, 0]))
     angle -= np.pi * round(angle / np.pi)
     return angle if angle > -np.pi / 2 + 1e-12 else angle + np.pi
+
+
+def summary(history: object, name: str, knots: Array) -> str:
+    """Kind, name, duration and number of pieces of a history, in one line."""
+    return f"{type(history).__name__} {name or 'without a name'}: {knots[-1]:.6g} s in {len(knots) - 1} pieces"

@@ -19,7 +19,7 @@ from msfp_gen.motions.time_grid import Resolution
 from msfp_gen.motions.waveforms import product, sine, smoothstep, wave_knots
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Prescribed:
     """Piecewise polynomials in time; after their end the channels keep the last value.
 
@@ -113,6 +113,10 @@ class Prescribed:
         rest[0, :, 0] = self.evaluate(self.duration)
         return replace(self, knots=np.append(self.knots, end), coefficients=np.concatenate([self.coefficients, rest]))
 
+    def __repr__(self) -> str:
+        """Name, duration and number of pieces."""
+        return piecewise.summary(self, self.name, self.knots)
+
     def __add__(self, other: Self) -> Self:
         """Sum of two histories of the same kind; the result lasts as long as the longer one."""
         if type(self) is not type(other):
@@ -149,7 +153,7 @@ class Prescribed:
         return cls(knots, piecewise.hermite5(knots, *(wave[:, :, None] * finite(cls.WORD, values))))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Load(Prescribed):
     """Force F1, F2, F3 [N] and moment M1, M2, M3 [N m] on the top plate at r_nn, in addition to those of the `Top`.
 
@@ -215,7 +219,7 @@ class Load(Prescribed):
         return cls(*sampled_linear("load", time, np.hstack(rows)), name)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rotation(Prescribed):
     """Rotation of a plate as a function of time: psi about E1, then theta about the rotated axis E2 [rad] (2.1).
 

@@ -25,7 +25,7 @@ _ROCKING_PLANES: dict[tuple[bool, ...], tuple[float, int]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Data and evaluation of a `Motion`, whose docstring describes the fields. Raises InputError as `Motion` does."""
 
@@ -44,6 +44,10 @@ class Trajectory:
         object.__setattr__(self, "metadata", dict(self.metadata))
         if self.max_step is not None:
             positive("max_step", self.max_step)
+
+    def __repr__(self) -> str:
+        """Name, duration and number of pieces."""
+        return piecewise.summary(self, self.name, self.knots)
 
     def _key(self) -> tuple[object, ...]:
         arrays = (self.knots, self.coefficients, self.jumps)

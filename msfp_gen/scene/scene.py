@@ -9,6 +9,7 @@ from msfp_gen.common.fields import check_fields, require_type
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
+from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
@@ -89,6 +90,11 @@ class Scene(SceneParts):
             raise InputError(
                 f"duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, or "
                 "hold the motion at its end (motion.hold in a scene file, motion.held(...) in Python)"
+            )
+        if self.end <= TIME_TOLERANCE:
+            raise InputError(
+                f"duration = {self.end:.3g}: no step is shorter than {TIME_TOLERANCE:g} s; give a longer duration or a "
+                "slower motion"
             )
         word, law = self.law
         if law is not None and law.depends_on_temperature and self.end > HEAT_TIMES[1]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.scene.top import MassTop
+from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.simulation.effect_switching import JAM_STATUSES
 from msfp_gen.specification.contract import STATUSES
 
@@ -20,6 +20,11 @@ MASSLESS = (  # docs/model.md, choice 10
     "; the sliders are massless: where forces depend on rates, only inertia determines how the surfaces share the "
     "motion; give effects.sliders = 'inertial'"
 )
+PULLED = (
+    "; the springs of the rig are anchored above the base and pull the displaced top at once: lower top.stiffness, or "
+    "leave out initial_state"
+)
+AT_ONCE = 1e-3  # [s]; a failure before is one of the initial state
 OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to overturn [rad]
 
 
@@ -32,7 +37,14 @@ def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None
         where += f", {found.quantity} = {value:.4g}"
     text = f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {cause or found.failure}"
     text += _state(scene, model, run) if found.motion and run.row_count else ""
+    text += PULLED if _pulled(scene, run) else ""
     return text + (MASSLESS if _inertia_missing(scene, model, status) else "")
+
+
+def _pulled(scene: Scene, run: Run) -> bool:
+    """Whether a run failed at once from a displaced state under a rig, whose springs are anchored above the base."""
+    state = scene.initial_state
+    return isinstance(scene.top, RigTop) and run.time < AT_ONCE and state is not None and bool(np.any(state.q))
 
 
 def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:

@@ -181,8 +181,11 @@ def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
 
 
 def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
-    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift."""
-    names = REQUIRED_EFFECTS.get(kind, {**REQUIRED_EFFECTS["inertia"], **REQUIRED_EFFECTS["uplift"]})
+    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift.
+
+    The monitors of a friction law change none, whatever another monitor changes at the same time.
+    """
+    names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
     return [
         f"{name} = {getattr(after, name)}"
         for name in names

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from contextlib import closing
 from io import StringIO
 from pathlib import Path
@@ -20,6 +21,7 @@ from support import ROOT, endless, hearing
 
 from msfp_gen import InputError, changed_scene, load_scene, simulate
 from msfp_gen.cli import main
+from msfp_gen.cli.interrupts import signals_as_interrupts
 from msfp_gen.motions import records
 from msfp_gen.result import Result
 from msfp_gen.scene.file.motion_tables import _record
@@ -172,6 +174,26 @@ def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:
     assert Result.from_netcdf(tmp_path / "runs" / "1-fenz-test1.nc").status == "ok"
     assert [run["source"] for run in json.loads(out)] == ["fenz-test1"]
     assert [row["scene"] for row in csv.DictReader(StringIO(Path(table).read_text(encoding="utf-8")))] == ["fenz-test1"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_in_a_callback_is_not_lost(number: signal.Signals) -> None:
+    """Python ignores it there; libraries that read and write files have such callbacks."""
+
+    class Item:
+        pass
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    item = Item()
+    reference = weakref.ref(item, lambda _: signal.raise_signal(number))
+    begin = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt), signals_as_interrupts():
+            del item
+            time.sleep(10)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert reference() is None and time.monotonic() - begin < 5
 
 
 def test_a_table_needs_a_known_suffix(tmp_path: Any) -> None:

@@ -422,15 +422,19 @@ def test_a_coefficient_below_zero_ends_the_run(method: str) -> None:
 def test_a_velocity_beyond_the_checked_range_is_noted() -> None:
     noted = [note for note in simulate(falling_law(2.6, slope=0.1)).notes if note.kind == "law_speed"]
     assert len(noted) == 1 and noted[0].value > 2.0 and "checked up to 2 m/s" in noted[0].line
+    assert noted[0].surface in (1, 4)  # the outer surfaces slide
     assert not [note for note in simulate(falling_law(1.0, slope=0.1)).notes if note.kind.startswith("law")]
 
 
 def test_a_force_and_a_temperature_beyond_the_checked_range_are_noted() -> None:
-    heavy = lawful(scene_of("fenz-test2", duration=2.0), "pvt", reference_pressure=P_REF, patch_radius=0.01)
-    kinds = {note.kind: note.value for note in simulate(heavy).notes}
-    assert kinds["law_load"] > 2e8 * np.pi * 0.01**2
-    hot = lawful(scene_of("fenz-test2", duration=2.0), "pvt", reference_pressure=P_REF, start_temperature=601.0)
-    assert {note.kind: note.value for note in simulate(hot).notes}["law_temperature"] > 600
+    """With the surface that leaves the range, here the third alone."""
+    scene = scene_of("fenz-test2", duration=2.0)
+    heavy = lawful(scene, "pvt", reference_pressure=P_REF, patch_radius=[0.05, 0.05, 0.01, 0.05])
+    notes = {note.kind: note for note in simulate(heavy).notes}
+    assert notes["law_load"].value > 2e8 * np.pi * 0.01**2 and notes["law_load"].surface == 3
+    hot = lawful(scene, "pvt", reference_pressure=P_REF, start_temperature=[20.0, 20.0, 601.0, 20.0])
+    notes = {note.kind: note for note in simulate(hot).notes}
+    assert notes["law_temperature"].value > 600 and notes["law_temperature"].surface == 3
 
 
 def test_one_evaluation_refuses_a_coefficient_below_zero() -> None:

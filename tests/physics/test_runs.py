@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from reference import energy, kinematics
 from reference.friction_circle import Push
 from reference.parameters import fenz
 from reference.quasi_static import follow
@@ -281,3 +282,22 @@ def test_moments_that_lock_the_spin_do_work() -> None:
     scene = Scene(bearing=bearing, motion=motion, top=top, effects=Effects(), solver=Solver(rtol=1e-5))
     closure = simulate(scene).summary["energy"]["closure_error"]
     assert closure < 1e-3, closure
+
+
+def test_kinetic_energy_is_that_of_the_reference() -> None:
+    """Bodies that spin and swing until friction stops them: translation, swing and spin, each with its inertia."""
+    bearing = presets.bearing("fenz-tfp")
+    rates = [(0.2, 0.1, 30.0), (-0.1, 0.2, -40.0), (0.1, -0.2, 50.0), (0.0, 0.1, 20.0)]
+    start = InitialState(np.zeros((4, 3)), rates, np.zeros((4, 2)))
+    still = Motion(knots=[0.0, 0.02], coefficients=np.zeros((1, 6, 6)))
+    effects = Effects(spin="patch", bouc_wen="report")
+    top = Top.prescribed((0.0, 0.0, -LOAD))
+    history = simulate(Scene(bearing, still, top, effects, Solver(rtol=1e-6), initial_state=start)).history
+    rows = range(0, len(history.time), len(history.time) // 8)
+    states = [
+        kinematics.State(history.tilt_angles[i], history.tilt_rates[i], history.tilt_accelerations[i]) for i in rows
+    ]
+    expected = np.array([energy.kinetic_energy(bearing, state) for state in states])
+    found = history.energy["kinetic"][rows]
+    assert np.ptp(found) > 0.5 * expected[0]
+    assert found == pytest.approx(expected - expected[0], abs=1e-9 * expected[0])

@@ -56,6 +56,8 @@ ROWS = [
     ("effects.spin", "fixed", ("effects.spin = 'fixed'", "'locked'", "'patch'", "'free'")),
     ("effects.rims", "yes", ("effects.rims = 'yes'", "True, False")),
     ("top", {"kind": "prescribed", "force": [0, 0]}, ("top.force = [0, 0]", "3 finite numbers [N]")),
+    # shorter than any step
+    ("motion.frequency", 1e16, ("duration = ", "no step is shorter than 1e-09 s", "slower motion")),
     # wrong units
     ("bearing.surfaces.0.radius", "473 kg", ("bearing.surfaces[0].radius = '473 kg' (surface 1)", "[m]")),
     ("bearing.surfaces.0.radius", "473", ("bearing.surfaces[0].radius = '473'", "names no unit", "[m]")),

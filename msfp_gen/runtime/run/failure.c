@@ -141,6 +141,6 @@ int msfp_classify_failure(msfp_run *run, int status)
 int msfp_classify_failure(msfp_run *run, int status)
 {
     (void)run;
-    return status;
+    return status == MSFP_E_FINITE ? MSFP_E_NEWTON : status; /* as above */
 }
 #endif

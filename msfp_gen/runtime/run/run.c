@@ -14,7 +14,7 @@ enum {
 static const double smallest_step = 1e-9;     /* [s], far below any period of a bearing; closer times count as equal */
 static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
 
-int msfp_consistent_initial_state(msfp_run *run)
+static int solve_initial_state(msfp_run *run)
 {
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
@@ -47,6 +47,18 @@ int msfp_consistent_initial_state(msfp_run *run)
     run->restart = 1;
     msfp_quasistatic_begin(run, &at);
     return msfp_check_state(run, &run->work, &run->now);
+}
+
+/* Where all that is given is finite and no solution is, Newton's method has diverged. */
+int msfp_consistent_initial_state(msfp_run *run)
+{
+    const int status = solve_initial_state(run);
+    msfp_point at;
+    if (status != MSFP_E_FINITE)
+        return status;
+    msfp_to_point(run, &run->now, &at);
+    const int given = msfp_all_finite(&at.base[0][0], 18) && msfp_all_finite(at.load, 6);
+    return given ? MSFP_E_NEWTON : status;
 }
 
 /* Copy a history without the state of its last search. */

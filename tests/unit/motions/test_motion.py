@@ -10,6 +10,7 @@ import pytest
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.prescribed import Load
 from msfp_gen.motions.records import bundled, read_record
 
 TIME = np.linspace(0.0, 6.0, 61)
@@ -207,6 +208,28 @@ def test_rotated_turns_the_horizontal_channels():
     np.testing.assert_allclose(turned[:, 1], motion.displacement(t)[:, 0], atol=1e-15)
     with pytest.raises(InputError, match="rocks the base"):
         Motion.from_arrays(TIME, WAVY, WAVY).rotated(0.1)
+
+
+@pytest.mark.parametrize("shift", [1e-15, -1e-15, 5e-10, -5e-10])
+def test_durations_that_differ_by_rounding_add(shift):
+    """Sums of steps in floating point: their ends are one time, in a sum of either order."""
+    time, wave = np.linspace(0.0, 2.0, 21), np.sin(np.linspace(0, np.pi, 21))[:, None] ** 3
+    one = Motion.from_arrays(time, wave * [0.01, 0.0, 0.0])
+    other = Motion.from_arrays(time * (1 + shift / 2), wave * [0.0, 0.02, 0.0])
+    for first, second in ((one, other), (other, one)):
+        both = first + second
+        assert both.duration == first.duration
+        np.testing.assert_allclose(both.displacement(1.0), [0.01, 0.02, 0.0], atol=1e-9)
+    with pytest.raises(InputError, match="lengthen the shorter one"):
+        one + Motion.from_arrays(time * (1 + 1e-8), wave * [0.01, 0.0, 0.0])
+
+
+def test_histories_print_in_one_line():
+    """Not their arrays, of which a record has thousands of numbers."""
+    assert (
+        repr(Motion.from_arrays(TIME, WAVY, name="wavy")) == f"Motion wavy: {TIME[-1]:.6g} s in {len(TIME) - 1} pieces"
+    )
+    assert repr(Load.constant((1.0, 0.0, 0.0))) == "Load without a name: 1 s in 1 pieces"
 
 
 def test_sum_adds(every):

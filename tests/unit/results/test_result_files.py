@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -199,3 +201,17 @@ def test_a_command_says_it_in_one_line(copy: Path, capsys: pytest.CaptureFixture
     assert main(["characterise", str(copy)]) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: path = ") and error.count("\n") == 1 and "counter_steps is no count" in error
+
+
+@pytest.mark.parametrize("field", ["kind", "text", "action", "time", "value", "surface"])
+def test_each_field_of_a_note_is_checked(copy: Path, field: str) -> None:
+    """One wrong field is enough; numbers that are whole are numbers too."""
+    note = {"time": 1, "kind": "value", "surface": 0, "value": 2.0, "text": "a note", "action": ""}
+    wrong = {"time": float("inf"), "value": "2", "surface": 1.0}.get(field, 3)
+    for given, valid in ((note, True), ({**note, field: wrong}, False)):
+        text = json.dumps([given]).replace("Infinity", "1e999")
+        with h5py.File(copy, "r+") as file:
+            file.attrs["notes"] = text
+            file.attrs.pop("digest", None)
+        with pytest.raises(InputError, match="damaged") if not valid else nullcontext():
+            assert Result.from_netcdf(copy)

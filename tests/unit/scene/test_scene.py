@@ -156,6 +156,7 @@ def test_a_full_bearing_and_a_csv_beside_the_file(tmp_path):
         ({"name": 3}, "scene.name"),
         ({"duration": -1}, "scene.duration"),
         ({"duration": 1e3}, "hold"),
+        ({"duration": 1e-9}, "no step is shorter than 1e-09 s"),
         ({"output_step": 100}, "output_step"),
         ({"initial_state": InitialState([[0, 0, 0]], [[0, 0, 0]], [[0, 0]])}, "initial_state.q has 1 rows"),
         ({"effects": Effects(rims=False), "stop": Stop(all_rims=True)}, "effects.rims = False"),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.resuming import assert_same, stopping_at
 
 from msfp_gen import (
     Auto,
@@ -30,6 +31,8 @@ from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.simulation import checkpoint
+from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.effect_switching import next_effects
 
 FULL = Effects()
@@ -357,6 +360,18 @@ def test_a_run_of_several_models_resumes_to_the_same_rows(tmp_path: Any) -> None
     for result in (first, again):
         np.testing.assert_array_equal(result.history.top_force, whole.history.top_force)
         assert result.notes == whole.notes
+
+
+def test_a_run_interrupted_before_a_switch_resumes_through_it(tmp_path: Any, monkeypatch: Any) -> None:
+    """The segment after the switch has no file yet."""
+    monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
+    scene, path = kumar(), tmp_path / "run.ck"
+    whole = simulate(scene)
+    switch = next(note.time for note in whole.notes if note.action)
+    with pytest.raises(RunError, match="interrupted"):
+        simulate(scene, progress=stopping_at(0.1), checkpoint=path, every=0.0)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.ck"] and checkpoint.read(path)[0]["time"] < switch
+    assert_same(whole, simulate(scene, checkpoint=path, every=0.0, resume=True))
 
 
 def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:

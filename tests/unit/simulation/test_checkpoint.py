@@ -176,6 +176,11 @@ def test_no_checkpoint_is_overwritten_or_missing(saved: Path, tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
+def test_a_checkpoint_that_is_a_folder_is_named_by_the_reason(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"': cannot be read \(Is a directory\); give the checkpoint of this run"):
+        simulate(scene_of("fenz-test2"), checkpoint=tmp_path, resume=True)
+
+
 def test_no_damage_is_believed(saved: Path, tmp_path: Path) -> None:
     """A byte flipped anywhere, a file cut anywhere, and files that are something else."""
     whole, path, scene = saved.read_bytes(), tmp_path / "run.ck", scene_of("fenz-test2")

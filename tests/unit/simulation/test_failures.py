@@ -145,6 +145,19 @@ def test_initial_state_under_tension_is_refused_at_once() -> None:
     assert failure_of(scene).status == "uplift"
 
 
+def test_a_start_from_which_newton_diverges_is_named() -> None:
+    """All that is given is finite, no acceleration is: a rig of 1 GN/m throws a top that starts displaced."""
+    tilts = [[0.07, -0.03], [0.04, 0.07], [0.03, 0.01], [0.05, 0.04]]
+    q = np.array([[*tilt, 0.0] for tilt in tilts])
+    start = InitialState(q, 0 * q, [(0.1, 0.3), (-0.5, 0.2), (0.3, -0.1), (0.0, -0.3)])
+    scene = Scene(presets.bearing("fenz-tfp"), STILL, Top.rig(LOAD, 1e9, 0.0, 1e6), Effects(), initial_state=start)
+    error = failure_of(scene)
+    assert error.status == "newton" and "stopped at t = 0 s" in str(error)
+    assert "the springs of the rig are anchored above the base" in str(error)
+    held = Scene(presets.bearing("fenz-tfp"), drop(12.0), Top.rig(0.0, 1e8), Effects())
+    assert "springs" not in str(failure_of(held))
+
+
 def test_massless_evaluation_gives_rates_and_names_uplift() -> None:
     """A massless stack has no acceleration; its contact is defined all the same, and it cannot pull either."""
     bearing, shape = presets.bearing("fenz-tfp"), (4, 3)

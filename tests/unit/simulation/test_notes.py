@@ -1,0 +1,74 @@
+"""The notes of a run: what their numbers are measured by, and what a switch of effects says of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import preset_run
+
+from msfp_gen import Effects
+from msfp_gen.results.history import History
+from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.notes import energy_notes, notes_of
+
+SLID, NORMAL, WORK = 0.05, 2e5, 700.0
+
+
+def given(error: float, work: float = WORK, slid: float = SLID) -> tuple[Scene, History]:
+    """A run of which only the energies, the normal forces and the sliding displacements count."""
+    result = preset_run("fenz-test2")
+    history = result.history
+    energy = {name: np.zeros_like(values) for name, values in history.energy.items()}
+    energy["friction_dissipated"][-1], energy["numerical"][len(history.time) // 2] = work, -error
+    sliding = np.zeros_like(history.sliding)
+    sliding[3] = slid
+    normal = np.full_like(history.normal_force, NORMAL)
+    return result.scene, replace(history, energy=energy, sliding=sliding, normal_force=normal)
+
+
+@pytest.mark.parametrize(("work", "slid"), [(WORK, SLID), (1e5, SLID), (WORK, 0.0)])
+def test_the_energy_that_is_missing_is_measured_by_the_largest_term(work: float, slid: float) -> None:
+    """Work of the load along the spheres, s^2/2R for each surface, is a term; what no tolerance resolves is added."""
+    scene, _ = given(0.0)
+    surfaces = scene.bearing.surfaces
+    along = NORMAL * sum(slid**2 / (2 * surface.radius) for surface in surfaces)
+    friction = max(surface.friction * surface.radius for surface in surfaces)
+    scale = max(work, along) + NORMAL * 3 * scene.solver.angle_tolerance * friction / 0.02
+    (note,) = energy_notes(*given(0.021 * scale, work, slid))
+    assert note.value == pytest.approx(0.021, rel=1e-12) and note.text.startswith(
+        "the energy closure has an error of 2.1%"
+    )
+    _, history = given(0.0)
+    assert note.time == history.time[len(history.time) // 2]
+    assert energy_notes(*given(0.019 * scale, work, slid)) == ()
+
+
+def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
+    """What the monitors of a friction law noted before, another effect does not change."""
+    trips = {"law_load": (0.5, 1, 9e6), "law_speed": (0.6, 2, 2.1), "heat": (1.0, 3, 12.0), "uplift": (1.0, 1, 0.0)}
+    run: Any = SimpleNamespace(trips=trips, time=1.0, status=("guard", 1, 0.0))
+    before = Effects(dimension="planar", friction="pv", sliders="massless")
+    segment: Any = SimpleNamespace(run=run, status="guard", model=SimpleNamespace(effects=before))
+    after = replace(before, friction="pvt", uplift=True, sliders="inertial")
+    actions = {note.kind: note.action for note in notes_of(segment, after)}
+    assert actions == {
+        "law_load": "",
+        "law_speed": "",
+        "heat": "friction = pvt",
+        "uplift": "uplift = True, sliders = inertial",
+    }
+
+
+@pytest.mark.parametrize("status", ["newton", "irregular"])
+def test_a_jam_names_the_effects_that_follow(status: str) -> None:
+    run: Any = SimpleNamespace(trips={}, time=1.0, status=(status, 2, 5.0))
+    segment: Any = SimpleNamespace(run=run, status=status, model=SimpleNamespace(effects=Effects(sliders="massless")))
+    (note,) = notes_of(segment, Effects())
+    assert (note.kind, note.action, note.surface) == ("jammed", "sliders = inertial", 2)
+    segment.model.effects = Effects()
+    (note,) = notes_of(segment, Effects(uplift=True))
+    assert note.action == "uplift = True" and f"({status})" in note.text
