@@ -18,7 +18,7 @@ def load_source(source: str) -> Result | Scene:
         from msfp_gen.result import Result
 
         return Result.from_netcdf(source)
-    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.buildings.opening import load_scene
 
     return load_scene(source)
 

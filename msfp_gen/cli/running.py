@@ -78,7 +78,7 @@ def run(
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.buildings.opening import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
@@ -92,8 +92,8 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
+    from msfp_gen.buildings.opening import load_scene
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.loader import load_scene
 
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")

@@ -14,7 +14,8 @@ from msfp_gen.common.fields import Quantity, Rule, errors_at, ruled_fields
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
-from msfp_gen.scene.file.loader import changed_table, scene_from_table
+from msfp_gen.scene.file.changes import changed_table
+from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.studies.bounding import bounded_scene

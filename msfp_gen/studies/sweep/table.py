@@ -15,7 +15,7 @@ from msfp_gen.results.export import require_pyarrow
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
-    from msfp_gen.scene.file.parameter_sweep import Variation
+    from msfp_gen.studies.sweep.variations import Variation
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 WIDTH = 80  # columns of a terminal
