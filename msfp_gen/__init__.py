@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
-    from msfp_gen.analysis.characterise import characterise
     from msfp_gen.buildings.building import Building
+    from msfp_gen.buildings.characterise import characterise
     from msfp_gen.buildings.opening import changed_scene, load_scene
     from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
     from msfp_gen.buildings.storey import BaseSlab, Storey
@@ -66,7 +66,7 @@ _MODULES = {
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "buildings.opening",
-    "characterise": "analysis.characterise",
+    "characterise": "buildings.characterise",
     "fit": "studies.calibration",
     "load_scene": "buildings.opening",
     "presets": "scene.file.presets",

@@ -138,6 +138,12 @@ def _of_matrices(given: Table, folder: Path | None, options: Table) -> Building:
     return Building.from_matrices(**files, nodes=nodes, **options)  # type: ignore[arg-type]
 
 
+def stored_bearing(row: Table, index: int) -> BuildingBearing:
+    """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
+    path = f"bearing[{index}]"
+    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {})
+
+
 def _bearing(given: Table, path: str, named: Table) -> BuildingBearing:
     values = dict(given)
     if "interface" not in values:

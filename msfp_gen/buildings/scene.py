@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -19,7 +19,7 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
-from msfp_gen.specification.layout import Auto, Effects
+from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 BALANCE = 1e-6  # largest part of the weight that the bearings do not balance at rest
 REST = 1e-9  # largest velocity of the ground at the start [m/s]
@@ -111,6 +111,14 @@ class BuildingScene:
         return -float(self.building.rigid_motions[:, 2] @ self.weights)
 
     @cached_property
+    def mass_centre(self) -> Array:
+        """Centre of mass of the building in plan, shape (2,) [m]."""
+        motions = self.building.rigid_motions
+        inertia = motions.T @ self.building.mass @ motions
+        centre: Array = np.array([inertia[1, 5], -inertia[0, 5]]) / inertia[0, 0]
+        return centre
+
+    @cached_property
     def places(self) -> Array:
         """Places of the bearings in plan, shape (bearings, 2) [m]."""
         nodes = [self.building.node(each.node).position[:2] for each in self.bearings]
@@ -168,6 +176,13 @@ class BuildingScene:
     def modelled(self) -> tuple[Effects, ...]:
         """The effects of the model of every bearing: as given, or selected from the scene."""
         return tuple(each.effects for each in self.effect_selections)
+
+    @property
+    def specs(self) -> tuple[ModelSpec, ...]:
+        """Layouts and effects of the models of the bearings, each once."""
+        pairs = zip(self.bearings, self.modelled, strict=True)
+        found = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
+        return tuple(dict.fromkeys(found))
 
     def _attachment(self, index: int) -> Array:
         given = self.bearings[index]

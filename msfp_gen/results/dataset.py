@@ -46,15 +46,23 @@ def coordinates_of(history: History) -> dict[str, Any]:
 
 def write_netcdf(result: RunData, path: str | Path) -> Path:
     """Write the dataset of `result` to `path`, completely or not at all. Raises InputError for an invalid path."""
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
-
-    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, PIECES, to_pieces
+    from msfp_gen.scene.file.stored_motion import GROUP, PIECES, to_pieces
 
     path = check_output(path, DATASET_SUFFIXES)
     dataset = to_dataset(result)
     pieces = to_pieces(result.scene.motion) if dataset.attrs["motion"] == PIECES else None
     dataset.attrs[DIGEST] = digest_of_dataset(dataset, pieces)
+    write_groups(path, dataset, {} if pieces is None else {GROUP: pieces})
+    return path
+
+
+def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset]) -> None:
+    """Write a dataset, and others as groups, as one netCDF-4 file, completely or not at all."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from msfp_gen.scene.file.stored_motion import COMPRESSED
+
     # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
     encoding = {
         name: {"zlib": True, "complevel": 1}
@@ -65,10 +73,10 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
     content = BytesIO()
     with h5netcdf.File(content, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
-        if pieces is not None:
-            pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+        for name, group in groups.items():
+            used = {key: value for key, value in COMPRESSED.items() if key in group}
+            group.dump_to_store(H5NetCDFStore(file, group=name), encoding=used)
     write_bytes(path, [content.getbuffer()])
-    return path
 
 
 def digest_of_dataset(
