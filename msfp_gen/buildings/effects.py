@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -13,21 +14,53 @@ from msfp_gen.scene.friction_selection import select_friction
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.scene import BuildingScene
+    from msfp_gen.buildings.building import Building
+    from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.top import NodeTop
 
 LEAST_SHARE = 0.1  # of the load at rest that an estimate must leave for uplift to be left out
 STEP = 5e-3  # of the linear response [s]
 SMALL = 1e-12  # of a mode that vertical motion does not excite
 
 
-def select_effects(scene: BuildingScene) -> tuple[EffectSelection, ...]:
+class Supported(Protocol):
+    """A bearing of a building: what decides its effects."""
+
+    @property
+    def bearing(self) -> Bearing: ...
+    @property
+    def interface(self) -> NodeTop: ...
+    @property
+    def effects(self) -> Effects | Auto | None: ...
+
+
+class OnBearings(Protocol):
+    """A building on bearings: what decides their effects."""
+
+    @property
+    def building(self) -> Building: ...
+    @property
+    def bearings(self) -> Sequence[Supported]: ...
+    @property
+    def motion(self) -> Motion: ...
+    @property
+    def end(self) -> float: ...
+    @property
+    def gravity(self) -> float: ...
+    @property
+    def attachments(self) -> Array: ...
+    @property
+    def axial_loads(self) -> Array: ...
+
+
+def select_effects(scene: OnBearings) -> tuple[EffectSelection, ...]:
     """The effects of every bearing: as given, or selected. Raises InputError where they exclude each other."""
     remaining = remaining_loads(scene)
     return tuple(_selected(scene, index, float(remaining[index])) for index in range(len(scene.bearings)))
 
 
-def _selected(scene: BuildingScene, index: int, remaining: float) -> EffectSelection:
+def _selected(scene: OnBearings, index: int, remaining: float) -> EffectSelection:
     given = scene.bearings[index]
     requested = Auto() if given.effects is None else given.effects
     if isinstance(requested, Effects):
@@ -58,7 +91,7 @@ def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reaso
     )
 
 
-def remaining_loads(scene: BuildingScene) -> Array:
+def remaining_loads(scene: OnBearings) -> Array:
     """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,).
 
     Vertically the response of the linear building on the springs of its interfaces; beyond that it overturns as a
@@ -72,7 +105,7 @@ def remaining_loads(scene: BuildingScene) -> Array:
     return found
 
 
-def _vertical_response(scene: BuildingScene, times: Array) -> Array:
+def _vertical_response(scene: OnBearings, times: Array) -> Array:
     """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N].
 
     By superposition of modes, each with its share of the damping, exact for an acceleration that is linear in a step.
@@ -100,7 +133,7 @@ def _vertical_response(scene: BuildingScene, times: Array) -> Array:
     return loads
 
 
-def _overturning(scene: BuildingScene, distance: float) -> Array:
+def _overturning(scene: OnBearings, distance: float) -> Array:
     """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
     share = max(_force_share(each.bearing, distance) for each in scene.bearings)
     motions = scene.building.rigid_motions
