@@ -19,6 +19,7 @@ from msfp_gen.analysis.characterise.report import Characterisation
 from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
 from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
 from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.summary import floor_rows, storey_rows
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
@@ -63,6 +64,7 @@ class BuildingCharacterisation:
         cycles: closed cycles of a motion in one direction, base shear over mean displacement.
         residual_displacement [m]; at_rest: whether the building is at rest by then.
         energy_dissipated: in all bearings [J].
+        peak_floor_acceleration: horizontal, of any floor [m/s^2]. peak_drift_ratio: of any storey; None without [-].
         bearings: demands on each.
         notes: what is not defined, and why.
     """
@@ -79,6 +81,8 @@ class BuildingCharacterisation:
     residual_displacement: float
     at_rest: bool
     energy_dissipated: float
+    peak_floor_acceleration: float
+    peak_drift_ratio: float | None
     bearings: tuple[BearingDemand, ...]
     notes: tuple[str, ...]
 
@@ -128,6 +132,8 @@ def characterise_building(result: BuildingData) -> BuildingCharacterisation:
         residual_displacement=float(size[-1]),
         at_rest=rest,
         energy_dissipated=float(result.dissipated[-1].sum()),
+        peak_floor_acceleration=max(each["peak_acceleration"]["radial"] for each in floor_rows(result)),
+        peak_drift_ratio=max((each["peak_drift_ratio"] for each in storey_rows(result)), default=None),
         bearings=tuple(map(_demand, bearings_of(result))),
         notes=tuple(notes),
     )

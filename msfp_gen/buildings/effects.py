@@ -24,7 +24,7 @@ STEP = 5e-3  # of the linear response [s]
 SMALL = 1e-12  # of a mode that vertical motion does not excite
 
 
-class Supported(Protocol):
+class _Supported(Protocol):
     """A bearing of a building: what decides its effects."""
 
     @property
@@ -35,13 +35,13 @@ class Supported(Protocol):
     def effects(self) -> Effects | Auto | None: ...
 
 
-class OnBearings(Protocol):
+class _OnBearings(Protocol):
     """A building on bearings: what decides their effects."""
 
     @property
     def building(self) -> Building: ...
     @property
-    def bearings(self) -> Sequence[Supported]: ...
+    def bearings(self) -> Sequence[_Supported]: ...
     @property
     def motion(self) -> Motion: ...
     @property
@@ -54,13 +54,13 @@ class OnBearings(Protocol):
     def axial_loads(self) -> Array: ...
 
 
-def select_effects(scene: OnBearings) -> tuple[EffectSelection, ...]:
+def select_effects(scene: _OnBearings) -> tuple[EffectSelection, ...]:
     """The effects of every bearing: as given, or selected. Raises InputError where they exclude each other."""
     remaining = remaining_loads(scene)
     return tuple(_selected(scene, index, float(remaining[index])) for index in range(len(scene.bearings)))
 
 
-def _selected(scene: OnBearings, index: int, remaining: float) -> EffectSelection:
+def _selected(scene: _OnBearings, index: int, remaining: float) -> EffectSelection:
     given = scene.bearings[index]
     requested = Auto() if given.effects is None else given.effects
     if isinstance(requested, Effects):
@@ -91,7 +91,7 @@ def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reaso
     )
 
 
-def remaining_loads(scene: OnBearings) -> Array:
+def remaining_loads(scene: _OnBearings) -> Array:
     """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,).
 
     Vertically the response of the linear building on the springs of its interfaces; beyond that it overturns as a
@@ -105,7 +105,7 @@ def remaining_loads(scene: OnBearings) -> Array:
     return found
 
 
-def _vertical_response(scene: OnBearings, times: Array) -> Array:
+def _vertical_response(scene: _OnBearings, times: Array) -> Array:
     """Change of the axial loads under the vertical motion of the ground, shape (times, bearings) [N].
 
     By superposition of modes, each with its share of the damping, exact for an acceleration that is linear in a step.
@@ -133,7 +133,7 @@ def _vertical_response(scene: OnBearings, times: Array) -> Array:
     return loads
 
 
-def _overturning(scene: OnBearings, distance: float) -> Array:
+def _overturning(scene: _OnBearings, distance: float) -> Array:
     """Largest change of the axial loads by overturning, shape (bearings,) [N]. distance: of the ground [m]."""
     share = max(_force_share(each.bearing, distance) for each in scene.bearings)
     motions = scene.building.rigid_motions

@@ -72,7 +72,7 @@ def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
     build(scene)
     with Progress(scene.name or "run") as progress:
         try:
-            return simulate(scene, progress=progress, **options), None  # type: ignore[arg-type]
+            return simulate(scene, progress=progress, **options), None
         except RunError as error:
             return error.result if is_result(error.result) else None, error
 

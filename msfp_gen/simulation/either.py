@@ -41,6 +41,10 @@ def simulate(
 ) -> Result: ...
 
 
+@overload
+def simulate(scene: Scene | BuildingScene, *, progress: bearings.Progress | None = None) -> Any: ...
+
+
 def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingResult:
     """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
     if not isinstance(scene, BuildingScene):
