@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from importlib import resources
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -17,10 +18,13 @@ from msfp_gen.version import __version__
 from .derive import Equations
 from .gradients import COLUMNS, UNKNOWN_COLUMNS
 from .heat import HEAT_KERNEL
-from .interface import interface_context, model_name
+from .interface import ABI_VERSION, CALL_ERRORS, interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c
 from .program import Block, Use
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 # Each is made from the template of its name.
 GRADIENT_FILES = ("msfp_gradient_kernels.h",)  # of models with gradients
@@ -245,12 +249,12 @@ def description(spec: ModelSpec) -> str:
     )
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:
-    """Render all generated files: {file name: text}. directional: kernels of a model with gradients."""
+def environment() -> Environment:
+    """Templates of the package, in which an undefined name is an error."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     folder = resources.files("msfp_gen.templates")
-    environment = Environment(
+    return Environment(
         loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -258,6 +262,16 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         keep_trailing_newline=True,
         autoescape=False,
     )
+
+
+def public_header() -> str:
+    """Text of `msfp.h`, the same for every model."""
+    context = {"version": __version__, "words": word_enums(), "abi": ABI_VERSION, "errors": CALL_ERRORS}
+    return environment().get_template("msfp.h.jinja").render(context, file="msfp.h")
+
+
+def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:
+    """Render all generated files: {file name: text}. directional: kernels of a model with gradients."""
     spec = equations.spec
     groups = [group for group in (equations.blocks, equations.column_blocks) if group is not None]
     blocks = [b for group in groups for f in fields(group) if (b := getattr(group, f.name)) is not None]
@@ -294,7 +308,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}
+    templates = environment()
     return {
-        file: environment.get_template(f"{template}.jinja").render(context, file=file)
-        for file, template in names.items()
+        file: templates.get_template(f"{template}.jinja").render(context, file=file) for file, template in names.items()
     }

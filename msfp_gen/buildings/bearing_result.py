@@ -56,7 +56,7 @@ class BearingResult:
     def displacement(self) -> Array:
         """Displacement across the bearing and its interface, base less top, shape (k, 3) [m]."""
         rows = self.building.scene.attachments[self.index, :3]
-        moved: Array = self.building.ground[:, 0] - self.building.displacement @ rows.T
+        moved: Array = self.building.support[:, self.index, 0] - self.building.displacement @ rows.T
         across: Array = moved - moved[0]
         return across
 

@@ -16,11 +16,14 @@ class BuildingData:
 
     time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
     the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
-    velocity and acceleration of the ground, shape (k, 3, 3) [m]. wrench: force and moment that the lower and the upper
-    end of each bearing exert on it, shape (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of
-    each bearing, a list of arrays of shape (k, n-1) [N], [m]. dissipated: energy dissipated in each bearing, shape
-    (k, bearings) [J]. counts: trials and tangents of the bearings. status: "ok" or the name of a failure; message: one
-    line of text, "" for a run that succeeded. provenance: versions with which the result was computed. wall_time [s].
+    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
+    (k, bearings, 3, 3). wrench: force and moment that the lower and the
+    upper end of each bearing exert on it, shape (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces
+    of each bearing, a list of arrays of shape (k, n-1) [N], [m]. Energies, shape (k,) or (k, bearings) [J]: dissipated:
+    in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
+    received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
+    counts: of the run. status: "ok" or the name of a failure; message: one line of text, "" for a run that succeeded.
+    provenance: versions with which the result was computed. wall_time [s].
     """
 
     scene: BuildingScene
@@ -33,6 +36,11 @@ class BuildingData:
     normal_force: list[Array]
     sliding: list[Array]
     dissipated: Array
+    stored: Array
+    damped: Array
+    received: Array
+    input: Array
+    support: Array
     counts: dict[str, int]
     status: str = "ok"
     message: str = ""
@@ -53,7 +61,7 @@ class BuildingData:
     def bearing_displacement(self) -> Array:
         """Displacement of the upper end of each bearing relative to the ground, shape (k, bearings, 3) [m]."""
         upper: Array = np.einsum("bin,kn->kbi", self.scene.attachments[:, :3], self.displacement)
-        return upper - self.ground[:, None, 0]
+        return upper - self.support[:, :, 0]
 
     @property
     def axial_force(self) -> Array:
@@ -103,24 +111,8 @@ class BuildingData:
         return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
 
     @property
-    def damped(self) -> Array:
-        """Energy dissipated by the damping of the building, shape (k,) [J]."""
-        return self._integral(_squares(self.velocity, self.scene.building.damping))
-
-    @property
-    def received(self) -> Array:
-        """Work of the bearings on the building, by their forces beyond those at rest, shape (k,) [J]."""
-        upper = np.einsum("bin,kn->kbi", self.scene.attachments, self.velocity)
-        power = -np.einsum("kbi,kbi->k", self.wrench[:, :, 1] - self.wrench[0, :, 1], upper)
-        return self._integral(power)
-
-    @property
     def _size(self) -> int:
         return len(self.scene.building.mass)
-
-    def _integral(self, power: Array) -> Array:
-        steps = 0.5 * (power[1:] + power[:-1]) * np.diff(self.time)
-        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _squares(rows: Array, matrix: Array) -> Array:

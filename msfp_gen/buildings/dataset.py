@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 AXES = LABELS["axis"]
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
+ENERGY = {
+    "damped": "dissipated by the damping of the building",
+    "received": "work of the bearings on the building, by their forces beyond those at rest",
+    "input": "work of the ground",
+}
 GROUND = ("displacement", "velocity", "acceleration")
 
 
@@ -57,7 +62,13 @@ def stored(result: BuildingData) -> dict[str, Variable]:
         dims, padded(result.normal_force), "N", "normal force on the surface", "compression"
     )
     found["sliding"] = Variable(dims, padded(result.sliding), "m", "distance s from the centre of the surface (3.20)")
+    for order, name in enumerate(GROUND):
+        unit, own = ("m", "m/s", "m/s^2")[order], result.support[:, :, order]
+        found[f"support_{name}"] = Variable(("bearing", "axis"), own, unit, f"{name} of the ground below the bearing")
     found["dissipated"] = Variable(("bearing",), result.dissipated, "J", "energy dissipated in the bearing")
+    found["stored"] = Variable(("bearing",), result.stored, "J", "energy stored in the bearing and its interface")
+    for name, meaning in ENERGY.items():
+        found[f"energy_{name}"] = Variable((), getattr(result, name), "J", meaning)
     return found
 
 
@@ -84,8 +95,8 @@ def derived(result: BuildingData) -> dict[str, Variable]:
         above = "force and moment that accelerate the floors above, at half height"
         found["drift"] = Variable(storey, result.drift, "m or rad", "deformation of the columns", "above less below")
         found["storey_force"] = Variable(storey, result.storey_force, "N or N m", above, "on the floors above")
-    for name in ("kinetic", "strain", "damped", "received"):
-        found[f"energy_{name}"] = Variable((), getattr(result, name), "J", f"energy of the building: {name}")
+    for name in ("kinetic", "strain"):
+        found[f"energy_{name}"] = Variable((), getattr(result, name), "J", f"{name} energy of the building")
     return found
 
 

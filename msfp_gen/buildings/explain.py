@@ -31,7 +31,7 @@ def explain_building(scene: BuildingScene) -> list[Table]:
         bearing_table(scene),
         *_kinds(scene),
         *_interfaces(scene),
-        one.motion_table(scene.motion),
+        *map(one.motion_table, scene.grounds[0]),
         *effect_tables(scene),
         _solver(scene),
     ]
@@ -123,9 +123,10 @@ def _interfaces(scene: BuildingScene) -> Iterator[Table]:
 def _solver(scene: BuildingScene) -> Table:
     solver = scene.solver
     rows = [
-        ("method", "TR-BDF2 of building and bearings"),
-        ("rtol", f"{solver.rtol:g}, relative error of a step of a bearing"),
-        ("longest step", f"{scene.step:g} s"),
+        ("method", f"{solver.method}: building and bearings together"),
+        ("rtol", f"{solver.rtol:g}, relative error of a step"),
+        ("longest step", "resolution of the motion" if solver.max_step is None else f"{solver.max_step:g} s"),
+        ("rows", f"every {scene.row_step:g} s"),
         ("ends at", f"{scene.end:.6g} s"),
     ]
     return Table("solver", (), rows)

@@ -51,7 +51,9 @@ class NodeTable:
 
 
 _INTERFACE, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, BaseSlab, Storey, NodeTable))
-_BEARING = model_of(BuildingBearing, bearing=(Any, ...), interface=(_INTERFACE, None), effects=(EFFECTS, None))
+_BEARING = model_of(
+    BuildingBearing, bearing=(Any, ...), interface=(_INTERFACE, None), effects=(EFFECTS, None), motion=(MOTION, None)
+)
 _BUILDING = model_of(
     FrameTable,
     base=(_BASE, None),
@@ -97,7 +99,9 @@ def building_from_table(
         parts["solver"] = Solver(**given.pop("solver"))
     common = {name: frame[name] for name in COMMON if name in frame}
     rows = enumerate(frame["bearing"])
-    parts["bearings"] = [_bearing({**common, **row}, f"building.bearing[{index}]", named) for index, row in rows]
+    parts["bearings"] = [
+        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder) for index, row in rows
+    ]
     return BuildingScene(**given, **parts)
 
 
@@ -141,10 +145,10 @@ def _of_matrices(given: Table, folder: Path | None, options: Table) -> Building:
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
     """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
     path = f"bearing[{index}]"
-    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {})
+    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {}, None)
 
 
-def _bearing(given: Table, path: str, named: Table) -> BuildingBearing:
+def _bearing(given: Table, path: str, named: Table, folder: Path | None) -> BuildingBearing:
     values = dict(given)
     if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
@@ -152,6 +156,9 @@ def _bearing(given: Table, path: str, named: Table) -> BuildingBearing:
     with errors_at("effects", f"{path}.effects"):
         if "effects" in values:
             values["effects"] = effects_from_table(values["effects"])
+    if "motion" in values:
+        with errors_at("motion", f"{path}.motion"):
+            values["motion"] = _motion(values["motion"], folder)
     with errors_at("top", f"{path}.interface"):
         values["interface"] = NodeTop(**values["interface"])
     with errors_at("building_bearing", path):

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msfp_gen.buildings.dataset import stored, to_dataset
-from msfp_gen.buildings.text import GROUP, to_arrays
+from msfp_gen.buildings.text import GROUP, ground_name, to_arrays
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.results import export
 from msfp_gen.results.dataset import write_groups
 from msfp_gen.results.reading import DIGEST
 from msfp_gen.results.stored_group import ArrayDigest, digest
-from msfp_gen.scene.file import stored_motion
+from msfp_gen.scene.file.stored_motion import to_pieces
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,10 +42,8 @@ def write_netcdf(result: BuildingData, path: str | Path) -> Path:
     """Write rows, derived rows and scene as netCDF-4 file. Raises InputError for an invalid path."""
     path = check_output(path, DATASET_SUFFIXES)
     dataset = to_dataset(result)
-    groups = {
-        GROUP: to_arrays(result.scene.building),
-        stored_motion.GROUP: stored_motion.to_pieces(result.scene.motion),
-    }
+    groups = {GROUP: to_arrays(result.scene.building)}
+    groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
     dataset.attrs[DIGEST] = digest_of(result, groups)
     write_groups(path, dataset, groups)
     return path

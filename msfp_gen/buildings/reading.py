@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.dataset import GROUND
+from msfp_gen.buildings.dataset import ENERGY, GROUND
 from msfp_gen.buildings.files import DIGESTED
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.text import GROUP, scene_from, shapes
+from msfp_gen.buildings.text import GROUP, ground_name, scene_from, shapes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.reading import DAMAGE, DIGEST, REMEDY, motion_in
@@ -60,7 +60,9 @@ def _read(root: StoredGroup, kind: type[B]) -> B:
     counts = {str(name): int(count) for name, count in json.loads(str(about["counts"])).items()}
     provenance = {str(name): str(value) for name, value in json.loads(str(about["provenance"])).items()}
     status, message = str(about["status"]), str(about["message"])
-    return kind(scene, *rows, counts, status, message, provenance, wall_time)
+    return kind(
+        scene, **rows, counts=counts, status=status, message=message, provenance=provenance, wall_time=wall_time
+    )
 
 
 def _scene(root: StoredGroup, about: dict[str, Any], arrays: Arrays) -> BuildingScene:
@@ -72,15 +74,16 @@ def _scene(root: StoredGroup, about: dict[str, Any], arrays: Arrays) -> Building
         for name, shape in shapes(size, len(table.get("node", [])), len(table.get("column", []))).items()
     }
     arrays |= {f"{GROUP}/{name}": values for name, values in found.items()}
-    motion, pieces, _ = motion_in(root)
-    arrays |= pieces
-    return scene_from(text, found, motion)
+    motions = []
+    for index in range(int(table.get("grounds", 1))):
+        motion, pieces, _ = motion_in(root, ground_name(index))
+        arrays |= pieces
+        motions.append(motion)
+    return scene_from(text, found, motions)
 
 
-def _rows(
-    root: StoredGroup, scene: BuildingScene, arrays: Arrays
-) -> tuple[Array, Array, Array, Array, Array, Array, list[Array], list[Array], Array]:
-    """Rows as `BuildingData` takes them, from time to dissipated."""
+def _rows(root: StoredGroup, scene: BuildingScene, arrays: Arrays) -> dict[str, Any]:
+    """The rows by the names that `BuildingData` has for them."""
     count, size, bearings = root.length("time"), len(scene.building.mass), len(scene.bearings)
     surfaces = [each.bearing.layout.surfaces for each in scene.bearings]
 
@@ -89,9 +92,9 @@ def _rows(
         arrays[name] = values
         return values
 
-    time = read("time")
-    motion = [read(f"coordinate_{name}", size) for name in GROUND]
-    ground = np.stack([read(f"ground_{name}", 3) for name in GROUND], axis=1)
+    found: dict[str, Any] = {"time": read("time")}
+    found |= {name: read(f"coordinate_{name}", size) for name in GROUND}
+    found["ground"] = np.stack([read(f"ground_{name}", 3) for name in GROUND], axis=1)
     ends = [
         np.concatenate([read(f"{end}_{what}", bearings, 3) for what in ("force", "moment")], axis=-1)
         for end in ("lower", "upper")
@@ -101,11 +104,18 @@ def _rows(
         [values[:, index, :own] for index, own in enumerate(surfaces)]
         for values in (read("normal_force", bearings, most), read("sliding", bearings, most))
     ]
-    dissipated = read("dissipated", bearings)
+    found |= {name: read(name, bearings) for name in ("dissipated", "stored")}
+    found |= {name: read(f"energy_{name}") for name in ENERGY}
+    found["support"] = np.stack([read(f"support_{name}", bearings, 3) for name in GROUND], axis=2)
+    found["wrench"] = np.stack(ends, axis=2)
+    found["normal_force"], found["sliding"] = each
+    _check_finite(arrays, each)
+    return found
+
+
+def _check_finite(arrays: Arrays, surfaces: list[list[Array]]) -> None:
     for name, values in arrays.items():
         if name not in ("normal_force", "sliding") and not np.isfinite(values).all():
             raise ValueError(f"{name} is not finite")
-    if not all(np.isfinite(values).all() for columns in each for values in columns):
+    if not all(np.isfinite(values).all() for columns in surfaces for values in columns):
         raise ValueError("a surface is not finite")
-    normal, sliding = each
-    return time, motion[0], motion[1], motion[2], ground, np.stack(ends, axis=2), normal, sliding, dissipated

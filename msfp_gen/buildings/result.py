@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
+from msfp_gen.buildings.compiled_run import ENERGIES, BuildingRun, unpacked
 from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.step import Coupling, State
 from msfp_gen.common.arrays import Array
+from msfp_gen.coupling.response import DISSIPATED
 from msfp_gen.results.note import Note
+from msfp_gen.specification.contract import WORKS, names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,42 +94,36 @@ class BuildingResult(BuildingData):
         return read_building(path, cls)
 
 
-class Rows:
-    """Rows of a run that grows."""
+def result_of(run: BuildingRun) -> BuildingResult:
+    """The rows of a run until now."""
+    rows = unpacked(run)
+    energies: dict[str, Any] = {name: rows[name] for name in ENERGIES}
+    count = len(run.ports)
+    works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
+    return BuildingResult(
+        run.scene,
+        rows["time"],
+        rows["displacement"],
+        rows["velocity"],
+        rows["acceleration"],
+        rows["ground"][:, 0],
+        np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
+        [rows[f"normal {i}"] for i in range(count)],
+        [rows[f"sliding {i}"] for i in range(count)],
+        np.stack([sum(work[name] for name in DISSIPATED) for work in works], axis=1),
+        np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
+        **energies,
+        support=rows["ground"][:, run.scene.grounds[1]],
+        counts=run.run.counts,
+    )
 
-    def __init__(self, scene: BuildingScene) -> None:
-        self.scene = scene
-        self.states: list[State] = []
-        self.ground: list[Array] = []
-        self.bearings: list[list[tuple[Array, Array, Array, float]]] = [[] for _ in scene.bearings]
 
-    def start(self, coupling: Coupling, state: State) -> None:
-        """The row of the state at rest."""
-        still = np.zeros((3, 6))
-        coupling.responses = [port.trial(0.0, still, still) for port in coupling.ports]
-        self.add(coupling, state)
-
-    def add(self, coupling: Coupling, state: State) -> None:
-        """The row of a state that the bearings have reached."""
-        self.states.append(state)
-        self.ground.append(coupling.lower(state.time)[:, :3])
-        for rows, each in zip(self.bearings, coupling.responses, strict=True):
-            rows.append((each.wrench, each.normal_force, each.sliding, each.dissipated))
-
-    def result(self, coupling: Coupling) -> BuildingResult:
-        """The rows until now."""
-        columns = [[np.array(column) for column in zip(*rows, strict=True)] for rows in self.bearings]
-        wrench, normal, sliding, dissipated = zip(*columns, strict=True)
-        return BuildingResult(
-            self.scene,
-            np.array([each.time for each in self.states]),
-            np.array([each.u for each in self.states]),
-            np.array([each.v for each in self.states]),
-            np.array([each.a for each in self.states]),
-            np.array(self.ground),
-            np.stack(wrench, axis=1),
-            list(normal),
-            list(sliding),
-            np.stack(dissipated, axis=1),
-            {"trials": coupling.trials, "tangents": coupling.tangents},
-        )
+def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
+    """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
+    upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
+    stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
+    stiffness += 2 * [interface.rotational_stiffness]
+    found: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
+    for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
+        found = found + rows[f"{name} {index}"]
+    return found

@@ -1,50 +1,79 @@
-"""`simulate_building`: the run of a building on its bearings, with steps of one length."""
+"""`simulate_building`: the run of a building on its bearings."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from typing import Protocol
 
-from msfp_gen.buildings.result import BuildingResult, Rows
+from msfp_gen.buildings.compiled_run import BuildingRun, start_run
+from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.step import Coupling, State, UnconvergedError
 from msfp_gen.errors import RunError
+from msfp_gen.specification.contract import STATUSES
 
-HALVINGS = 6  # of a step that fails
+STEPS_PER_CALL = 20  # between two looks at interrupts, progress and checkpoints
+_FAILURES = {status.name: status for status in STATUSES}
+Progress = Callable[[float, float], None]
 
 
-def simulate_building(scene: BuildingScene) -> BuildingResult:
+class Keeper(Protocol):
+    """A checkpoint of the run (`simulation/checkpoint.py`)."""
+
+    def restore(self, run: object) -> None:
+        """Set a new run to the saved state, if there is one."""
+
+    def save_if_due(self, run: object) -> None:
+        """Save the run if enough time has passed."""
+
+    def save(self, run: object) -> None:
+        """Save the run now."""
+
+
+def simulate_building(
+    scene: BuildingScene,
+    progress: Progress | None = None,
+    keep: Callable[[BuildingRun], Keeper] | None = None,
+    threads: int | None = None,
+) -> BuildingResult:
     """The motion of a building and its bearings from rest.
 
-    Raises RunError: a bearing cannot follow, or a step has no solution; its `result` has the rows until then.
+    progress: called with the time reached and the end [s]. keep: gives the checkpoint of a run. threads: as in
+    `start_run`. Raises InputError; RunError that names the bearing: it cannot follow, or a step has no solution; its
+    `result` has the rows until then, as after an interrupt.
     """
-    coupling = Coupling(scene)
-    count = len(scene.building.mass)
-    state = State(0.0, *(np.zeros(count) for _ in range(3)))
-    rows = Rows(scene)
-    rows.start(coupling, state)
-    steps = max(1, round(scene.end / scene.step))
-    times = np.linspace(0.0, scene.end, steps + 1)
+    run = start_run(scene, threads)
+    keeper = keep(run) if keep is not None else None
+    if keeper is not None:
+        keeper.restore(run.run)
+    interrupted = _advance(run, progress, keeper)
+    status = run.run.status[0]
+    if keeper is not None and status == "ok":  # a run that failed fails again from the last checkpoint
+        keeper.save(run.run)
+    if status == "ok" and interrupted:
+        status = "interrupted"
+    if status != "ok":
+        raise RunError(failure(run, status), status=status, result=result_of(run))
+    return result_of(run)
+
+
+def _advance(run: BuildingRun, progress: Progress | None, keeper: Keeper | None) -> bool:
+    """Take all steps; True after Ctrl-C."""
     try:
-        for time in times[1:]:
-            state = _advance(coupling, state, float(time))
-            rows.add(coupling, state)
-    except RunError as error:
-        raise RunError(str(error), status=error.status, result=rows.result(coupling)) from None
-    return rows.result(coupling)
+        while run.run.advance(STEPS_PER_CALL):
+            if keeper is not None:
+                keeper.save_if_due(run.run)
+            if progress is not None:
+                progress(run.run.time, run.scene.end)
+    except KeyboardInterrupt:
+        return True
+    return False
 
 
-def _advance(coupling: Coupling, state: State, end: float) -> State:
-    """Steps until the time `end` [s]: one, or shorter ones where a step fails. Raises RunError."""
-    h, shortest = end - state.time, (end - state.time) * 0.6 / 2**HALVINGS
-    while True:
-        last = state.time + 1.5 * h > end
-        try:
-            state = coupling.step(state, end - state.time if last else h)
-        except UnconvergedError as error:
-            if h < shortest:
-                raise RunError(str(error), status=error.status) from None
-            h /= 2
-            continue
-        coupling.commit()
-        if last:
-            return state
+def failure(run: BuildingRun, status: str) -> str:
+    """One line with bearing, time, surface, cause and remedy."""
+    _, bearing, surface, value = run.run.status
+    found = _FAILURES[status]
+    who = run.scene.label(bearing - 1) if bearing else "building"
+    where = f", surface {surface}" if surface else ""
+    where += f", {found.quantity} = {value:.4g}" if surface and found.quantity else ""
+    return f"{who}: stopped at t = {run.run.time:.6g} s of {run.scene.end:.6g} s{where}: {found.failure}"

@@ -22,6 +22,7 @@ from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 BALANCE = 1e-6  # largest part of the weight that the bearings do not balance at rest
+ROW_STEP = 0.01  # between rows [s]
 REST = 1e-9  # largest velocity of the ground at the start [m/s]
 
 
@@ -32,7 +33,7 @@ class BuildingBearing:
     bearing: its values; the same one may carry the building at several places. interface: `Top.node(...)`, stiffness
     and damping between its top plate and the building. position: in plan [m]; None: that of the node. node: of the
     building, to which a rigid link attaches it. effects: of its model, or `Auto`: selected from the scene, as None is.
-    name: for messages and results. Raises InputError.
+    name: for messages and results. motion: of the ground below it; None: that of the scene. Raises InputError.
     """
 
     bearing: Bearing
@@ -41,9 +42,11 @@ class BuildingBearing:
     node: str = "base"
     effects: Effects | Auto | None = None
     name: str = ""
+    motion: Motion | None = None
 
     def __post_init__(self) -> None:
         require_type(self.bearing, Bearing, "building_bearing.bearing")
+        require_type(self.motion, (Motion, type(None)), "building_bearing.motion")
         require_type(self.interface, NodeTop, "building_bearing.interface")
         require_type(self.effects, (Effects, Auto, type(None)), "building_bearing.effects")
         check_fields(self, "building_bearing")
@@ -59,10 +62,10 @@ class BuildingBearing:
 class BuildingScene:
     """The complete input of the run of a building.
 
-    building; bearings: at least one, of any layouts, which stand on the same rigid ground. motion: of the ground, from
-    rest, in translation. solver: `rtol` of the bearings; `max_step`: step of the building [s]; None: 5 ms, or that of
-    the motion where it is shorter. duration [s]; None: that of the motion. Raises InputError: inconsistent parts, or
-    weights that the bearings do not balance.
+    building; bearings: at least one, of any layouts. motion: of the ground, from rest, in translation; displacements
+    count from the start. solver: of steps that the building and all bearings take together. duration [s]; None: that of
+    the motion. output_step: between rows, at which steps end [s]; None: 10 ms. Raises InputError: inconsistent parts,
+    or weights that the bearings do not balance.
     """
 
     building: Building
@@ -71,6 +74,7 @@ class BuildingScene:
     solver: Solver = field(default_factory=Solver)
     duration: Annotated[float | None, Quantity("s", above=0.0)] = None
     name: str = ""
+    output_step: Annotated[float | None, Quantity("s", above=0.0)] = None
 
     def __post_init__(self) -> None:
         require_type(self.building, Building, "scene.building")
@@ -94,11 +98,20 @@ class BuildingScene:
         return self.motion.duration if self.duration is None else self.duration
 
     @property
-    def step(self) -> float:
-        """Step of the building [s]."""
-        if self.solver.max_step is not None:
-            return self.solver.max_step
-        return min(5e-3, self.motion.max_step or 5e-3)
+    def row_step(self) -> float:
+        """Time between two rows [s]."""
+        return ROW_STEP if self.output_step is None else self.output_step
+
+    @cached_property
+    def grounds(self) -> tuple[list[Motion], list[int]]:
+        """The different motions of the ground, that of the scene first, and the index of that of each bearing."""
+        motions, indices = [self.motion], []
+        for each in self.bearings:
+            own = self.motion if each.motion is None else each.motion
+            if own not in motions:
+                motions.append(own)
+            indices.append(motions.index(own))
+        return motions, indices
 
     @property
     def gravity(self) -> float:
@@ -203,13 +216,16 @@ class BuildingScene:
                 )
 
     def _check_motion(self) -> None:
-        if np.any(self.motion.coefficients[:, 3:]):
-            raise InputError("scene.motion: the ground rotates; a building takes translations, leave the rotation out")
-        speed = float(np.abs(self.motion.velocity(0.0)).max())
-        if speed > REST:
-            raise InputError(f"scene.motion: it starts with {speed:.3g} m/s; give a motion that starts from rest")
-        if self.duration is not None and self.duration > self.motion.duration * (1 + 1e-12):
-            raise InputError(
-                f"scene.duration = {self.duration}: the motion lasts {self.motion.duration:.12g} s; give at most that, "
-                "or motion.held(...)"
-            )
+        own = {f"scene.bearings[{i}].motion": each.motion for i, each in enumerate(self.bearings) if each.motion}
+        for name, motion in {"scene.motion": self.motion, **own}.items():
+            if np.any(motion.coefficients[:, 3:]):
+                raise InputError(f"{name}: the ground rotates; a building takes translations, leave the rotation out")
+            speed = float(np.abs(motion.velocity(0.0)).max())
+            if speed > REST:
+                raise InputError(f"{name}: it starts with {speed:.3g} m/s; give a motion that starts from rest")
+            if self.end > motion.duration * (1 + 1e-12):
+                field = f"scene.duration = {self.duration}: the motion" if motion is self.motion else f"{name}: it"
+                raise InputError(
+                    f"{field} lasts {motion.duration:.12g} s, the run {self.end:.12g} s; give at most that as "
+                    "scene.duration, or motion.held(...)"
+                )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from msfp_gen.buildings.storey import Columns
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.file.loader import bearing_table, plain_table, toml_table
+from msfp_gen.scene.file.stored_motion import GROUP as MOTION
 from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.scene.solver import Solver
 
@@ -32,6 +34,8 @@ def scene_text(scene: BuildingScene) -> str:
         {
             "name": scene.name,
             "duration": scene.duration,
+            "output_step": scene.output_step,
+            "grounds": len(scene.grounds[0]),
             "solver": plain_table(scene.solver),
             "node": [{"name": n.name, "carries": n.carries} for n in building.nodes],
             "column": [{"name": column.name} for column in building.columns],
@@ -41,8 +45,9 @@ def scene_text(scene: BuildingScene) -> str:
                     "bearing": bearing_table(each.bearing),
                     "interface": plain_table(each.interface),
                     "effects": None if each.effects is None else plain_table(each.effects),
+                    "ground": ground,
                 }
-                for each in scene.bearings
+                for each, ground in zip(scene.bearings, scene.grounds[1], strict=True)
             ],
         }
     )
@@ -70,15 +75,25 @@ def shapes(size: int, nodes: int, columns: int) -> dict[str, tuple[int, ...]]:
     return found | dict.fromkeys(("deformation", "inertia"), (columns, FREEDOMS, size))
 
 
-def scene_from(text: str, arrays: dict[str, Array], motion: Motion) -> BuildingScene:
-    """The inverse of `scene_text`, with the arrays of `to_arrays`. Raises InputError."""
+def ground_name(index: int) -> str:
+    """The group of a result file with a motion of the ground; the first is that of the scene."""
+    return MOTION if index == 0 else f"{MOTION}_{index}"
+
+
+def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -> BuildingScene:
+    """The inverse of `scene_text`, with the arrays of `to_arrays` and all motions of the ground. Raises InputError."""
     table = toml_table(text)
     given = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
     nodes = tuple(Node(str(each["name"]), place, rows, bool(each["carries"])) for each, place, rows in given)
     stated = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
     columns = tuple(Columns(str(each["name"]), *both) for each, *both in stated)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
-    bearings = [stored_bearing(row, index) for index, row in enumerate(table["bearing"])]
+    bearings = []
+    for index, row in enumerate(table["bearing"]):
+        ground = row.pop("ground", 0)
+        own = motions[ground] if ground else None
+        bearings.append(replace(stored_bearing(row, index), motion=own))
     known = {field.name for field in fields(Solver)}
     solver = Solver(**{name: value for name, value in table.get("solver", {}).items() if name in known})
-    return BuildingScene(building, bearings, motion, solver, table.get("duration"), str(table.get("name", "")))
+    name, duration, step = str(table.get("name", "")), table.get("duration"), table.get("output_step")
+    return BuildingScene(building, bearings, motions[0], solver, duration, name, step)

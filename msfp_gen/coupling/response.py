@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.specification.contract import WORKS, names
 
-_DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
+DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
 
 
 class Source(Protocol):
@@ -52,7 +52,7 @@ class Response:
     def dissipated(self) -> float:
         """Energy dissipated in the bearing since the start [J]."""
         works = dict(zip(names(WORKS), self._values["work"], strict=True))
-        return sum(float(works[name]) for name in _DISSIPATED)
+        return sum(float(works[name]) for name in DISSIPATED)
 
     @cached_property
     def _values(self) -> dict[str, Array]:

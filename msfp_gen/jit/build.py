@@ -83,7 +83,7 @@ def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = 
             # Another process may have built it while this one waited for the lock.
             manifest = entry.find()
             if manifest is None:
-                manifest, built = _build(entry, part, notify), True
+                manifest, built = _build(spec, entry, part, notify), True
                 entry.publish(part)
     return _info(spec, manifest, entry.folder, entry.identity, not built, perf_counter() - begin)
 
@@ -165,17 +165,17 @@ def _info(spec: ModelSpec, manifest: cache.Manifest, folder: Path, key: str, cac
     )
 
 
-def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest:
+def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest:
     """Derive, lower, emit and compile a model into `folder`, and write its manifest."""
     from msfp_gen.generator import generate
 
-    notify(f"deriving and emitting {entry.spec.key}", 0.0)
-    generated = generate(entry.spec)
+    notify(f"deriving and emitting {spec.key}", 0.0)
+    generated = generate(spec)
     wrapper = next(name for name in generated.files if name.endswith(".pyx"))
     translated = f"{Path(wrapper).stem}.c"
     known = find_translation(generated.files[wrapper])
     sources = {
-        **runtime_sources(entry.spec.gradients),
+        **runtime_sources(spec.gradients),
         **generated.files,
         **({translated: known} if known is not None else {}),
     }
@@ -194,7 +194,7 @@ def _build(entry: cache.Entry, folder: Path, notify: Progress) -> cache.Manifest
         keep_translation(generated.files[wrapper], folder / translated)
     manifest = cache.Manifest(
         module=entry.module,
-        spec=entry.spec.key,
+        spec=spec.key,
         key=entry.key,
         inputs=entry.inputs,
         extension=extension.name,

@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib import metadata
@@ -105,10 +105,9 @@ def module_name(spec: ModelSpec) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """Location of one model in the cache, whether it is built or not.
+    """Location of one compiled module in the cache, whether it is built or not.
 
     Attributes:
-        spec: layout and effects.
         module: name of the extension module.
         inputs: all inputs that determine the extension: model, sources, versions of tools, compiler, flags. No derived
             expression is among them, so that an entry is found without deriving the equations.
@@ -117,7 +116,6 @@ class Entry:
         folder: folder of the entry.
     """
 
-    spec: ModelSpec
     module: str
     inputs: dict[str, Any]
     key: str
@@ -132,20 +130,28 @@ class Entry:
             spec: layout and effects.
             portable: compiled for every processor, not only for that of this machine.
         """
+        return cls._of(module_name(spec), {"spec": spec.key, "sources": digest_sources()}, portable)
+
+    @classmethod
+    def of_files(cls, module: str, files: Mapping[str, str]) -> Entry:
+        """The entry of a module of given sources beside the header of the models: file name -> text."""
+        text = json.dumps(dict(sorted(files.items())))
+        return cls._of(module, {"files": _sha256(text), "sources": digest_sources()}, portable=True)
+
+    @classmethod
+    def _of(cls, module: str, own: dict[str, Any], portable: bool) -> Entry:
         inputs: dict[str, Any] = {
             "manifest": 3,
-            "spec": spec.key,
-            "sources": digest_sources(),
+            **own,
             "tools": {"msfp-gen": __version__, **{tool: tool_version(tool) for tool in TOOLS}},
             "abi": EXTENSION_SUFFIX,
             "flags": {use: list(flags) for use, flags in FLAGS.items()},
         }
-        inputs["compiler"] = _compiler(module_name(spec), inputs)
+        inputs["compiler"] = _compiler(module, inputs)
         identity = _sha256(json.dumps(inputs, sort_keys=True))
         inputs["processor"] = [] if portable else list(processor_flags(FLAGS["user"]))
         key = _sha256(json.dumps(inputs, sort_keys=True))
-        module = module_name(spec)
-        return cls(spec, module, inputs, key, identity, cache_root() / f"{module}-{key[:20]}")
+        return cls(module, inputs, key, identity, cache_root() / f"{module}-{key[:20]}")
 
     def find(self) -> Manifest | None:
         """Manifest of the compiled model; None if it is not built or is damaged. A damaged one raises a warning."""

@@ -135,6 +135,7 @@ def compile_extension(
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
     processor: Sequence[str] = (),
+    libraries: Sequence[str] = (),
 ) -> Path:
     """Write `sources` into `folder` and build the extension `module` there.
 
@@ -151,6 +152,8 @@ def compile_extension(
         Called with the number of compiled C files and the number of all.
     processor
         Flags of the C files that select a processor; see `msfp_gen.jit.processor`.
+    libraries
+        Options of the linker beside those of every extension.
 
     Returns
     -------
@@ -182,7 +185,7 @@ def compile_extension(
             progress(done, len(chains))
     objects = [object_file(name) for name in [*units, f"{wrapper}.c"]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
-    log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"])))
+    log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"], *libraries)))
     if not target.is_file():
         message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
         raise CompileError(message, log=log.path)

@@ -130,6 +130,10 @@ class Port(Protocol):
     """A compiled two-port: a committed state and a trial. Arrays are contiguous float64 in SI units."""
 
     @property
+    def capsule(self) -> object:
+        """The two-port for other compiled code, valid as long as this object."""
+
+    @property
     def time(self) -> float:
         """Time of the committed state [s]."""
 
@@ -166,3 +170,18 @@ class Port(Protocol):
 
     def restore(self, snapshot: bytes) -> None:
         """Return to the state of a snapshot. Raises ValueError."""
+
+    def step_begin(self, step: float, expected: Array) -> str:
+        """Begin a step by stages; status. The next methods: see `port_stage` and others of `msfp.h`."""
+
+    def stage(self, stage: int, ends: Array) -> tuple[str, Array]:
+        """Status, and wrenches in a stage with the ends at `ends`, shapes (2, 6) and (2, 3, 6)."""
+
+    def stage_derivative(self) -> tuple[str, Array]:
+        """Status, and derivatives of the wrench of the upper end in the stage with respect to its rates, (6, 6)."""
+
+    def step_end(self) -> tuple[str, float, float]:
+        """Status, error of the step over its tolerance, share of the step at which the first event lies."""
+
+    def step_commit(self, time: float) -> str:
+        """Accept the step; status."""

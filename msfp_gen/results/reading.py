@@ -112,17 +112,17 @@ def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Sc
     return scene_from_table(table, motion=motion)
 
 
-def motion_in(root: StoredGroup) -> tuple[Motion, Arrays, dict[str, Attribute]]:
-    """The motion that a file has as polynomials, and its arrays and attributes by their paths in the file."""
-    from msfp_gen.scene.file.stored_motion import GROUP, from_pieces
+def motion_in(root: StoredGroup, name: str = "motion") -> tuple[Motion, Arrays, dict[str, Attribute]]:
+    """The motion that a group of a file has as polynomials, its arrays and attributes by their paths in the file."""
+    from msfp_gen.scene.file.stored_motion import from_pieces
 
-    group = root.group(GROUP)
+    group = root.group(name)
     count = group.length("knots")
     shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
-    pieces = {name: group.array(name, shape, compressed=name != "knots") for name, shape in shapes.items()}
-    about = group.attributes(lambda name: name in ("name", "metadata", "max_step"))
+    pieces = {key: group.array(key, shape, compressed=key != "knots") for key, shape in shapes.items()}
+    about = group.attributes(lambda each: each in ("name", "metadata", "max_step"))
     motion = from_pieces(pieces, about)
-    arrays, named = ({f"{GROUP}/{name}": value for name, value in each.items()} for each in (pieces, about))
+    arrays, named = ({f"{name}/{key}": value for key, value in each.items()} for each in (pieces, about))
     return motion, arrays, named
 
 

@@ -96,6 +96,11 @@ typedef struct {
 #endif
 } msfp_seed;
 
+/* Jacobians of all surfaces with respect to their inputs: moment and N of the contacts, lane by lane; rims. */
+typedef struct {
+    double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
+} msfp_surface_jacobians;
+
 /* Results of one evaluation, with tangents [field][column]. Blocks as in msfp_model.h. */
 typedef struct {
     double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE];
@@ -125,6 +130,7 @@ typedef struct {
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];
     double dforce[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_DOF], dmoment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_DOF];
     double dnormal[MSFP_NB][MSFP_DOF];
+    msfp_surface_jacobians jacobians;
 } msfp_work;
 
 /* Residual [MSFP_DOF] of the condensed equations: the angular balances [N m], with interface forces summed from the top
@@ -219,8 +225,7 @@ typedef struct {
 
 /* ---- runs ------------------------------------------------------------------------------------ */
 
-#define MSFP_STAGES 7 /* of a method, at most */
-#define MSFP_NODES 3  /* interpolation nodes inside a step, at most */
+#define MSFP_NODES 3 /* interpolation nodes inside a step, at most */
 
 typedef struct {
     int method; /* enum msfp_method */

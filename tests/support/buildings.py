@@ -43,9 +43,9 @@ def frame(**options: object) -> Building:
     return Building.shear(BASE, 3 * [storey(**options)], 0.05)  # type: ignore[arg-type]
 
 
-def scene(building: Building, step: float = 0.01, bearing: Bearing = BEARING, **changes: object) -> BuildingScene:
+def scene(building: Building, rtol: float = 1e-4, bearing: Bearing = BEARING, **changes: object) -> BuildingScene:
     """The building on four bearings under two seconds of a motion along E1."""
     interface = changes.pop("interface", INTERFACE)
     bearings = [BuildingBearing(bearing, interface, place) for place in PLACES]  # type: ignore[arg-type]
-    made = BuildingScene(building, bearings, MOTION, Solver(max_step=step), 2.0)
+    made = BuildingScene(building, bearings, MOTION, Solver(rtol=rtol), 2.0)
     return replace(made, **changes)  # type: ignore[arg-type]

@@ -76,5 +76,12 @@ void msfp_api_port_counts(const msfp_port *port, int64_t *counts);
 double msfp_api_port_time(const msfp_port *port);
 int msfp_api_port_commit(msfp_port *port);
 int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
+int msfp_api_port_method(int method, msfp_method_stages *stages);
+int msfp_api_port_step_begin(msfp_port *port, double step, const double *expected);
+int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench);
+int msfp_api_port_stage_derivative(msfp_port *port, double *derivative);
+int msfp_api_port_step_end(msfp_port *port, double *error, double *share);
+int msfp_api_port_jump(msfp_port *port, const double *ends);
+int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause);
 
 #endif

@@ -99,6 +99,14 @@ static const msfp_api table = {
     .gradient_events = msfp_gradient_events,
     .gradient_extremes = msfp_gradient_extremes,
 #endif
+    .port_method = msfp_api_port_method,
+    .port_step_begin = msfp_api_port_step_begin,
+    .port_stage = msfp_api_port_stage,
+    .port_stage_derivative = msfp_api_port_stage_derivative,
+    .port_step_end = msfp_api_port_step_end,
+    .port_step_commit = msfp_port_step_commit,
+    .port_jump = msfp_api_port_jump,
+    .port_cause = msfp_api_port_cause,
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

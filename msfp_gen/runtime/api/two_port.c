@@ -1,4 +1,5 @@
 /* two_port.c: a bearing between two moving ends, for the table of functions. */
+#include <math.h>
 #include <string.h>
 #include "api.h"
 
@@ -73,4 +74,65 @@ int msfp_api_port_commit(msfp_port *port) { return port ? msfp_port_commit(port)
 int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
 {
     return snapshot ? msfp_port_snapshot_read(port, snapshot, size) : MSFP_E_SNAPSHOT;
+}
+
+/* ---- steps by stages ---- */
+
+int msfp_api_port_method(int method, msfp_method_stages *stages)
+{
+    if (method < 0 || method >= MSFP_METHODS || method == MSFP_METHOD_DOPRI5 || !stages)
+        return MSFP_E_ARGUMENT;
+    const msfp_tableau *tableau = msfp_tableau_of(method);
+    stages->count = tableau->stages;
+    stages->diagonal = tableau->gamma;
+    stages->order = tableau->order;
+    memcpy(stages->weights, tableau->a, sizeof stages->weights);
+    memcpy(stages->shares, tableau->c, sizeof stages->shares);
+    memcpy(stages->errors, tableau->e, sizeof stages->errors);
+    return MSFP_OK;
+}
+
+int msfp_api_port_step_begin(msfp_port *port, double step, const double *expected)
+{
+    if (port->committed.status)
+        return port->committed.status;
+    if (!(step > 0.0 && step < INFINITY) || !expected || !msfp_all_finite(expected, 2))
+        return MSFP_E_ARGUMENT;
+    msfp_port_step_begin(port, step, expected);
+    return MSFP_OK;
+}
+
+int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench)
+{
+    const int now = port->step.stage;
+    if (stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages || !wrench)
+        return MSFP_E_ARGUMENT;
+    if (!ends || !msfp_valid_ends(ends))
+        return MSFP_E_FINITE;
+    return msfp_port_stage(port, stage, ends, wrench);
+}
+
+int msfp_api_port_stage_derivative(msfp_port *port, double *derivative)
+{
+    return port->step.stage && derivative ? msfp_port_stage_derivative(port, derivative) : MSFP_E_ARGUMENT;
+}
+
+int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
+{
+    if (!port->step.stage || port->step.stage != port->step.stages.method->stages - 1 || !error || !share)
+        return MSFP_E_ARGUMENT;
+    return msfp_port_step_end(port, error, share);
+}
+
+int msfp_api_port_jump(msfp_port *port, const double *ends)
+{
+    return ends && msfp_valid_ends(ends) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
+}
+
+int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)
+{
+    msfp_run *run = &port->committed;
+    status = msfp_port_cause(port, status);
+    *cause = (msfp_progress){ status, run->status_surface, run->status_value, run->now.t, run->h, 0 };
+    return status;
 }

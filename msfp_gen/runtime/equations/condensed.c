@@ -41,17 +41,17 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
                              double g[MSFP_NB][2], double *residual, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE];
-    msfp_surface_jacobians jacobians;
+    msfp_surface_jacobians *jacobians = tangent ? &w->jacobians : NULL;
     if (!seed->same_base)
         msfp_base(p, at, w);
     msfp_kinematics(p, at, w);
     msfp_top(p, at, w);
-    msfp_rims(p, w, tangent ? &jacobians : NULL);
+    msfp_rims(p, w, jacobians);
     forces(p, w, residual);
 #if MSFP_LAW
     msfp_friction_conditions(at, w);
 #endif
-    const int status = msfp_surfaces(p, w, seed, g, tangent ? &jacobians : NULL);
+    const int status = msfp_surfaces(p, w, seed, g, jacobians);
     if (status)
         return status;
     for (int k = 1; k <= NB; ++k) {
@@ -61,7 +61,7 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
         w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
     }
     if (tangent)
-        msfp_tangent(p, at, seed, w, &jacobians, tangent);
+        msfp_tangent(p, at, seed, w, tangent);
     return MSFP_OK;
 }
 

@@ -161,10 +161,6 @@ void msfp_split_moment_tangent(msfp_work *w, int j);
 
 /* ---- surface.c ---- */
 
-/* Jacobians of all surfaces with respect to their inputs: moment and N of the contacts, lane by lane; rims. */
-typedef struct {
-    double contact[(MSFP_MOMENT_SIZE + 1) * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
-} msfp_surface_jacobians;
 /* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
 /* Columns of that force and of its moment, from the Jacobian. */
@@ -201,7 +197,12 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
 void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                  const msfp_surface_jacobians *jacobians, double *tangent);
+                  double *tangent);
+/* After it: derivatives [MSFP_DOF][MSFP_DOF] of the same equations with respect to force and moment at the top, for
+ * given columns of these: dforce [MSFP_FORCE_SIZE][MSFP_DOF], dmoment [MSFP_MOMENT_SIZE][MSFP_DOF]. The columns in `w`
+ * are lost. */
+void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dforce, const double *dmoment,
+                       double *derivatives);
 
 /* ---- observe.c ---- */
 

@@ -163,8 +163,39 @@ MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, co
             rows[r * DOF + (k - 1) * ND + i] -= variation[i * VARIATION + VARIATION_M + r];
 }
 
+/* The tangent from the columns at the top downwards. */
+MSFP_INLINE void descend(const msfp_parameters *p, const msfp_seed *seed, msfp_work *w,
+                         double variation[NB + 1][ND * VARIATION], columns *c, double *tangent)
+{
+    for (int k = NB; k >= 1; --k) {
+        double next[FORCE * DOF]; /* in the frame of the body below */
+        force_below(p, w, k, variation[k], c);
+        memcpy(next, c->below, sizeof next);
+        add_variation(next, k, variation[k], VARIATION_F, FORCE);
+        surface(w, seed, &w->jacobians, k - 1, variation[k], c);
+        balance(p, w, k, variation[k], c, tangent);
+        memcpy(c->above, next, sizeof c->above);
+        memcpy(c->moment_above, c->moment_below, sizeof c->moment_above);
+    }
+}
+
+MSFP_WIDE void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dforce, const double *dmoment,
+                                 double *derivatives)
+{
+    static const msfp_seed none;
+    double variation[NB + 1][ND * VARIATION] = { { 0.0 } };
+    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
+    columns c;
+    memset(&c, 0, sizeof c);
+    msfp_transported_wrench_tangent(w->body[NB], no_twist, w->force[NB], w->moment[NB], wrench, c.twist, dforce, dmoment,
+                                    dwrench);
+    memcpy(c.above, dwrench, sizeof c.above);
+    memcpy(c.moment_above, dwrench + FORCE * DOF, sizeof c.moment_above);
+    descend(p, &none, w, variation, &c, derivatives);
+}
+
 MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                            const msfp_surface_jacobians *jacobians, double *tangent)
+                            double *tangent)
 {
     const double factors[MSFP_SEED_SIZE] = { seed->cq, seed->cv, seed->ca };
     double variation[NB + 1][ND * VARIATION], moment[MOMENT];
@@ -176,15 +207,6 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
                              variation[k]);
     }
     top(p, at, seed, w, variation[NB], &c);
-    for (int k = NB; k >= 1; --k) {
-        double next[FORCE * DOF]; /* in the frame of the body below */
-        force_below(p, w, k, variation[k], &c);
-        memcpy(next, c.below, sizeof next);
-        add_variation(next, k, variation[k], VARIATION_F, FORCE);
-        surface(w, seed, jacobians, k - 1, variation[k], &c);
-        balance(p, w, k, variation[k], &c, tangent);
-        memcpy(c.above, next, sizeof c.above);
-        memcpy(c.moment_above, c.moment_below, sizeof c.moment_above);
-    }
+    descend(p, seed, w, variation, &c, tangent);
 }
 #endif

@@ -64,24 +64,40 @@ static void surface(msfp_work *w, const msfp_surface_jacobians *jacobians, rim_c
     msfp_split_moment_tangent(w, j);
 }
 
-MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                            const msfp_surface_jacobians *jacobians, double *tangent)
+/* The tangent from the columns of kinematics and of force and moment at the top. */
+static void descend(const msfp_parameters *p, msfp_work *w, double *tangent)
 {
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
     rim_columns rims;
-    seed_columns(w, seed);
-    msfp_kinematics_tangent(p, at, w);
-    msfp_top_tangent(p, at, w, NULL);
     for (int j = 0; j < NB; ++j)
-        msfp_rim_force_tangent(w, j, jacobians->rim[j], rims.force[j], rims.moment[j]);
+        msfp_rim_force_tangent(w, j, w->jacobians.rim[j], rims.force[j], rims.moment[j]);
     forces(p, w, &rims, tangent);
     for (int j = 0; j < NB; ++j)
-        surface(w, jacobians, &rims, j);
+        surface(w, &w->jacobians, &rims, j);
     for (int k = 1; k <= NB; ++k) {
         const double *above = k < NB ? w->below[k] : w->moment[k], *dabove = k < NB ? w->dbelow[k] : w->dmoment[k];
         msfp_angular_balance_tangent(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], above, out,
                                      w->dbody[k], w->dforce[k - 1], w->dmoment[k - 1], w->dforce[k], dabove, dout);
         memcpy(tangent + (k - 1) * ND * DOF, dout, NA * DOF * sizeof *dout);
     }
+}
+
+void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dforce, const double *dmoment,
+                       double *derivatives)
+{
+    memset(w->dx, 0, sizeof w->dx);
+    memset(w->dbody, 0, sizeof w->dbody);
+    memcpy(w->dforce[NB], dforce, sizeof w->dforce[NB]);
+    memcpy(w->dmoment[NB], dmoment, sizeof w->dmoment[NB]);
+    descend(p, w, derivatives);
+}
+
+MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                            double *tangent)
+{
+    seed_columns(w, seed);
+    msfp_kinematics_tangent(p, at, w);
+    msfp_top_tangent(p, at, w, NULL);
+    descend(p, w, tangent);
 }
 #endif

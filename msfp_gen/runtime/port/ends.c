@@ -32,16 +32,19 @@ static jet product(jet a, jet b)
 /* Sum over k of (-s)^k/(2k + first)!: sin(x)/x with first = 1, (1 - cos x)/x^2 with first = 2, where s = x^2 < 10. */
 static jet series(jet s, int first)
 {
-    enum { TERMS = 20 };
-    double factor[TERMS], value = 0.0, rate = 0.0, second = 0.0;
-    factor[0] = 1.0 / first;
-    for (int k = 1; k < TERMS; ++k)
-        factor[k] = -factor[k - 1] / ((2.0 * k + first) * (2.0 * k + first - 1.0));
-    for (int k = TERMS - 1; k >= 0; --k) {
-        second = second * s.of[0] + 2.0 * rate;
-        rate = rate * s.of[0] + value;
-        value = value * s.of[0] + factor[k];
+    enum { TERMS = 20, SMALL = 8 };
+    static const double smallest = 0.1; /* below it the terms from SMALL on vanish */
+    double value = 0.0, rate = 0.0, second = 0.0;
+    for (int k = s.of[0] < smallest ? SMALL : TERMS; k > 0; --k) { /* a_(k-1) = 1 + factor s a_k, in nested form */
+        const double factor = -1.0 / ((2 * k + first) * (2 * k + first - 1));
+        second = factor * (second * s.of[0] + 2.0 * rate);
+        rate = factor * (rate * s.of[0] + (value + 1.0));
+        value = factor * s.of[0] * (value + 1.0);
     }
+    const double scale = 1.0 / first;
+    value = (value + 1.0) * scale;
+    rate *= scale;
+    second *= scale;
     return (jet){ { value, rate * s.of[1], second * s.of[1] * s.of[1] + rate * s.of[2] } };
 }
 
@@ -65,6 +68,13 @@ void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_O
 {
     static const int next[3] = { 1, 2, 0 };
     jet r[3], matrix[3][3], square = constant(0.0);
+    int turned = 0;
+    for (int i = 0; i < MSFP_ORDERS * 3; ++i)
+        turned |= (&rotation[0][0])[i] != 0.0;
+    if (!turned) {
+        memset(&angles[0][0], 0, MSFP_ORDERS * sizeof *angles);
+        return;
+    }
     for (int i = 0; i < 3; ++i)
         r[i] = (jet){ { rotation[0][i], rotation[1][i], rotation[2][i] } };
     for (int i = 0; i < 3; ++i)
@@ -84,6 +94,45 @@ void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_O
         for (int i = 0; i < 3; ++i)
             angles[order][i] = found[i].of[order];
 }
+
+#if MSFP_TOP_ROTATION
+/* Angular velocity of the axis at angles psi, theta, phi, from their rates, (3.12) without spin. */
+static void axis_turns(const double *angles, const double *rates, double turn[3])
+{
+    turn[0] = rates[0];
+    turn[1] = rates[1] * cos(angles[0]);
+    turn[2] = rates[1] * sin(angles[0]);
+}
+
+/* Rates of angles at the rates of the rotation vector, are linear in these; their derivatives with respect to the
+ * rotation vector are the second derivatives of the angles on a straight path, in two directions at once. */
+void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3])
+{
+    double path[MSFP_ORDERS][3] = { { 0.0 } }, along[MSFP_ORDERS][3], sum[MSFP_ORDERS][3], difference[MSFP_ORDERS][3];
+    memcpy(path[0], rotation[0], sizeof path[0]);
+    memcpy(path[1], rotation[1], sizeof path[1]);
+    double angles[MSFP_ORDERS][3];
+    msfp_end_angles((const double(*)[3])path, angles);
+    const double sine = sin(angles[0][0]), cosine = cos(angles[0][0]);
+    for (int i = 0; i < 3; ++i) {
+        memset(path[1], 0, sizeof path[1]);
+        path[1][i] = 1.0;
+        msfp_end_angles((const double(*)[3])path, along);
+        axis_turns(along[0], along[1], turns[i]);
+        for (int k = 0; k < 3; ++k)
+            path[1][k] = rotation[1][k] + (k == i);
+        msfp_end_angles((const double(*)[3])path, sum);
+        for (int k = 0; k < 3; ++k)
+            path[1][k] = rotation[1][k] - (k == i);
+        msfp_end_angles((const double(*)[3])path, difference);
+        const double psi1 = 0.25 * (sum[2][0] - difference[2][0]), theta1 = 0.25 * (sum[2][1] - difference[2][1]);
+        const double turned = angles[1][1] * along[1][0];
+        derivatives[i][0] = psi1;
+        derivatives[i][1] = theta1 * cosine - turned * sine;
+        derivatives[i][2] = theta1 * sine + turned * cosine;
+    }
+}
+#endif
 
 /* ---- polynomials of a step ---- */
 

@@ -79,19 +79,17 @@ void msfp_port_free(msfp_port *port)
     free(port);
 }
 
-/* Fix the horizontal springs where end B is at the end of a trial: the load that its motion adds stays small beside the
- * axial load. The energy of the springs is counted from there. */
-static void move_anchor(const msfp_port *port, msfp_run *run, const msfp_ends *to)
+double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
+                             const double *at)
 {
-    double plate[3], anchor[3] = { 0.0 }, before[3], stored = 0.0;
-    msfp_body_C_get(run->work.body[NB], plate);
+    double anchor[3] = { 0.0 }, before[3], stored = 0.0;
     for (int i = 0; i < 2; ++i) {
-        before[i] = port->plate[i] + port->from.of[1][0][i];
-        anchor[i] = port->plate[i] + to->of[1][0][i];
+        before[i] = port->plate[i] + from[i];
+        anchor[i] = port->plate[i] + at[i];
         stored += (plate[i] - anchor[i]) * (plate[i] - anchor[i]) - (plate[i] - before[i]) * (plate[i] - before[i]);
     }
     msfp_top_parameters_x0_put(run->parameters.top, anchor);
-    run->now.energy += 0.5 * run->parameters.top[MSFP_TOP_PARAMETERS_K] * stored;
+    return 0.5 * run->parameters.top[MSFP_TOP_PARAMETERS_K] * stored;
 }
 
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to)
@@ -109,7 +107,8 @@ void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends
     msfp_support_path(&port->from, to, h, &port->support);
 #endif
     attach_all(port, run); /* nothing of an earlier trial is left in the searches */
-    move_anchor(port, run, to);
+    /* The springs are fixed where end B is at the end: the load that its motion adds stays small beside the axial load. */
+    run->now.energy += msfp_port_move_anchor(port, run, port->committed.rows[0].top, port->from.of[1][0], to->of[1][0]);
 }
 
 /* Record the end of the step just taken. */
@@ -228,7 +227,7 @@ void msfp_port_revert(msfp_port *port)
     copy_state(&port->run, &port->committed);
 }
 
-/* ---- snapshots: motion of the ends, its checksum, and the snapshot of the committed run with one row ---- */
+/* ---- snapshots: what the port adds, its checksum, and the snapshot of the committed run with one row ---- */
 
 int msfp_valid_ends(const double *ends)
 {
@@ -242,27 +241,38 @@ int msfp_valid_ends(const double *ends)
     return 1;
 }
 
-enum { HEAD = sizeof(msfp_ends) + sizeof(uint64_t) };
+/* All numbers: no bytes between them. */
+typedef struct {
+    msfp_ends from;
+    double moves[MSFP_DOF][MSFP_END_FREEDOMS], moved; /* as in msfp_port_step */
+} head;
+
+enum { HEAD = sizeof(head) + sizeof(uint64_t) };
 
 size_t msfp_port_snapshot_size(const msfp_port *port) { return HEAD + msfp_snapshot_size(&port->committed, 1); }
 
 void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
 {
-    const uint64_t sum = msfp_checksum(&port->from, sizeof port->from);
-    memcpy(snapshot, &port->from, sizeof port->from);
-    memcpy((char *)snapshot + sizeof port->from, &sum, sizeof sum);
+    head h;
+    h.from = port->from;
+    memcpy(h.moves, port->step.moves, sizeof h.moves);
+    h.moved = port->step.moved;
+    const uint64_t sum = msfp_checksum(&h, sizeof h);
+    memcpy(snapshot, &h, sizeof h);
+    memcpy((char *)snapshot + sizeof h, &sum, sizeof sum);
     msfp_snapshot_write(&port->committed, 1, (char *)snapshot + HEAD);
 }
 
 int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
 {
-    msfp_ends from;
+    head h;
     uint64_t sum;
     if (size != msfp_port_snapshot_size(port)) /* one row, no events */
         return MSFP_E_SNAPSHOT;
-    memcpy(&from, snapshot, sizeof from);
-    memcpy(&sum, (const char *)snapshot + sizeof from, sizeof sum);
-    if (sum != msfp_checksum(&from, sizeof from) || !msfp_valid_ends(&from.of[0][0][0]))
+    memcpy(&h, snapshot, sizeof h);
+    memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
+    if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0]) ||
+        !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;
     found.rows = NULL; /* those of `committed` stay until the snapshot is accepted */
@@ -276,7 +286,10 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     }
     msfp_run_free(&port->committed);
     port->committed = found;
-    port->from = from;
+    port->from = h.from;
+    memcpy(port->step.moves, h.moves, sizeof h.moves);
+    port->step.moved = h.moved != 0.0;
+    port->step.stage = port->step.finished = 0;
     msfp_port_revert(port);
     return MSFP_OK;
 }

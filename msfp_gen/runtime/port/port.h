@@ -26,6 +26,18 @@ typedef struct {
     double coefficients[6][MSFP_DEGREE + 1];
 } msfp_polynomials;
 
+/* A step by stages from the committed state: those of `committed.now` and `next`. */
+typedef struct {
+    msfp_stages stages;
+    int stage;         /* that is being solved; 0: none */
+    double anchor[2];  /* where the horizontal springs of the interface are fixed in this step [m] */
+    double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* derivatives of the rates of a stage with respect to those of end B */
+    int moved;         /* those are of the latest stage that was differentiated; otherwise there was none */
+    double before[MSFP_EVENTS], after[MSFP_EVENTS]; /* event functions at its ends */
+    double energy;     /* at its end, with springs as in `committed.now` [J] */
+    int finished;      /* it may be committed */
+} msfp_port_step;
+
 struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
@@ -41,6 +53,7 @@ struct msfp_port {
     size_t time_count, time_capacity;
     int tried; /* a trial has succeeded since the last commit, revert or failure */
     int ready; /* it may be committed: the same, or a trial of no duration */
+    msfp_port_step step;
 };
 
 /* ---- port.c ---- */
@@ -73,6 +86,32 @@ void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
 void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
 
+/* Fix the horizontal springs of the interface where end B is at u = `at` [m], instead of `from`; returns by how much
+ * their energy is larger there, with the top plate at `plate` [m]: [J]. */
+double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
+                             const double *at);
+
+/* ---- stage.c: steps by the stages of a method that another program drives ---- */
+
+/* Begin a step of length h [s] from the committed state; a step that was begun before is forgotten. expected [2]:
+ * horizontal displacement of end B that is expected at its end [m]. */
+void msfp_port_step_begin(msfp_port *port, double h, const double *expected);
+/* Solve stage i, 1 or the last one again or the one after it, with the ends moving as `ends` [end][order][6] says, and
+ * state the wrenches [end][6]. Returns MSFP_OK or a status, with its place as in a run. */
+int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench);
+/* Derivatives [6][6] of the wrench of end B in that stage with respect to the rates of end B, whose displacements change
+ * with them by the diagonal entry of the method times the step. Returns MSFP_OK or a status. */
+int msfp_port_stage_derivative(msfp_port *port, double *derivative);
+/* After the last stage: error of the step over its tolerance [-], and the share of the step at which the first event of
+ * the bearing lies; 1: none. Returns MSFP_OK or a status. */
+int msfp_port_step_end(msfp_port *port, double *error, double *share);
+/* Accept the step, which ends at the time t [s]. */
+int msfp_port_step_commit(msfp_port *port, double t);
+/* The accelerations of the ends in the committed state jump to those of `ends`. Returns MSFP_OK or a status. */
+int msfp_port_jump(msfp_port *port, const double *ends);
+/* The cause of a `status` that a shorter step does not cure. */
+int msfp_port_cause(msfp_port *port, int status);
+
 /* ---- ends.c: what a motion of the ends is to the equations ---- */
 
 /* Angles psi, theta, phi (2.1) of a rotation vector, with derivatives: both [order][3]. */
@@ -86,6 +125,12 @@ void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const 
 #if MSFP_TOP_ROTATION
 /* Rotation psi, theta of end B over a step. */
 void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support);
+#endif
+
+#if MSFP_TOP_ROTATION
+/* Angular velocities [direction][3] of the axis of end B for unit rates of its rotation vector, and the derivatives of
+ * its present angular velocity with respect to the rotation vector. rotation [order][3]. */
+void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3]);
 #endif
 
 /* ---- derivatives.c ---- */

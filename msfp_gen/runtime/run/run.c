@@ -14,9 +14,7 @@ enum {
 static const double smallest_step = 1e-9;     /* [s], far below any period of a bearing; closer times count as equal */
 static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
 
-/* Accelerations, friction rates and powers consistent with the present state: at the start and after a jump of the base
- * acceleration. */
-static int consistent_initial_state(msfp_run *run)
+int msfp_consistent_initial_state(msfp_run *run)
 {
     msfp_point at;
     msfp_solution solution = { 0, 0, 0.0 };
@@ -91,7 +89,7 @@ int msfp_run_start(msfp_run *run, const msfp_parameters *p, const msfp_history *
         memcpy(run->now.foot, options->foot, 2 * sizeof *options->foot);
     else
         msfp_foot_at_rest(p, &at, run->now.foot);
-    run->status = consistent_initial_state(run);
+    run->status = msfp_consistent_initial_state(run);
     if (run->status)
         return run->status;
     msfp_row row;
@@ -229,7 +227,7 @@ static int accept(msfp_run *run, const double *before, const double *after, doub
     }
     if (run->next_jump < run->jump_count && run->now.t >= run->jumps[run->next_jump] - msfp_smallest_step(run->now.t)) {
         run->now.t = fmax(run->now.t, run->jumps[run->next_jump++]);
-        run->status = consistent_initial_state(run);
+        run->status = msfp_consistent_initial_state(run);
         if (run->status == MSFP_OK)
             run->status = MSFP_IF_GRADIENTS(msfp_gradients_jump(run), MSFP_OK);
         run->h = fmin(run->h, 1e-4);

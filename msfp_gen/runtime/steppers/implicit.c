@@ -7,16 +7,9 @@
 #include <string.h>
 #include "steppers.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, STAGES = MSFP_STAGES };
+enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ };
 
 static const int unknown[ND] = MSFP_FREE;
-
-typedef struct {
-    const msfp_tableau *method;
-    double v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], power[STAGES][MSFP_WORKS], prescribed[STAGES];
-    double foot[STAGES][2]; /* velocity and acceleration of the foot of the supported mass */
-    msfp_stage now; /* the stage that is being solved */
-} stages;
 
 MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double weight, int count)
 {
@@ -25,8 +18,8 @@ MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double 
 }
 
 /* Add the weighted rates of the first `count` stages to coordinates, their rates, and Y, Z. */
-static void add_stages(const stages *s, const double *weights, int count, double h, double q[NB][NQ], double v[NB][NQ],
-                       double f[NB][2], double foot[2])
+static void add_stages(const msfp_stages *s, const double *weights, int count, double h, double q[NB][NQ],
+                       double v[NB][NQ], double f[NB][2], double foot[2])
 {
     for (int j = 0; j < count; ++j) {
         add(&q[0][0], &s->v[j][0][0], h * weights[j], NB * NQ);
@@ -36,9 +29,10 @@ static void add_stages(const stages *s, const double *weights, int count, double
     }
 }
 
-/* Q, V and fp of stage i, in q = Q + beta v, v = V + beta a, f = fp + beta df, and the same of the foot. */
-static void prepare(const msfp_run *run, stages *s, int i, double h)
+/* Q, V and fp, in q = Q + beta v, v = V + beta a, f = fp + beta df, and the same of the foot. */
+void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
 {
+    const double h = s->h;
     memcpy(s->now.Q, run->now.q, sizeof s->now.Q);
     memcpy(s->now.V, run->now.v, sizeof s->now.V);
     memcpy(s->now.seed.fp, run->now.f, sizeof s->now.seed.fp);
@@ -46,10 +40,12 @@ static void prepare(const msfp_run *run, stages *s, int i, double h)
     add_stages(s, s->method->a[i], i, h, s->now.Q, s->now.V, s->now.seed.fp, s->now.at.foot);
     s->now.at.foot[0] += s->now.beta * s->now.at.foot[1];
     s->now.at.foot_beta = s->now.beta;
+    s->now.seed.same_base = 0;
+    msfp_heat_prepare(run, s->method->a[i], i, h, s->now.beta, &s->now.at);
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
-static double extrapolated_rate(const msfp_run *run, const stages *s, int i, int k, int j, double h)
+static double extrapolated_rate(const msfp_run *run, const msfp_stages *s, int i, int k, int j, double h)
 {
     const double *c = s->method->c;
     const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / c[1] : h * run->now.a[k][j];
@@ -62,7 +58,7 @@ static double extrapolated_rate(const msfp_run *run, const stages *s, int i, int
 
 /* Rate j of body k at stage i from an acceleration extrapolated linearly, as a base acceleration linear in time
  * causes. */
-static double rate_of_extrapolated_acceleration(const msfp_run *run, const stages *s, int i, int k, int j, double h)
+static double rate_of_extrapolated_acceleration(const msfp_run *run, const msfp_stages *s, int i, int k, int j, double h)
 {
     const double *c = s->method->c;
     const double change = i > 1 ? (s->a[i - 1][k][j] - s->a[0][k][j]) / c[i - 1] : h * run->acceleration_slope[k][j];
@@ -70,7 +66,7 @@ static double rate_of_extrapolated_acceleration(const msfp_run *run, const stage
 }
 
 /* First guess of stage i. */
-static void guess(const msfp_run *run, stages *s, int i, double h, int extrapolate)
+static void guess(const msfp_run *run, msfp_stages *s, int i, double h, int extrapolate)
 {
     const int sampled = run->options.sampled;
     memcpy(s->now.at.v, run->now.v, sizeof s->now.at.v);
@@ -85,7 +81,7 @@ static void guess(const msfp_run *run, stages *s, int i, double h, int extrapola
 }
 
 /* First guesses are tried in the order of enum msfp_start, the last one only if a shorter step has failed as well. */
-static int solve(msfp_run *run, stages *s, int i, double h)
+int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i)
 {
     int status = MSFP_E_NEWTON;
     for (int start = 0; start < MSFP_STARTS && status == MSFP_E_NEWTON; ++start) {
@@ -93,7 +89,7 @@ static int solve(msfp_run *run, stages *s, int i, double h)
             break;
         run->counts[MSFP_COUNT_OTHER_STARTS] += start == MSFP_START_PLAIN;
         run->counts[MSFP_COUNT_QUASISTATIC_STARTS] += start == MSFP_START_QUASISTATIC;
-        guess(run, s, i, h, (run->restart ? MSFP_START_PLAIN : MSFP_START_PREDICTED) == start);
+        guess(run, s, i, s->h, (run->restart ? MSFP_START_PLAIN : MSFP_START_PREDICTED) == start);
         if (start == MSFP_START_QUASISTATIC)
             msfp_quasistatic_start(run, &s->now);
         status = msfp_solve_stage(run, &s->now);
@@ -102,7 +98,7 @@ static int solve(msfp_run *run, stages *s, int i, double h)
 }
 
 /* Integrals of the energy balance up to stage i, by the weights of the method. */
-static void integrals(const msfp_run *run, const stages *s, int i, double h, double *work)
+static void integrals(const msfp_run *run, const msfp_stages *s, int i, double h, double *work)
 {
     memcpy(work, run->now.work, sizeof run->now.work);
     for (int j = 0; j <= i; ++j) {
@@ -114,7 +110,7 @@ static void integrals(const msfp_run *run, const stages *s, int i, double h, dou
 
 /* Where the solution is smooth, third-order weights integrate the work: they see the curvature of power over a long
  * step. Rates that ring are integrated correctly by the weights of the method alone; prescribed rates never ring. */
-static void refine_integrals(const stages *s, double h, int ringing, double *work)
+static void refine_integrals(const msfp_stages *s, double h, int ringing, double *work)
 {
     const msfp_tableau *method = s->method;
     for (int j = 0; j < method->stages && method->order <= 3.0; ++j)
@@ -123,40 +119,6 @@ static void refine_integrals(const stages *s, double h, int ringing, double *wor
         else
             for (int e = 0; e < MSFP_WORKS; ++e) /* the energy stored in stuck friction always rings */
                 work[e] -= e == MSFP_WORK_FRICTION_STORED ? 0.0 : h * method->e[j] * s->power[j][e];
-}
-
-static int stage(msfp_run *run, stages *s, int i, double h)
-{
-    prepare(run, s, i, h);
-    msfp_point_at(run, run->now.t + s->method->c[i] * h, &s->now.at);
-    s->now.seed.same_base = 0;
-    msfp_heat_prepare(run, s->method->a[i], i, h, s->now.beta, &s->now.at);
-    const int status = solve(run, s, i, h);
-    if (status)
-        return status;
-    memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
-#if MSFP_GRADIENTS
-    msfp_gradients_stage(run, i, &s->now);
-#endif
-    memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
-    memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
-    memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);
-    msfp_friction_rates(&run->work, s->df[i]);
-    run->next.mechanical = msfp_mechanical_energy(&run->parameters, &s->now.at, &run->work);
-    msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]);
-    s->prescribed[i] = msfp_prescribed_power(&run->parameters, &s->now.at, &run->work);
-    msfp_heat_stage(run, i, s->now.beta);
-    if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
-        msfp_node *node = &run->node[run->node_count++];
-        node->share = s->method->c[i];
-        msfp_heat_node(run, node);
-        memcpy(node->q, s->now.at.q, sizeof node->q);
-        memcpy(node->v, s->now.at.v, sizeof node->v);
-        memcpy(node->f, s->now.f, sizeof node->f);
-        memcpy(node->foot, run->work.foot, sizeof node->foot);
-        integrals(run, s, i, h, node->work);
-    }
-    return MSFP_OK;
 }
 
 /* Error of Y, Z outside the unit disc. Only the distance by which this step moves them outwards counts, with a weight
@@ -177,10 +139,37 @@ static double unit_disc_error(const msfp_run *run, const msfp_stage *s)
     return worst;
 }
 
+void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
+{
+    memcpy(s->now.at.f, s->now.f, sizeof s->now.at.f);
+#if MSFP_GRADIENTS
+    msfp_gradients_stage(run, i, &s->now);
+#endif
+    memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
+    memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
+    memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);
+    msfp_friction_rates(&run->work, s->df[i]);
+    run->next.mechanical = msfp_mechanical_energy(&run->parameters, &s->now.at, &run->work);
+    msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]);
+    s->prescribed[i] = msfp_prescribed_power(&run->parameters, &s->now.at, &run->work);
+    msfp_heat_stage(run, i, s->now.beta);
+    if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
+        msfp_node *node = &run->node[run->node_count++];
+        node->share = s->method->c[i];
+        msfp_heat_node(run, node);
+        memcpy(node->q, s->now.at.q, sizeof node->q);
+        memcpy(node->v, s->now.at.v, sizeof node->v);
+        memcpy(node->f, s->now.f, sizeof node->f);
+        memcpy(node->foot, run->work.foot, sizeof node->foot);
+        integrals(run, s, i, s->h, node->work);
+    }
+    s->other = fmax(s->other, unit_disc_error(run, &s->now));
+}
+
 /* The embedded estimate of an undamped fast mode is as large as its ringing, although the method damps it. As Hosea and
  * Shampine (1996) do, it is filtered by (1 - beta J)^-1: the last stage is solved with its history moved by the
  * estimate, with the present factors. */
-static void filter(msfp_run *run, const stages *s, msfp_increment *estimate)
+static void filter(msfp_run *run, const msfp_stages *s, msfp_increment *estimate)
 {
     msfp_stage moved = s->now;
     msfp_work w; /* separate, so that run->work keeps the end of the step */
@@ -216,65 +205,80 @@ static void filter(msfp_run *run, const stages *s, msfp_increment *estimate)
     estimate->foot[0] = w.foot[MSFP_FOOT_Y] - run->work.foot[MSFP_FOOT_Y];
 }
 
-int msfp_step_implicit(msfp_run *run, double h, double *error)
+void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
 {
-    stages s;
+    const msfp_state *now = &run->now;
+    s->method = msfp_tableau_of(run->options.method);
+    const double beta = s->method->gamma * h;
+    run->node_count = 0;
+    s->h = h;
+    s->other = 0.0;
+    s->now.beta = beta;
+    s->now.inertia = 1.0;
+    s->now.seed.cq = s->now.seed.beta = beta;
+    s->now.seed.cv = 1.0;
+#if MSFP_CLOSED_FORM
+    s->now.seed.closed_form = 0;
+#endif
+    s->now.seed.ca = 1.0 / beta;
+    s->now.seed.accuracy = 1e-5 * run->options.rtol;
+    memset(s->now.at.a, 0, sizeof s->now.at.a);
+    memcpy(s->v[0], now->v, sizeof s->v[0]);
+    memcpy(s->a[0], now->a, sizeof s->a[0]);
+    memcpy(s->df[0], now->df, sizeof s->df[0]);
+    memcpy(s->foot[0], now->foot + MSFP_FOOT_Y1, sizeof s->foot[0]);
+    memcpy(s->power[0], now->power, sizeof s->power[0]);
+    s->prescribed[0] = now->prescribed_power;
+    msfp_heat_begin(run);
+}
+
+void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
+{
     msfp_increment estimate;
     memset(&estimate, 0, sizeof estimate);
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
-    const msfp_tableau *method = s.method = msfp_tableau_of(run->options.method);
+    const msfp_tableau *method = s->method;
     const int last = method->stages - 1;
-    run->node_count = 0;
-    const double beta = method->gamma * h;
-    s.now.beta = beta;
-    s.now.inertia = 1.0;
-    s.now.seed.cq = s.now.seed.beta = beta;
-    s.now.seed.cv = 1.0;
-#if MSFP_CLOSED_FORM
-    s.now.seed.closed_form = 0;
-#endif
-    s.now.seed.ca = 1.0 / beta;
-    s.now.seed.accuracy = 1e-5 * run->options.rtol;
-    memset(s.now.at.a, 0, sizeof s.now.at.a);
-    memcpy(s.v[0], now->v, sizeof s.v[0]);
-    memcpy(s.a[0], now->a, sizeof s.a[0]);
-    memcpy(s.df[0], now->df, sizeof s.df[0]);
-    memcpy(s.foot[0], now->foot + MSFP_FOOT_Y1, sizeof s.foot[0]);
-    memcpy(s.power[0], now->power, sizeof s.power[0]);
-    s.prescribed[0] = now->prescribed_power;
-    msfp_heat_begin(run);
-    double other = 0.0; /* errors beside that of the embedded estimate */
-    for (int i = 1; i <= last; ++i) {
-        const int status = stage(run, &s, i, h);
-        if (status)
-            return status;
-        other = fmax(other, unit_disc_error(run, &s.now));
-    }
+    const double h = s->h;
     next->t = now->t + h;
     msfp_heat_finish(run);
-    memcpy(s.now.at.f, s.now.f, sizeof s.now.f);
-    run->reached = s.now.at;
-    memcpy(next->q, s.now.at.q, sizeof next->q);
-    memcpy(next->v, s.now.at.v, sizeof next->v);
-    memcpy(next->a, s.now.at.a, sizeof next->a);
-    memcpy(next->f, s.now.f, sizeof next->f);
+    run->reached = s->now.at;
+    memcpy(next->q, s->now.at.q, sizeof next->q);
+    memcpy(next->v, s->now.at.v, sizeof next->v);
+    memcpy(next->a, s->now.at.a, sizeof next->a);
+    memcpy(next->f, s->now.f, sizeof next->f);
     memcpy(next->foot, run->work.foot, sizeof next->foot);
-    memcpy(next->df, s.df[last], sizeof next->df);
-    memcpy(next->power, s.power[last], sizeof next->power);
-    next->prescribed_power = s.prescribed[last];
-    integrals(run, &s, last, h, next->work);
-    add_stages(&s, method->e, last + 1, h, estimate.q, estimate.v, estimate.f, estimate.foot);
+    memcpy(next->df, s->df[last], sizeof next->df);
+    memcpy(next->power, s->power[last], sizeof next->power);
+    next->prescribed_power = s->prescribed[last];
+    integrals(run, s, last, h, next->work);
+    add_stages(s, method->e, last + 1, h, estimate.q, estimate.v, estimate.f, estimate.foot);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < NQ; ++d)
-            run->acceleration_slope[k][d] = (s.a[last][k][d] - s.a[0][k][d]) / h;
-    other = fmax(other, msfp_friction_jump_error(now, next));
-    other = fmax(other, msfp_heat_error(run, method->e, last + 1, h, beta));
+            run->acceleration_slope[k][d] = (s->a[last][k][d] - s->a[0][k][d]) / h;
+    double other = fmax(s->other, msfp_friction_jump_error(now, next));
+    other = fmax(other, msfp_heat_error(run, method->e, last + 1, h, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
-    refine_integrals(&s, h, *error > 1.0, next->work);
+    refine_integrals(s, h, *error > 1.0, next->work);
     if (*error > 1.0) {
-        filter(run, &s, &estimate);
+        filter(run, s, &estimate);
         *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     }
+}
+
+int msfp_step_implicit(msfp_run *run, double h, double *error)
+{
+    msfp_stages s;
+    msfp_stages_begin(run, &s, h);
+    for (int i = 1; i < s.method->stages; ++i) {
+        msfp_stage_begin(run, &s, i);
+        msfp_point_at(run, run->now.t + s.method->c[i] * h, &s.now.at);
+        const int status = msfp_stage_solve(run, &s, i);
+        if (status)
+            return status;
+        msfp_stage_end(run, &s, i);
+    }
+    msfp_stages_end(run, &s, error);
     return MSFP_OK;
 }

@@ -99,8 +99,7 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor)
             s->at.v[k][unknown[i]] -= factor * step[k * ND + i];
 }
 
-/* Factors of the tangent at the present rates, with the residual there and its size. */
-static int factorise(msfp_run *run, msfp_stage *s, double *residual, double *size)
+int msfp_factorise_stage(msfp_run *run, msfp_stage *s, double *residual, double *size)
 {
     update_point(s);
     ++run->counts[MSFP_COUNT_FACTORISATIONS];
@@ -144,7 +143,7 @@ void msfp_quasistatic_start(msfp_run *run, msfp_stage *s)
     s->inertia = s->seed.ca = 0.0;
     double size = msfp_stage_residual(run, s, &run->work, residual);
     for (int i = 0; i < 10 && size > 1e-2 && size < INFINITY; ++i) {
-        if (factorise(run, s, residual, &size))
+        if (msfp_factorise_stage(run, s, residual, &size))
             break;
         size = take_step(run, s, residual, step, size, 1);
     }
@@ -220,7 +219,7 @@ static int check_regularity(msfp_run *run, msfp_stage *s, double size)
     if (run->work_sign &&
         run->work_sign != run->determinant) { /* the factors may belong to a distant guess: evaluate at the solution */
         double residual[DOF];
-        const int status = factorise(run, s, residual, &size);
+        const int status = msfp_factorise_stage(run, s, residual, &size);
         if (status)
             return failed(run, status, size);
     }
@@ -247,7 +246,7 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
     if (!fresh)
         size = msfp_stage_residual(run, s, &run->work, residual);
     if (fresh)
-        status = factorise(run, s, residual, &size);
+        status = msfp_factorise_stage(run, s, residual, &size);
     if (status && status != MSFP_E_IRREGULAR) /* the forces cannot be formed at this guess */
         status = MSFP_E_NEWTON;
     for (int i = 0; size > goal; ++i) {
@@ -263,7 +262,7 @@ int msfp_solve_stage(msfp_run *run, msfp_stage *s)
         fresh = size > goal && size >= 0.1 * before;
         if (fresh) {
             ++run->counts[MSFP_COUNT_FRESH_TANGENTS];
-            status = factorise(run, s, residual, &size);
+            status = msfp_factorise_stage(run, s, residual, &size);
         }
     }
     return check_regularity(run, s, size);

@@ -73,6 +73,30 @@ void msfp_stage_move(msfp_stage *s, const double *step, double factor);
 void msfp_quasistatic_start(msfp_run *run, msfp_stage *s);
 /* Newton's method on a stage, from the rates in it. */
 int msfp_solve_stage(msfp_run *run, msfp_stage *s);
+/* Factors of the tangent at the present rates, in `run`, with the residual there and its size. */
+int msfp_factorise_stage(msfp_run *run, msfp_stage *s, double *residual, double *size);
+
+/* ---- implicit.c: a step of an ESDIRK method, stage by stage ---- */
+
+/* A step in progress: rates of its stages, and the stage that is being solved. */
+typedef struct {
+    const msfp_tableau *method;
+    double h, other; /* its length [s]; its error beside that of the embedded estimate, over its tolerance [-] */
+    double v[MSFP_STAGES][MSFP_NB][MSFP_NQ], a[MSFP_STAGES][MSFP_NB][MSFP_NQ], df[MSFP_STAGES][MSFP_NB][2],
+        power[MSFP_STAGES][MSFP_WORKS], prescribed[MSFP_STAGES];
+    double foot[MSFP_STAGES][2]; /* velocity and acceleration of the foot of the supported mass */
+    msfp_stage now;
+} msfp_stages;
+
+/* Begin a step of length h [s]. */
+void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h);
+/* For each stage i from 1 on: begin; base, load and support into s->now.at; solve, which may be repeated for others of
+ * these; end. The point s->now.at and run->work are then at the solution. */
+void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i);
+int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i);
+void msfp_stage_end(msfp_run *run, msfp_stages *s, int i);
+/* The state at the end of the step, into run->next, and its error as below. */
+void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error);
 
 /* ---- the methods; error: of the step over its tolerance [-] ---- */
 

@@ -104,7 +104,12 @@ def test_a_file_gives_the_scene_of_python(tmp_path: Path):
     assert scene.bearings[0].interface == Top.node(1e7, 5e7, 1e6) != scene.bearings[2].interface
     assert scene.bearings[1].effects == Auto(uplift=True) and scene.bearings[0].effects is None
     assert scene.modelled == (Effects(), Effects(uplift=True), Effects(), Effects())
-    assert (scene.step, scene.end, scene.name, scene.label(3)) == (0.01, 1.0, "one storey", "bearing 4 (last)")
+    assert (scene.solver.max_step, scene.end, scene.name, scene.label(3)) == (
+        0.01,
+        1.0,
+        "one storey",
+        "bearing 4 (last)",
+    )
 
 
 def test_a_reduced_frame(tmp_path: Path):

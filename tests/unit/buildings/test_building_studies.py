@@ -21,6 +21,7 @@ from msfp_gen.studies.study.loader import load_study
 TEXT = """
 name = "slab"
 duration = 0.24
+output_step = "20 ms"
 
 [building.base]
 mass = "45 t"
@@ -52,8 +53,6 @@ kind = "ramp"
 acceleration = 2.0
 duration = 0.3
 
-[solver]
-max_step = "20 ms"
 """
 FRICTION = "building.bearing[*].bearing.surfaces[0].friction"
 

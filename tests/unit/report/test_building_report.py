@@ -26,7 +26,7 @@ FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftsh
 @cache
 def result() -> BuildingResult:
     motion = Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1)
-    return simulate(scene(frame(), 0.02, motion=motion, duration=0.8, name="frame <b>"))
+    return simulate(scene(frame(), motion=motion, duration=0.8, output_step=0.02, name="frame <b>"))
 
 
 @cache

@@ -1,0 +1,116 @@
+/* building.h: what the files of the run of a building share. */
+#ifndef BUILDING_H
+#define BUILDING_H
+#define _POSIX_C_SOURCE 200809L
+#include <pthread.h>
+#include "msfp_building.h"
+
+enum { FACTORS = 3 }; /* step sizes whose factors are kept */
+enum { ENERGIES = 3, DAMPED = 0, RECEIVED, GROUND }; /* integrals over the run */
+
+/* The linear equations at one step size: A = M/beta + C + beta K. */
+typedef struct {
+    double beta;     /* [s]; 0: none */
+    long used;       /* when it was last used */
+    double *factors; /* [n][n] of A */
+    double *follow;  /* [attachments][n] A^-1 P, with P the columns of the attachments in the unit matrix */
+    double *mobility, *mobility_factors; /* [attachments]^2: P^T A^-1 P */
+} linear;
+
+/* A bearing in the stage that is being solved. */
+typedef struct {
+    int status;
+    double wrench[2 * MSFP_WRENCH], derivative[MSFP_WRENCH * MSFP_WRENCH], rest[MSFP_WRENCH];
+    double ends[2 * 3 * MSFP_WRENCH];
+    double error, share; /* of the step */
+} member;
+
+/* What a task of the threads does for one bearing. */
+typedef void task(msfp_building *b, int bearing);
+
+typedef struct {
+    pthread_t *threads; /* beside the one that asks */
+    int count;          /* with that one */
+    pthread_mutex_t lock;
+    pthread_cond_t begun, done;
+    task *what;
+    long generation;
+    int pending, ended;
+} pool;
+
+struct msfp_building {
+    msfp_building_scene scene;
+    msfp_method_stages method;
+    member *members;
+    int *piece;     /* [grounds] where the last search ended */
+    double *ground; /* [grounds][MSFP_GROUND] in the present stage */
+    pool pool;
+    /* Numbers of the state between two steps, written to snapshots from here on. */
+    double t, h, previous_error, energy, energies[ENERGIES];
+    double tangent_beta; /* of `tangent` [s]; 0: none */
+    int stop, jump, span, next_row;
+    long counts[MSFP_BUILDING_COUNTS];
+    double *u, *v, *a;  /* [n] */
+    double *slope;      /* [n] rate of change of `a` over the last step */
+    double *tangent;    /* [attachments]^2 sum of the derivatives of the bearings */
+    double *force;      /* [attachments] forces of the bearings less those at rest */
+    /* The step in progress. */
+    linear linear[FACTORS], *now;
+    long clock;
+    int solving;   /* stage */
+    double trying; /* length of the step [s] */
+    double *stage_v, *stage_a;                       /* [stages][n] */
+    double power[MSFP_STAGES][ENERGIES];
+    double *Q, *V, *free;        /* [n] of the stage: u = Q + beta v, v = V + beta a; rates without forces */
+    double *x, *residual;        /* [attachments] rates, and by how much they miss the solution */
+    double *change, *balance;    /* [attachments] of the rates; forces that are out of balance */
+    double *scale;               /* [attachments] of these [N], [N m] */
+    double *matrix;              /* [attachments]^2 */
+    int *pivots;
+    double *next_u;              /* [n] */
+    double *scratch;             /* [3][attachments] */
+    int status, bearing, surface;
+    double value;
+    double *rows;
+    size_t row_count, row_capacity;
+};
+
+/* ---- pool.c ---- */
+
+int pool_begin(msfp_building *b);
+void pool_end(msfp_building *b);
+/* Do something for each bearing, in threads. */
+void for_each_bearing(msfp_building *b, task *what);
+
+/* ---- linear.c ---- */
+
+/* y = A x or y += A x, of a symmetric matrix [n][n]. */
+void multiply(int n, const double *matrix, const double *x, int add, double *y);
+double dot(int n, const double *x, const double *y);
+/* Factors at that beta [s], into b->now. */
+int factor_linear(msfp_building *b, double beta);
+/* x = A^-1 x [n]. */
+void solve_linear(msfp_building *b, double *x);
+/* Factors of I + mobility * tangent, into b->matrix. */
+int factor_tangent(msfp_building *b);
+/* x = (I + mobility * tangent)^-1 x [attachments]. */
+void solve_tangent(msfp_building *b, double *x);
+void linear_free(msfp_building *b);
+
+/* ---- stage.c ---- */
+
+/* Motions of the ground at time t [s]; up to a jump it is that before. */
+void ground_at(msfp_building *b, double t);
+/* One step of length h [s], not accepted: its error over the tolerance, the share at which the first event lies, and the
+ * bearing, from 1, with the largest error; 0: the building. */
+int try_step(msfp_building *b, double h, double *error, double *share, int *worst);
+/* The largest energy of the building so far, with that of the present state. */
+void note_energy(msfp_building *b);
+/* Motion of both ends of each bearing at the present state, into the members. */
+void ends_now(msfp_building *b);
+
+/* ---- state.c ---- */
+
+int write_row(msfp_building *b);
+
+#endif

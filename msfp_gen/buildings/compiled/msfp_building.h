@@ -1,0 +1,89 @@
+/* msfp_building.h: the run of a linear building on bearings (docs/buildings.md).
+ *
+ * The building has n coordinates u with M u'' + C u' + K u + forces of the bearings = 0, and each bearing is a two-port
+ * (msfp.h) between the ground and the building. All take the steps of one implicit method. In a stage the rates of the
+ * coordinates at the bearings, the attachments, are the unknowns: the other coordinates follow from the linear
+ * equations, and each bearing from its own stage equations.
+ *
+ * Matrices are dense; those for LAPACK are stored by columns. Functions that return an int return MSFP_OK or a status.
+ */
+#ifndef MSFP_BUILDING_H
+#define MSFP_BUILDING_H
+#include <stddef.h>
+#include "msfp.h"
+
+/* A two-port of a model: as in the wrapper of the models. */
+typedef struct {
+    const msfp_api *api;
+    msfp_port *port;
+} msfp_part;
+
+/* Functions of LAPACK. */
+typedef struct {
+    void (*potrf)(char *uplo, int *n, double *a, int *lda, int *info);
+    void (*potrs)(char *uplo, int *n, int *columns, double *a, int *lda, double *b, int *ldb, int *info);
+    void (*getrf)(int *m, int *n, double *a, int *lda, int *pivots, int *info);
+    void (*getrs)(char *transposed, int *n, int *columns, double *a, int *lda, int *pivots, double *b, int *ldb,
+                  int *info);
+} msfp_lapack;
+
+enum { MSFP_WRENCH = 6, MSFP_GROUND = 9 }; /* displacement, velocity and acceleration along E1, E2, E3 */
+
+/* What a run is given; arrays must outlive it. */
+typedef struct {
+    int n, attachments, bearings, grounds;
+    const double *mass, *damping, *stiffness; /* [n][n] */
+    const int *attached;                      /* [attachments] coordinates that bearings move with */
+    const msfp_part *parts;                   /* [bearings] */
+    const double *rows;                       /* [bearings][6][attachments] motion of the upper ends */
+    const int *ground_of;                     /* [bearings] motion of the ground below */
+    const msfp_piecewise *ground;             /* [grounds] motions, of which channels 0 to 2 are used */
+    const int *entry_count;                   /* [bearings] numbers kept of the rows of each bearing, */
+    const int *entries;                       /* one bearing after the other: their indices */
+    double weight;                            /* scale of forces [N] */
+    const double *stops, *jumps;              /* rising times at which a step ends; at which accelerations jump [s] */
+    int stop_count, jump_count;
+    const double *span_ends, *span_steps;     /* intervals of time with a longest step each [s] */
+    int span_count;
+    int method;                               /* enum msfp_method */
+    double rtol, max_step, first_step, max_steps, end, output_step;
+    int threads;
+    msfp_lapack lapack;
+} msfp_building_scene;
+
+/* How a run stands. */
+typedef struct {
+    int status, bearing, surface; /* bearing: that failed, counted from 1; 0: the building */
+    double value, time, step;
+    size_t rows;
+} msfp_building_progress;
+
+enum {
+    MSFP_BUILDING_STEPS,
+    MSFP_BUILDING_REJECTED,
+    MSFP_BUILDING_ITERATIONS,
+    MSFP_BUILDING_TANGENTS,
+    MSFP_BUILDING_COUNTS
+};
+
+typedef struct msfp_building msfp_building;
+
+/* A run at rest, with its first row; NULL: no memory. */
+msfp_building *msfp_building_new(const msfp_building_scene *scene);
+void msfp_building_free(msfp_building *b);
+/* Take up to `steps` steps. Returns 1 while there is more to do. */
+int msfp_building_advance(msfp_building *b, long steps);
+void msfp_building_state(const msfp_building *b, msfp_building_progress *progress);
+void msfp_building_counts(const msfp_building *b, long *counts);
+/* Rows: time, u, v, a, motions of the ground, energies (damped, received from the bearings, work of the ground), and of
+ * each bearing the wrenches on both ends and the kept numbers of its row. */
+size_t msfp_building_row_size(const msfp_building *b);
+const double *msfp_building_rows(const msfp_building *b);
+/* The state between two steps, with all rows, as bytes; in a run of the same scene and build the steps that follow are
+ * those that followed there, bit by bit. */
+size_t msfp_building_snapshot_size(const msfp_building *b);
+void msfp_building_snapshot_write(const msfp_building *b, void *snapshot);
+/* After MSFP_E_SNAPSHOT or MSFP_E_MEMORY the run must not be continued. */
+int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t size);
+
+#endif

@@ -1,0 +1,191 @@
+# cython: language_level=3, embedsignature=True
+"""Run of a linear building on bearings in compiled code (msfp_building.h): `Run`."""
+
+from cpython.exc cimport PyErr_CheckSignals
+from cpython.pycapsule cimport PyCapsule_GetPointer
+from libc.stdlib cimport calloc, free
+from scipy.linalg.cython_lapack cimport dgetrf, dgetrs, dpotrf, dpotrs
+
+import numpy as np
+
+cdef extern from "msfp_building.h":
+    enum: MSFP_ABI_VERSION
+    enum: MSFP_OK
+    enum: MSFP_E_MEMORY
+    enum: MSFP_BUILDING_COUNTS
+    ctypedef struct msfp_api:
+        int abi_version
+        const char *(*status_name)(int) noexcept nogil
+    ctypedef struct msfp_part:
+        const msfp_api *api
+    ctypedef struct msfp_piecewise:
+        int pieces
+        const double *knots
+        const double *coefficients
+    ctypedef struct msfp_lapack:
+        void *potrf
+        void *potrs
+        void *getrf
+        void *getrs
+    ctypedef struct msfp_building_scene:
+        int n, attachments, bearings, grounds
+        const double *mass
+        const double *damping
+        const double *stiffness
+        const int *attached
+        const msfp_part *parts
+        const double *rows
+        const int *ground_of
+        const msfp_piecewise *ground
+        const int *entry_count
+        const int *entries
+        double weight
+        const double *stops
+        const double *jumps
+        int stop_count, jump_count
+        const double *span_ends
+        const double *span_steps
+        int span_count, method
+        double rtol, max_step, first_step, max_steps, end, output_step
+        int threads
+        msfp_lapack lapack
+    ctypedef struct msfp_building_progress:
+        int status, bearing, surface
+        double value, time, step
+        size_t rows
+    ctypedef struct msfp_building:
+        pass
+    msfp_building *msfp_building_new(const msfp_building_scene *) noexcept nogil
+    void msfp_building_free(msfp_building *) noexcept nogil
+    int msfp_building_advance(msfp_building *, long) noexcept nogil
+    void msfp_building_state(const msfp_building *, msfp_building_progress *) noexcept nogil
+    void msfp_building_counts(const msfp_building *, long *) noexcept nogil
+    size_t msfp_building_row_size(const msfp_building *) noexcept nogil
+    const double *msfp_building_rows(const msfp_building *) noexcept nogil
+    size_t msfp_building_snapshot_size(const msfp_building *) noexcept nogil
+    void msfp_building_snapshot_write(const msfp_building *, void *) noexcept nogil
+    int msfp_building_snapshot_read(msfp_building *, const void *, size_t) noexcept nogil
+
+COUNTS = ("steps", "rejected_steps", "iterations", "tangents")
+
+
+cdef const double *_doubles(list held, object values) except? NULL:
+    """The numbers of an array, which `held` keeps."""
+    cdef const double[::1] view = np.ascontiguousarray(values, dtype=float).reshape(-1)
+    held.append(view)
+    return &view[0] if view.shape[0] else NULL
+
+
+cdef const int *_ints(list held, object values) except? NULL:
+    cdef const int[::1] view = np.ascontiguousarray(values, dtype=np.intc).reshape(-1)
+    held.append(view)
+    return &view[0] if view.shape[0] else NULL
+
+
+cdef class Run:
+    """The run of a building. See msfp_building.h for what it is given.
+
+    matrices (3, n, n): mass, damping, stiffness. attached (r,): coordinates at the bearings. ports: the two-ports of all
+    bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
+    of each bearing, indices into its row.
+    """
+    cdef msfp_building *run
+    cdef msfp_part *parts
+    cdef msfp_piecewise *grounds
+    cdef list held
+
+    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, *, double weight, stops, jumps,
+                  span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
+                  double end, double output_step, int threads):
+        cdef msfp_building_scene s
+        cdef int i
+        held = self.held = [ports]
+        s.n, s.attachments, s.bearings, s.grounds = len(matrices[0]), len(attached), len(ports), len(grounds)
+        s.mass, s.damping, s.stiffness = _doubles(held, matrices[0]), _doubles(held, matrices[1]), _doubles(held, matrices[2])
+        s.attached, s.rows, s.ground_of = _ints(held, attached), _doubles(held, rows), _ints(held, ground_of)
+        s.entry_count = _ints(held, [len(each) for each in entries])
+        s.entries = _ints(held, np.concatenate(entries))
+        s.weight, s.rtol, s.max_step, s.first_step, s.max_steps = weight, rtol, max_step, first_step, max_steps
+        s.end, s.output_step, s.threads, s.method = end, output_step, threads, method
+        s.stops, s.stop_count, s.jumps, s.jump_count = _doubles(held, stops), len(stops), _doubles(held, jumps), len(jumps)
+        s.span_ends, s.span_steps, s.span_count = _doubles(held, span_ends), _doubles(held, span_steps), len(span_ends)
+        s.lapack.potrf, s.lapack.potrs, s.lapack.getrf, s.lapack.getrs = <void *>dpotrf, <void *>dpotrs, <void *>dgetrf, <void *>dgetrs
+        self.parts = <msfp_part *>calloc(s.bearings, sizeof(msfp_part))
+        self.grounds = <msfp_piecewise *>calloc(s.grounds, sizeof(msfp_piecewise))
+        if self.parts is NULL or self.grounds is NULL:
+            raise MemoryError("no memory for the run of a building")
+        for i, port in enumerate(ports):
+            self.parts[i] = (<msfp_part *>PyCapsule_GetPointer(port.capsule, "msfp_part"))[0]
+            if self.parts[i].api.abi_version != MSFP_ABI_VERSION:
+                raise ImportError(f"a model has ABI version {self.parts[i].api.abi_version}, the building {MSFP_ABI_VERSION}")
+        for i, (knots, coefficients) in enumerate(grounds):
+            self.grounds[i].pieces = len(coefficients)
+            self.grounds[i].knots, self.grounds[i].coefficients = _doubles(held, knots), _doubles(held, coefficients)
+        s.parts, s.ground = self.parts, self.grounds
+        with nogil:
+            self.run = msfp_building_new(&s)
+        if self.run is NULL:
+            raise MemoryError("no memory for the run of a building")
+
+    def __dealloc__(self):
+        msfp_building_free(self.run)
+        free(self.parts)
+        free(self.grounds)
+
+    def advance(self, long steps):
+        """Take up to `steps` steps without the GIL; True while there is more to do. An interrupt is raised after them."""
+        cdef int more
+        with nogil:
+            more = msfp_building_advance(self.run, steps)
+        PyErr_CheckSignals()
+        return bool(more)
+
+    cdef msfp_building_progress progress(self):
+        cdef msfp_building_progress found
+        msfp_building_state(self.run, &found)
+        return found
+
+    @property
+    def status(self):
+        """Status name; bearing from 1, 0: the building; its surface from 1, 0: none; value."""
+        cdef msfp_building_progress found = self.progress()
+        return self.parts[0].api.status_name(found.status).decode(), found.bearing, found.surface, found.value
+
+    @property
+    def time(self):
+        """Time reached [s]."""
+        return self.progress().time
+
+    @property
+    def rows(self):
+        """Rows (T, size), a copy."""
+        cdef size_t count = self.progress().rows, size = msfp_building_row_size(self.run)
+        if not count:
+            return np.zeros((0, size))
+        cdef const double[:, ::1] view = <double[:count, :size]>msfp_building_rows(self.run)
+        return np.array(view)
+
+    dropped_rows = 0  # it keeps all rows
+
+    @property
+    def counts(self):
+        """Counters, see COUNTS."""
+        cdef long found[MSFP_BUILDING_COUNTS]
+        msfp_building_counts(self.run, found)
+        return {name: found[i] for i, name in enumerate(COUNTS)}
+
+    def snapshot(self):
+        """State with all rows, as bytes."""
+        cdef bytearray found = bytearray(msfp_building_snapshot_size(self.run))
+        cdef char *to = found
+        msfp_building_snapshot_write(self.run, to)
+        return bytes(found)
+
+    def restore(self, bytes snapshot):
+        """Continue from a snapshot of a run of the same scene and build. Raises ValueError, MemoryError."""
+        cdef const char *given = snapshot
+        cdef int status = msfp_building_snapshot_read(self.run, given, len(snapshot))
+        if status == MSFP_E_MEMORY:
+            raise MemoryError("no memory for a snapshot")
+        if status != MSFP_OK:
+            raise ValueError("these bytes are no snapshot of a run of this building")

@@ -1,0 +1,278 @@
+/* run.c: the loop over the steps of a building: their length, jumps of the ground, rows, failures. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "building.h"
+
+static const double smallest_step = 1e-9;     /* [s]; closer times count as equal */
+static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
+static const double growth = 1.189207115002721; /* steps that end nowhere in particular have lengths in this ratio */
+enum { RELOCATIONS = 4 };
+
+static double smallest(double t) { return smallest_step * fmax(1.0, t); }
+
+/* ---- begin and end ---- */
+
+static int allocate(msfp_building *b)
+{
+    const size_t n = b->scene.n, r = b->scene.attachments, stages = MSFP_STAGES;
+    struct {
+        double **to;
+        size_t count;
+    } arrays[] = { { &b->u, n },           { &b->v, n },        { &b->a, n },       { &b->slope, n },
+                   { &b->tangent, r * r }, { &b->force, r },    { &b->Q, n },       { &b->V, n },
+                   { &b->free, n },        { &b->x, r },        { &b->residual, r }, { &b->change, r },
+                   { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n },
+                   { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
+                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND } };
+    int complete = 1;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
+        complete &= (*arrays[i].to = calloc(arrays[i].count, sizeof(double))) != NULL;
+    b->members = calloc((size_t)b->scene.bearings, sizeof *b->members);
+    b->piece = calloc((size_t)b->scene.grounds, sizeof *b->piece);
+    b->pivots = calloc(r, sizeof *b->pivots);
+    return complete && b->members && b->piece && b->pivots ? MSFP_OK : MSFP_E_MEMORY;
+}
+
+/* Scale of the forces at the attachments: the weight, with its arms where they are moments. */
+static void set_scale(msfp_building *b)
+{
+    const int r = b->scene.attachments;
+    for (int i = 0; i < r; ++i) {
+        double most = 0.0;
+        for (int k = 0; k < b->scene.bearings * MSFP_WRENCH; ++k)
+            most = fmax(most, fabs(b->scene.rows[(size_t)k * r + i]));
+        b->scale[i] = b->scene.weight * (most > 0.0 ? most : 1.0);
+    }
+}
+
+static void restart_bearing(msfp_building *b, int bearing)
+{
+    member *m = &b->members[bearing];
+    const msfp_part *part = &b->scene.parts[bearing];
+    m->status = part->api->port_jump(part->port, m->ends);
+}
+
+static void end_run(msfp_building *b, int status, int bearing)
+{
+    msfp_progress cause = { status, 0, 0.0, 0.0, 0.0, 0 };
+    b->bearing = bearing;
+    if (bearing && status != MSFP_E_MEMORY) {
+        const msfp_part *part = &b->scene.parts[bearing - 1];
+        status = part->api->port_cause(part->port, status, &cause);
+    }
+    b->status = status;
+    b->surface = cause.surface;
+    b->value = cause.value;
+}
+
+/* The accelerations of the ground jump at the present time. */
+static void restart(msfp_building *b)
+{
+    ground_at(b, b->t);
+    ends_now(b);
+    for_each_bearing(b, restart_bearing);
+    for (int i = 0; i < b->scene.bearings && !b->status; ++i)
+        if (b->members[i].status) {
+            b->status = b->members[i].status;
+            b->bearing = i + 1;
+        }
+    memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
+}
+
+static void begin(msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    for (int i = 0; i < s->bearings && !b->status; ++i) {
+        member *m = &b->members[i];
+        if ((b->status = s->parts[i].api->port_wrench(s->parts[i].port, m->wrench)))
+            b->bearing = i + 1;
+        memcpy(m->rest, m->wrench + MSFP_WRENCH, sizeof m->rest);
+    }
+    b->energy = 1e-5 * s->weight; /* that of its weight lifted by 0.01 mm: smaller ones do not matter */
+    b->h = s->first_step > 0.0 ? s->first_step : fmin(1e-3, 1e-3 * s->end);
+    b->previous_error = 1.0;
+    if (b->jump < s->jump_count && s->jumps[b->jump] <= smallest(0.0))
+        ++b->jump;
+    if (!b->status)
+        restart(b);
+    if (!b->status)
+        b->status = write_row(b);
+    b->next_row = 1;
+}
+
+msfp_building *msfp_building_new(const msfp_building_scene *scene)
+{
+    msfp_building *b = calloc(1, sizeof *b);
+    if (!b)
+        return NULL;
+    b->scene = *scene;
+    if (allocate(b) || pool_begin(b)) {
+        msfp_building_free(b);
+        return NULL;
+    }
+    set_scale(b);
+    b->status = scene->parts[0].api->port_method(scene->method, &b->method);
+    begin(b);
+    return b;
+}
+
+void msfp_building_free(msfp_building *b)
+{
+    if (!b)
+        return;
+    pool_end(b);
+    linear_free(b);
+    void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
+                    b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u,
+                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows };
+    for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
+        free(all[i]);
+    free(b);
+}
+
+/* ---- the length of a step ---- */
+
+static double next_row_time(const msfp_building *b) { return b->next_row * b->scene.output_step; }
+
+/* The time at which the next step must end at the latest [s]. */
+static double latest_end(msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    while (b->stop < s->stop_count && s->stops[b->stop] <= b->t + smallest(b->t))
+        ++b->stop;
+    double end = fmin(s->end, next_row_time(b)), stop = end;
+    if (b->stop < s->stop_count)
+        stop = fmin(stop, s->stops[b->stop]);
+    if (b->jump < s->jump_count)
+        stop = fmin(stop, s->jumps[b->jump]);
+    return stop < end - smallest(end) ? stop : end;
+}
+
+/* The step h, no longer than permitted at the present time; see allowed_step of run.c of the models. */
+static double allowed(msfp_building *b, double h)
+{
+    const msfp_building_scene *s = &b->scene;
+    while (b->span + 1 < s->span_count && s->span_ends[b->span] <= b->t + smallest(b->t))
+        ++b->span;
+    if (s->span_count)
+        h = fmin(h, s->span_steps[b->span]);
+    for (int i = b->span; i + 1 < s->span_count && b->t + h > s->span_ends[i]; ++i)
+        h = fmin(h, fmax(s->span_ends[i] - b->t, s->span_steps[i + 1]));
+    return s->max_step > 0.0 ? fmin(h, s->max_step) : h;
+}
+
+/* A step of at most h [s], of which a whole number reaches `left`: few different lengths mean few factorisations. */
+static double divided(double h, double left)
+{
+    const double count = ceil(left / h * (1.0 - 1e-9));
+    return count <= 8.0 ? left / fmax(count, 1.0) : pow(growth, floor(log(h) / log(growth)));
+}
+
+/* The next length after a step of length h. A step that was cut to end at a given time leaves the proposal as it is,
+ * unless its error permits a longer one. */
+static double next_length(const msfp_building *b, double h, double error)
+{
+    const double e = fmax(error, 1e-6), last = fmax(b->previous_error, 1e-6), order = b->method.order;
+    if (h < 0.9 * b->h && error < 0.5)
+        return fmax(b->h, h * fmin(5.0, 0.9 * pow(e, -1.0 / order)));
+    return h * fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+}
+
+/* ---- steps ---- */
+
+static void commit_bearing(msfp_building *b, int bearing)
+{
+    member *m = &b->members[bearing];
+    const msfp_part *part = &b->scene.parts[bearing];
+    m->status = part->api->port_step_commit(part->port, b->t);
+}
+
+static void accept(msfp_building *b, double h, double t, double error)
+{
+    const msfp_building_scene *s = &b->scene;
+    const size_t n = s->n, last = b->method.count - 1;
+    const double *v = b->stage_v + last * n, *a = b->stage_a + last * n;
+    for (size_t c = 0; c < n; ++c) {
+        b->slope[c] = (a[c] - b->a[c]) / h;
+        b->u[c] = b->next_u[c];
+        b->v[c] = v[c];
+        b->a[c] = a[c];
+    }
+    for (int e = 0; e < ENERGIES; ++e) {
+        double sum = b->method.diagonal * b->power[last][e];
+        for (size_t j = 0; j < last; ++j)
+            sum += b->method.weights[last][j] * b->power[j][e];
+        b->energies[e] += h * sum;
+        b->power[0][e] = b->power[last][e];
+    }
+    b->t = t;
+    ++b->counts[MSFP_BUILDING_STEPS];
+    for_each_bearing(b, commit_bearing);
+    note_energy(b);
+    b->h = next_length(b, h, error);
+    b->previous_error = error;
+    ground_at(b, t);
+    if (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t)) {
+        b->next_row += t >= next_row_time(b) - smallest(t);
+        b->status = write_row(b);
+    }
+    if (!b->status && b->jump < s->jump_count && t >= s->jumps[b->jump] - smallest(t)) {
+        ++b->jump;
+        restart(b);
+        b->h = fmin(b->h, 1e-3);
+    }
+}
+
+/* Shorten the step after a failure; the run ends where it is the shortest already. */
+static int shorten(msfp_building *b, double h, double factor, int status, int bearing)
+{
+    b->h = h * factor;
+    ++b->counts[MSFP_BUILDING_REJECTED];
+    if (b->h >= smallest(b->t) && status != MSFP_E_MEMORY)
+        return 1;
+    end_run(b, status, bearing);
+    return 0;
+}
+
+/* One step, or the rejection of one. Returns 0 where the run ends. */
+static int one_step(msfp_building *b)
+{
+    const double end = latest_end(b), left = end - b->t;
+    double h = divided(allowed(b, b->h), left), error, share;
+    int worst;
+    for (int relocations = 0;; ++relocations) {
+        const int status = try_step(b, h, &error, &share, &worst);
+        if (status)
+            return shorten(b, h, 0.25, status, b->bearing);
+        if (error > 1.0)
+            return shorten(b, h, fmax(0.1, 0.9 * pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
+        if (share >= 1.0 || relocations >= RELOCATIONS)
+            break;
+        h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
+    }
+    accept(b, h, fabs(b->t + h - end) <= smallest(end) ? end : b->t + h, error);
+    return b->status == MSFP_OK;
+}
+
+static int finished(const msfp_building *b) { return b->t >= b->scene.end - smallest(b->scene.end); }
+
+int msfp_building_advance(msfp_building *b, long steps)
+{
+    for (long i = 0; i < steps && !b->status && !finished(b); ++i) {
+        if ((double)(b->counts[MSFP_BUILDING_STEPS] + b->counts[MSFP_BUILDING_REJECTED]) >= b->scene.max_steps) {
+            b->status = MSFP_E_STEPS;
+            b->bearing = 0;
+        } else
+            one_step(b);
+    }
+    return !b->status && !finished(b);
+}
+
+void msfp_building_state(const msfp_building *b, msfp_building_progress *progress)
+{
+    *progress = (msfp_building_progress){ b->status, b->status ? b->bearing : 0, b->surface, b->value, b->t, b->h,
+                                          b->row_count };
+}
+
+void msfp_building_counts(const msfp_building *b, long *counts) { memcpy(counts, b->counts, sizeof b->counts); }

@@ -1,0 +1,168 @@
+/* state.c: rows of a run of a building, and its snapshots. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include "building.h"
+
+/* ---- rows ---- */
+
+static size_t head_size(const msfp_building_scene *s)
+{
+    return 1 + 3 * (size_t)s->n + (size_t)s->grounds * MSFP_GROUND + ENERGIES;
+}
+
+size_t msfp_building_row_size(const msfp_building *b)
+{
+    size_t size = head_size(&b->scene);
+    for (int i = 0; i < b->scene.bearings; ++i)
+        size += 2 * MSFP_WRENCH + b->scene.entry_count[i];
+    return size;
+}
+
+const double *msfp_building_rows(const msfp_building *b) { return b->rows; }
+
+static int room_for(msfp_building *b, size_t rows)
+{
+    if (rows <= b->row_capacity)
+        return MSFP_OK;
+    const size_t wider = rows > 2 * b->row_capacity ? rows : 2 * b->row_capacity;
+    double *more = realloc(b->rows, wider * msfp_building_row_size(b) * sizeof *more);
+    if (!more)
+        return MSFP_E_MEMORY;
+    b->rows = more;
+    b->row_capacity = wider;
+    return MSFP_OK;
+}
+
+static double *put(double *to, const double *from, size_t count)
+{
+    memcpy(to, from, count * sizeof *to);
+    return to + count;
+}
+
+int write_row(msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    if (room_for(b, b->row_count + 1))
+        return MSFP_E_MEMORY;
+    double *row = b->rows + b->row_count * msfp_building_row_size(b);
+    const int *entries = s->entries;
+    row = put(row, &b->t, 1);
+    row = put(row, b->u, s->n);
+    row = put(row, b->v, s->n);
+    row = put(row, b->a, s->n);
+    row = put(row, b->ground, (size_t)s->grounds * MSFP_GROUND);
+    row = put(row, b->energies, ENERGIES);
+    for (int i = 0; i < s->bearings; ++i) {
+        const msfp_part *part = &s->parts[i];
+        double *all = malloc((size_t)part->api->row_size * sizeof *all);
+        if (!all)
+            return MSFP_E_MEMORY;
+        part->api->port_row(part->port, all);
+        row = put(row, b->members[i].wrench, 2 * MSFP_WRENCH);
+        for (int k = 0; k < s->entry_count[i]; ++k)
+            *row++ = all[*entries++];
+        free(all);
+    }
+    ++b->row_count;
+    return MSFP_OK;
+}
+
+/* ---- snapshots ---- */
+
+static const uint64_t magic = 0x6d73667062756931; /* "msfpbui1" */
+
+/* The numbers of the state in order, in both directions. */
+typedef struct {
+    char *at;
+    int reading;
+} tape;
+
+static void pass(tape *t, void *data, size_t size)
+{
+    memcpy(t->reading ? data : t->at, t->reading ? t->at : data, size);
+    t->at += size;
+}
+
+static void pass_state(msfp_building *b, tape *t)
+{
+    const msfp_building_scene *s = &b->scene;
+    const size_t n = s->n * sizeof(double), r = s->attachments * sizeof(double);
+    double *numbers[] = { &b->t, &b->h, &b->previous_error, &b->energy, &b->tangent_beta };
+    int *indices[] = { &b->stop, &b->jump, &b->span, &b->next_row };
+    double *arrays[] = { b->u, b->v, b->a, b->slope };
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i)
+        pass(t, numbers[i], sizeof(double));
+    for (size_t i = 0; i < sizeof indices / sizeof *indices; ++i)
+        pass(t, indices[i], sizeof(int));
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
+        pass(t, arrays[i], n);
+    pass(t, b->energies, sizeof b->energies);
+    pass(t, b->power[0], sizeof b->power[0]);
+    pass(t, b->counts, sizeof b->counts);
+    pass(t, b->tangent, r * s->attachments);
+    for (int i = 0; i < s->bearings; ++i)
+        pass(t, b->members[i].wrench, sizeof b->members[i].wrench);
+}
+
+/* Bytes of that state. */
+static size_t state_size(const msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    return 5 * sizeof(double) + 4 * sizeof(int) + 4 * (size_t)s->n * sizeof(double) + sizeof b->energies +
+           sizeof b->power[0] + sizeof b->counts + (size_t)s->attachments * s->attachments * sizeof(double) +
+           (size_t)s->bearings * sizeof b->members[0].wrench;
+}
+
+static size_t fixed_size(const msfp_building *b)
+{
+    size_t size = 3 * sizeof(uint64_t) + state_size(b);
+    for (int i = 0; i < b->scene.bearings; ++i)
+        size += b->scene.parts[i].api->port_snapshot_size(b->scene.parts[i].port);
+    return size;
+}
+
+static size_t rows_size(const msfp_building *b, size_t rows) { return rows * msfp_building_row_size(b) * sizeof(double); }
+
+size_t msfp_building_snapshot_size(const msfp_building *b) { return fixed_size(b) + rows_size(b, b->row_count); }
+
+void msfp_building_snapshot_write(const msfp_building *b, void *snapshot)
+{
+    tape t = { snapshot, 0 };
+    uint64_t head[3] = { magic, msfp_building_row_size(b), b->row_count };
+    pass(&t, head, sizeof head);
+    pass_state((msfp_building *)b, &t); /* which only reads it here */
+    for (int i = 0; i < b->scene.bearings; ++i) {
+        const msfp_part *part = &b->scene.parts[i];
+        part->api->port_snapshot_write(part->port, t.at);
+        t.at += part->api->port_snapshot_size(part->port);
+    }
+    pass(&t, b->rows, rows_size(b, b->row_count));
+}
+
+int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t size)
+{
+    tape t = { (char *)snapshot, 1 }; /* read only */
+    uint64_t head[3];
+    if (size < fixed_size(b))
+        return MSFP_E_SNAPSHOT;
+    pass(&t, head, sizeof head);
+    if (head[0] != magic || head[1] != msfp_building_row_size(b) || head[2] > size || !head[2] ||
+        size != fixed_size(b) + rows_size(b, head[2]))
+        return MSFP_E_SNAPSHOT;
+    if (room_for(b, head[2]))
+        return MSFP_E_MEMORY;
+    pass_state(b, &t);
+    for (int i = 0; i < b->scene.bearings; ++i) {
+        const msfp_part *part = &b->scene.parts[i];
+        const size_t own = part->api->port_snapshot_size(part->port);
+        const int status = part->api->port_snapshot_read(part->port, t.at, own);
+        if (status)
+            return status;
+        t.at += own;
+    }
+    pass(&t, b->rows, rows_size(b, head[2]));
+    b->row_count = head[2];
+    b->status = MSFP_OK;
+    return MSFP_OK;
+}

@@ -1,0 +1,168 @@
+"""The compiled run of a building: what it is given, and where its rows hold what."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.arrays import Array
+from msfp_gen.coupling.two_port import TwoPort
+from msfp_gen.errors import InputError
+from msfp_gen.jit.driver import load_driver
+from msfp_gen.motions.motion import Motion
+from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+
+KEPT = ("normal", "sliding", "kinetic", "potential", "rim_stored", "seat_stored", "work")  # of the row of a bearing
+BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
+ENERGIES = ("damped", "received", "input")
+
+
+class Run(Protocol):
+    """`Run` of `compiled/msfp_building.pyx`."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    @property
+    def status(self) -> tuple[str, int, int, float]:
+        """Name; bearing from 1, 0: the building; surface from 1, 0: none; value."""
+
+    @property
+    def rows(self) -> Array:
+        """Rows until now, shape (T, size)."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters."""
+
+    def advance(self, steps: int) -> bool:
+        """Take at most `steps` steps; False where the run has ended."""
+
+    def snapshot(self) -> bytes:
+        """State with all rows."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingRun:
+    """A compiled run and its parts.
+
+    run: compiled. ports: the two-ports of the bearings, which only the run steps. grounds: the different motions of the
+    ground, that of the scene first. build: hash of all that determines the numbers beside the scene.
+    """
+
+    run: Run
+    scene: BuildingScene
+    ports: list[TwoPort]
+    grounds: list[Motion]
+    build: str
+
+
+def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
+    """The run of a scene before its first step.
+
+    threads: for the bearings; None: as many as there are processors, with eight bearings each. Results do not depend on
+    it. Raises InputError, RunError.
+    """
+    ports = [_port(scene, index) for index in range(len(scene.bearings))]
+    grounds, ground_of = scene.grounds
+    grid, building, solver = time_grid(scene, grounds), scene.building, scene.solver
+    attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
+    pieces = [snapped(each.knots, each.coefficients, grid.stops) for each in grounds]
+    module, key = load_driver("msfp_gen.buildings")
+    run: Run = module.Run(
+        (building.mass, building.damping, building.stiffness),
+        attached,
+        [port.compiled for port in ports],
+        scene.attachments[:, :, attached],
+        pieces,
+        ground_of,
+        [_entries(port) for port in ports],
+        weight=float(scene.axial_loads.sum()),
+        stops=grid.stops,
+        jumps=grid.jumps,
+        span_ends=grid.ends,
+        span_steps=grid.steps,
+        method=ports[0].model.extension.METHODS[solver.method],
+        rtol=solver.rtol,
+        max_step=solver.max_step or 0.0,
+        first_step=solver.first_step or 0.0,
+        max_steps=float(solver.max_steps),
+        end=scene.end,
+        output_step=scene.row_step,
+        threads=_threads(threads, len(ports)),
+    )
+    keys = [key, *(port.model.info.key for port in ports)]
+    return BuildingRun(run, scene, ports, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
+
+
+def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:
+    """Times at which steps of the run must end, and limits of the step, from the motions of the ground."""
+    steps = [scene.solver.max_step, *(each.max_step for each in grounds)]
+    jumps = np.concatenate([times for each in grounds for times in (each.jumps, short_pieces(each.knots))])
+    longest = min((step for step in steps if step is not None), default=np.inf)
+    return TimeGrid.of([each.resolution for each in grounds], jumps, scene.end, longest)
+
+
+def columns(run: BuildingRun) -> Iterator[tuple[str, int, Any]]:
+    """Parts of a row in order: what it is, how many numbers, and their shape."""
+    n, bearings = len(run.scene.building.mass), run.ports
+    yield "time", 1, ()
+    for name in ("displacement", "velocity", "acceleration"):
+        yield name, n, (n,)
+    yield "ground", 9 * len(run.grounds), (len(run.grounds), 3, 3)
+    yield from ((name, 1, ()) for name in ENERGIES)
+    for index, port in enumerate(bearings):
+        yield f"wrench {index}", 12, (2, 6)
+        for name, shape in _shapes(port):
+            yield f"{name} {index}", int(np.prod(shape)), shape
+
+
+def unpacked(run: BuildingRun) -> dict[str, Array]:
+    """The rows until now by name, those of bearings with their index; each of shape (k, ...)."""
+    rows, found, begin = run.run.rows, {}, 0
+    for name, count, shape in columns(run):
+        found[name] = rows[:, begin : begin + count].reshape(len(rows), *shape)
+        begin += count
+    return found
+
+
+def _shapes(port: TwoPort) -> list[tuple[str, tuple[int, ...]]]:
+    return [(name, tuple(shape)) for name, shape in port.model.extension.ROW if name in KEPT]
+
+
+def _entries(port: TwoPort) -> Array:
+    """Indices into the row of a model of the numbers that are kept."""
+    found, begin = [], 0
+    for name, shape in port.model.extension.ROW:
+        count = int(np.prod(shape))
+        if name in KEPT:
+            found.append(np.arange(begin, begin + count))
+        begin += count
+    return np.concatenate(found)
+
+
+def _port(scene: BuildingScene, index: int) -> TwoPort:
+    given, load = scene.bearings[index], float(scene.axial_loads[index])
+    try:
+        return TwoPort(given.bearing, given.interface, load, scene.modelled[index], scene.solver)
+    except InputError as error:
+        raise InputError(f"scene.bearings[{index}]: {error}") from None
+
+
+def _threads(given: int | None, bearings: int) -> int:
+    if given is None:
+        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return max(1, min(processors, bearings // BEARINGS_OF_A_THREAD))
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        raise InputError(f"threads = {given!r}: give a whole number of at least 1")
+    return given

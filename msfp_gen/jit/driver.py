@@ -1,0 +1,69 @@
+"""Compiled code that drives two-ports of models, such as the run of a building: built, cached and loaded as models are.
+
+It includes `msfp.h` and knows models by their tables of functions alone, so one build serves all of them.
+"""
+
+from __future__ import annotations
+
+from functools import cache as remember
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+
+from msfp_gen.jit import cache
+from msfp_gen.jit.build import load_extension
+from msfp_gen.jit.compiler import compile_extension
+
+LIBRARIES = ("-pthread",)
+SUFFIXES = (".c", ".h", ".pyx")
+
+
+@remember
+def load_driver(package: str) -> tuple[ModuleType, str]:
+    """The module of the `.pyx` and the C files in `<package>/compiled`, and the hash of all that determines it.
+
+    Raises CompileError: no C compiler was found, or it rejected a file; InputError: the cache cannot be written to.
+    """
+    files = sources(resources.files(package) / "compiled")
+    module = next(Path(name).stem for name in files if name.endswith(".pyx"))
+    entry = cache.Entry.of_files(module, files)
+    manifest = entry.find()
+    if manifest is None:
+        with entry.building(_silent) as part:
+            manifest = entry.find()
+            if manifest is None:
+                manifest = _build(entry, files, part)
+                entry.publish(part)
+    return load_extension(entry.folder / manifest.extension, module), entry.key
+
+
+def sources(folder: Traversable) -> dict[str, str]:
+    """The sources in a folder: file name -> text."""
+    found = sorted(folder.iterdir(), key=lambda file: file.name)
+    return {file.name: file.read_text(encoding="utf-8") for file in found if file.name.endswith(SUFFIXES)}
+
+
+def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
+    from msfp_gen.generator.emit import public_header
+
+    begin = perf_counter()
+    extension = compile_extension({**files, "msfp.h": public_header()}, entry.module, folder, libraries=LIBRARIES)
+    manifest = cache.Manifest(
+        module=entry.module,
+        spec=entry.module,
+        key=entry.key,
+        inputs=entry.inputs,
+        extension=extension.name,
+        files={path.name: cache.digest(path) for path in sorted(folder.iterdir())},
+        statements=0,
+        operations=0,
+        stages={"compile": perf_counter() - begin},
+    )
+    manifest.write(folder)
+    return manifest
+
+
+def _silent(_: str, __: float) -> None:
+    """Progress callback that does nothing."""

@@ -1,0 +1,86 @@
+"""Overturning: axial forces of the bearings down to zero, lift-off, and back; against statics and in shaking."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.buildings import BASE, BEARING, INTERFACE, LOAD, PLACES, storey
+
+from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Motion, Solver, simulate
+from msfp_gen.buildings.result import BuildingResult
+
+LIFTING = Effects(uplift=True)
+
+
+def sunk(depth: float, end: float) -> Motion:
+    """A support that sinks slowly and returns [m], [s]."""
+    time = np.linspace(0.0, end, 401)
+    path = np.zeros((401, 3))
+    path[:, 2] = -depth * np.sin(np.pi * time / end) ** 4
+    return Motion.from_arrays(time, path)
+
+
+def test_a_bearing_whose_support_sinks_lifts_off_and_lands():
+    """Statics: as the support sinks, the bearing loses load in proportion; then three bearings carry everything."""
+    mass, centre, end, depth = 3e4, np.array([0.8, 0.4]), 20.0, 8e-3
+    bearings = [BuildingBearing(BEARING, INTERFACE, place, effects=LIFTING) for place in PLACES]
+    bearings[2] = replace(bearings[2], motion=sunk(depth, end))
+    slab = Building.shear(BaseSlab(mass, (1e5, 1e5, 1e5), tuple(centre)), [])
+    still = Motion.from_arrays(np.linspace(0.0, end, 11), np.zeros((11, 3)))
+    result = simulate(BuildingScene(slab, bearings, still))
+    places, weight = np.array(PLACES), mass * BEARING.gravity
+    low = int(np.argmin(result.support[:, 2, 0, 2]))
+    # On three bearings: the loads that balance the weight at its centre.
+    three = [0, 1, 3]
+    balance = np.vstack([np.ones(3), places[three].T])
+    carried = np.linalg.solve(balance, weight * np.array([1.0, *centre]))
+    assert carried.min() > 0.05 * weight
+    assert result.axial_force[low, three] == pytest.approx(carried, abs=2e-3 * weight)
+    assert abs(result.axial_force[low, 2]) < 2e-3 * weight
+    # On four springs of one stiffness, each carries k times its compression; the fourth mode is the warping.
+    warp = np.array([1.0, -1.0, 1.0, -1.0])
+    early = int(np.argmax(result.support[:, 2, 0, 2] < -0.1 * depth))
+    contact = stiffness_of(INTERFACE.vertical_stiffness, result)
+    change = 0.25 * contact * result.support[early, 2, 0, 2] * warp * warp[2]
+    assert result.axial_force[early] - result.axial_force[0] == pytest.approx(change, rel=2e-2)
+    # Landed, it carries what it carried.
+    assert result.axial_force[-1] == pytest.approx(result.axial_force[0], rel=5e-3)
+
+
+def stiffness_of(interface: float, result: BuildingResult) -> float:
+    """Of the interface and the unilateral contacts of a bearing in series [N/m]."""
+    surfaces = result.scene.bearings[0].bearing.surfaces
+    return 1.0 / (1.0 / interface + sum(1.0 / surface.seat_stiffness for surface in surfaces))
+
+
+def rocking(rtol: float, amplitude: float = 0.07) -> BuildingResult:
+    """A slender frame, whose outer bearings lift off in turn."""
+    building = Building.shear(BASE, 3 * [replace(storey(), height=6.0)], 0.05)
+    bearings = [BuildingBearing(BEARING, INTERFACE, place, effects=LIFTING) for place in PLACES]
+    return simulate(BuildingScene(building, bearings, Motion.harmonic(amplitude, 0.8, cycles=2), Solver(rtol=rtol)))
+
+
+def test_a_slender_frame_lifts_off_and_lands():
+    coarse, fine = rocking(1e-3), rocking(1e-4)
+    assert np.all((fine.axial_force < 1e-3 * LOAD).sum(axis=0)[[1, 2]] > 10)
+    assert fine.axial_force.max() > 2.0 * LOAD and fine.axial_force[-1, [1, 2]].min() > 1.5 * LOAD
+    for result in (coarse, fine):
+        left = result.kinetic + result.strain + result.damped - result.received
+        assert np.abs(left).max() < 5e-4 * result.kinetic.max()
+    assert coarse.axial_force.max() == pytest.approx(fine.axial_force.max(), rel=2e-3)
+    displacements = [np.abs(each.bearing_displacement).max(axis=(0, 1)) for each in (coarse, fine)]
+    assert displacements[0] == pytest.approx(displacements[1], rel=2e-2)
+    assert displacements[0][0] == pytest.approx(displacements[1][0], rel=2e-4)
+
+
+def test_moments_of_the_axial_forces_are_those_of_the_frame():
+    """Also while bearings hang in the air: their moments about the base and the inertia of all floors."""
+    result = rocking(1e-4)
+    building = result.scene.building
+    moment = result.acceleration @ building.mass @ building.rigid_motions[:, 4]
+    places = np.array(PLACES)
+    upper = result.wrench[:, :, 1] - result.wrench[0, :, 1]
+    overturning = upper[:, :, 2] @ places[:, 0] - upper[:, :, 4].sum(axis=1)
+    assert moment == pytest.approx(overturning, abs=1e-5 * 4 * LOAD)

@@ -1,0 +1,119 @@
+"""The compiled run of a building: threads, checkpoints, steps, motions of the supports."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
+
+from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
+from msfp_gen.buildings.compiled_run import start_run
+from msfp_gen.buildings.result import BuildingResult, result_of
+from msfp_gen.buildings.run import simulate_building
+
+EVENTFUL = scene(frame(), duration=0.8)
+
+
+def same(one: BuildingResult, other: BuildingResult) -> bool:
+    names = ("time", "displacement", "acceleration", "wrench", "dissipated", "stored", "input", "received")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def test_results_do_not_depend_on_the_number_of_threads():
+    one, three = simulate(EVENTFUL, threads=1), simulate(EVENTFUL, threads=3)
+    assert same(one, three) and one.counts == three.counts
+
+
+@pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
+def test_a_restored_run_continues_bit_by_bit(effects):
+    made = replace(EVENTFUL, bearings=[replace(each, effects=effects) for each in EVENTFUL.bearings], duration=0.3)
+    whole = simulate_building(made)
+    begun = start_run(made)
+    begun.run.advance(whole.counts["steps"] // 2)
+    snapshot = begun.run.snapshot()
+    begun.run.advance(3)
+    later = start_run(made, threads=2)
+    later.run.restore(snapshot)
+    while later.run.advance(7):
+        pass
+    assert same(result_of(later), whole) and later.run.counts == whole.counts
+
+
+def test_an_interrupted_run_is_resumed_bit_by_bit(tmp_path):
+    file, calls = tmp_path / "run.ckpt", []
+
+    def interrupt(time: float, end: float) -> None:
+        calls.append((time, end))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(RunError, match=r"^building: stopped at t = .*interrupted") as caught:
+        simulate(EVENTFUL, progress=interrupt, checkpoint=file)
+    assert caught.value.status == "interrupted" and 1 < len(caught.value.result.time) < 81
+    assert calls[-1][1] == EVENTFUL.end
+    assert same(simulate(EVENTFUL, checkpoint=file, resume=True), simulate(EVENTFUL))
+
+
+def test_a_checkpoint_of_another_building_is_refused(tmp_path):
+    file, short = tmp_path / "run.ckpt", replace(EVENTFUL, duration=0.05)
+    simulate(short, checkpoint=file)
+    with pytest.raises(InputError, match=r"this file exists; resume it"):
+        simulate(short, checkpoint=file)
+    with pytest.raises(InputError, match=r"made for another scene: duration was 0\.05, now it is 0\.06"):
+        simulate(replace(short, duration=0.06), checkpoint=file, resume=True)
+    with pytest.raises(InputError, match="made for another scene: the content"):
+        simulate(replace(short, building=frame(frequency=4.0)), checkpoint=file, resume=True)
+    with pytest.raises(InputError, match="resume: needs the checkpoint"):
+        simulate(short, resume=True)
+    with pytest.raises(ValueError, match="no snapshot"):
+        start_run(short).run.restore(b"x" * 100)
+
+
+@pytest.mark.parametrize("threads", [0, 1.5, True, "two"])
+def test_a_wrong_number_of_threads_is_refused(threads):
+    with pytest.raises(InputError, match=rf"threads = {threads!r}: give a whole number of at least 1"):
+        simulate(EVENTFUL, threads=threads)
+
+
+def test_rows_lie_at_even_times_and_steps_end_at_samples():
+    record = Motion.from_acceleration(0.007 * np.arange(30), np.random.default_rng(1).normal(size=(30, 3)))
+    result = simulate(replace(EVENTFUL, motion=record, duration=None, output_step=0.02))
+    assert result.time == pytest.approx([*0.02 * np.arange(11), 0.203])
+    assert result.counts["steps"] >= 29 + 10
+
+
+def test_a_motion_of_its_own_moves_one_support():
+    """A slow lift of one of three supports tilts the slab as a rigid body on them."""
+    places = [(0.0, 0.0), (4.0, 0.0), (0.0, 5.0)]
+    lift = 0.01
+    rise = Motion.from_arrays(np.linspace(0, 20, 201), raised(lift))
+    still = Motion.from_arrays(np.linspace(0, 20, 201), np.zeros((201, 3)))
+    bearings = [BuildingBearing(BEARING, INTERFACE, place) for place in places]
+    bearings[2] = replace(bearings[2], motion=rise)
+    slab = Building.shear(BaseSlab(3e4, (1e5, 1e5, 1e5), (1.0, 1.5)), [])
+    result = simulate(BuildingScene(slab, bearings, still))
+    base = result.node("base")[-1, 0]
+    assert result.support[-1, :, 0, 2] == pytest.approx([0.0, 0.0, lift], abs=1e-9) and not result.ground.any()
+    assert base[3] == pytest.approx(lift / 5.0, rel=2e-3)
+    assert result.bearing_displacement[-1, :, 2] == pytest.approx([0.0, 0.0, 0.0], abs=3e-5)
+
+
+def raised(height: float) -> np.ndarray:
+    share = np.linspace(0, 1, 201)
+    rise = np.zeros((201, 3))
+    rise[:, 2] = height * share**3 * (10 - 15 * share + 6 * share**2)
+    return rise
+
+
+def test_equal_motions_of_the_supports_are_the_common_motion():
+    own = replace(EVENTFUL, bearings=[replace(each, motion=MOTION) for each in EVENTFUL.bearings], duration=0.3)
+    common = simulate(replace(EVENTFUL, duration=0.3))
+    assert same(simulate(own), common) and len(own.grounds[0]) == 1
+    other = replace(own, motion=Motion.from_arrays(np.linspace(0, 1, 11), np.zeros((11, 3))))
+    moved = simulate(other)
+    assert len(other.grounds[0]) == 2
+    assert np.abs(moved.displacement - common.displacement).max() < 1e-4 * np.abs(common.displacement).max()
+    assert np.array_equal(moved.ground, np.zeros_like(moved.ground))
+    assert moved.axial_force.min() > 0.5 * LOAD
