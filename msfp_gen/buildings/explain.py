@@ -77,7 +77,7 @@ def effect_tables(scene: BuildingScene) -> Iterator[Table]:
         groups.setdefault((selection.effects, asked, scene.bearings[index].bearing), []).append(index)
     for members in groups.values():
         selection = scene.effect_selections[_decisive(scene, members)]
-        table = one.effect_table(selection)
+        table = one.effect_table(selection, "monitors note where they do not suffice")
         yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
         yield from one.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
 
