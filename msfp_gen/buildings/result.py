@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
-from msfp_gen.buildings.compiled_run import ENERGIES, BuildingRun, unpacked
+from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
 from msfp_gen.buildings.data import BuildingData
 from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.response import DISSIPATED
@@ -97,22 +97,23 @@ class BuildingResult(BuildingData):
 def result_of(run: BuildingRun) -> BuildingResult:
     """The rows of a run until now."""
     rows = unpacked(run)
-    energies: dict[str, Any] = {name: rows[name] for name in ENERGIES}
     count = len(run.ports)
     works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
     return BuildingResult(
-        run.scene,
-        rows["time"],
-        rows["displacement"],
-        rows["velocity"],
-        rows["acceleration"],
-        rows["ground"][:, 0],
-        np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
-        [rows[f"normal {i}"] for i in range(count)],
-        [rows[f"sliding {i}"] for i in range(count)],
-        np.stack([sum(work[name] for name in DISSIPATED) for work in works], axis=1),
-        np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
-        **energies,
+        scene=run.scene,
+        time=rows["time"],
+        displacement=rows["displacement"],
+        velocity=rows["velocity"],
+        acceleration=rows["acceleration"],
+        ground=rows["ground"][:, 0],
+        wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
+        normal_force=[rows[f"normal {i}"] for i in range(count)],
+        sliding=[rows[f"sliding {i}"] for i in range(count)],
+        dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
+        stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
+        damped=rows["damped"],
+        received=rows["received"],
+        input=rows["input"],
         support=rows["ground"][:, run.scene.grounds[1]],
         counts=run.run.counts,
     )

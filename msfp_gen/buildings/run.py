@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from msfp_gen.buildings.compiled_run import BuildingRun, start_run
 from msfp_gen.buildings.result import BuildingResult, result_of
@@ -19,13 +19,13 @@ Progress = Callable[[float, float], None]
 class Keeper(Protocol):
     """A checkpoint of the run (`simulation/checkpoint.py`)."""
 
-    def restore(self, run: object) -> None:
+    def restore(self, run: Any) -> None:
         """Set a new run to the saved state, if there is one."""
 
-    def save_if_due(self, run: object) -> None:
+    def save_if_due(self, run: Any) -> None:
         """Save the run if enough time has passed."""
 
-    def save(self, run: object) -> None:
+    def save(self, run: Any) -> None:
         """Save the run now."""
 
 

@@ -98,7 +98,7 @@ def _simulate_building(
     if not resume:
         require_no_checkpoint(path)
 
-    def keep(run: BuildingRun) -> Any:
+    def keep(run: BuildingRun) -> Checkpoint:
         return Checkpoint(path, identity(run), every, resume)
 
     return simulate_building(scene, progress, keep, threads)
@@ -119,8 +119,9 @@ def identity(run: BuildingRun) -> Identity:
     return Identity(run.build, tomli_w.dumps(known), fingerprint(scene))
 
 
-simulate.__doc__ = (
-    f"{bearings.simulate.__doc__}\n    Of a `BuildingScene`: its `BuildingResult`, with the options progress, "
-    "checkpoint, every,\n    resume and threads: of its bearings; None: chosen. Results do not depend on it.\n"
-)
+_ADDED = """
+    Of a `BuildingScene`: its `BuildingResult`, with the options progress, checkpoint, every, resume, and threads:
+    for its bearings, None: chosen. Results do not depend on their number.
+"""
+simulate.__doc__ = f"{bearings.simulate.__doc__}{_ADDED}"
 simulate.__signature__ = inspect.signature(bearings.simulate)  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ import pytest
 import run_tutorial
 from matplotlib.image import imread
 from support import ROOT
-from test_tutorial import coarse, same
+from support.pages import coarse, same
 
 from msfp_gen import BuildingScene, load_scene
 from msfp_gen.cli import main

@@ -261,6 +261,17 @@ typedef struct {
     int step_count;
 } msfp_gradient_inputs;
 
+/* A stiffly accurate ESDIRK method, for a program that takes its steps itself. Stage 0 is the start of the step, stage
+ * count - 1 its end. Stage i is at the share shares[i] of the step h, where y = y_0 + h sum_j weights[i][j] y'_j over
+ * j < i + h diagonal y'_i. The error of a step is estimated as h sum_j errors[j] y'_j. */
+#define MSFP_STAGES 7 /* of a method, at most */
+typedef struct {
+    int count;
+    double diagonal;
+    double weights[MSFP_STAGES][MSFP_STAGES], shares[MSFP_STAGES], errors[MSFP_STAGES];
+    double order; /* of the estimated error + 1 */
+} msfp_method_stages;
+
 /* Receives rows [count][api->row_size] in the order of time; they are valid during the call. A value other than 0 ends
  * this call of run_advance early: the run itself may be continued. */
 typedef int (*msfp_row_callback)(void *user, const double *rows, size_t count);
@@ -405,6 +416,29 @@ typedef struct msfp_api {
     const double *(*gradient_events)(const msfp_run *run, size_t *count);
     /* Of the extremes with respect to one parameter, [extremes_size]. */
     void (*gradient_extremes)(const msfp_run *run, int parameter, double *out);
+
+    /* ---- the two-port by stages: your program takes the steps, and the bearing is one of its parts ---- */
+    /* A step: port_step_begin; port_stage for stage 1, 2, ..., each as often as your iteration needs; port_step_end; then
+     * port_step_commit, or port_step_begin once more. Wrenches are functions of the motion of the ends in the stage, of the
+     * stages before it and of the committed state. Ends and wrenches as above; the model too. After a failure begin a
+     * shorter step. These steps and trials exclude each other between two commits. */
+    int (*port_method)(int method, msfp_method_stages *stages); /* enum msfp_method, implicit ones */
+    /* step [s]; expected [2]: horizontal displacement of the upper end that you expect at its end [m]. */
+    int (*port_step_begin)(msfp_port *port, double step, const double *expected);
+    /* Solve a stage: the one after the last, or that one again for another motion of the upper end. */
+    int (*port_stage)(msfp_port *port, int stage, const double *ends, double *wrench);
+    /* Derivatives [6][6] of the wrench of the upper end in the stage just solved, with respect to its rates; its
+     * displacements change with them by diagonal * step. */
+    int (*port_stage_derivative)(msfp_port *port, double *derivative);
+    /* After the last stage: error of the bearing over its tolerance [-], above 1 take a shorter step; share of the step at
+     * which its first event lies (a rim is met, a contact closes), below 1 take a step that ends there. */
+    int (*port_step_end)(msfp_port *port, double *error, double *share);
+    /* Accept the step; time: of its end, as your program counts it [s]. */
+    int (*port_step_commit)(msfp_port *port, double time);
+    /* At the committed time the accelerations of the ends jump to those of `ends`, which else is the committed motion. */
+    int (*port_jump)(msfp_port *port, const double *ends);
+    /* Why no shorter step cures the `status` of a step: a status, with its place. */
+    int (*port_cause)(msfp_port *port, int status, msfp_progress *cause);
 } msfp_api;
 
 #ifdef __cplusplus

@@ -105,7 +105,8 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench)
 {
     const int now = port->step.stage;
-    if (stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages || !wrench)
+    if (now < 0 || stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages ||
+        !wrench)
         return MSFP_E_ARGUMENT;
     if (!ends || !msfp_valid_ends(ends))
         return MSFP_E_FINITE;
@@ -114,12 +115,12 @@ int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *
 
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative)
 {
-    return port->step.stage && derivative ? msfp_port_stage_derivative(port, derivative) : MSFP_E_ARGUMENT;
+    return port->step.stage > 0 && derivative ? msfp_port_stage_derivative(port, derivative) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
 {
-    if (!port->step.stage || port->step.stage != port->step.stages.method->stages - 1 || !error || !share)
+    if (port->step.stage < 1 || port->step.stage != port->step.stages.method->stages - 1 || !error || !share)
         return MSFP_E_ARGUMENT;
     return msfp_port_step_end(port, error, share);
 }

@@ -53,6 +53,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     if (!port)
         return NULL;
     port->axial_load = axial_load;
+    port->step.stage = MSFP_NO_STEP;
     port->knots[0] = options->start_time;
     port->knots[1] = options->start_time + 1.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
@@ -131,6 +132,8 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
     msfp_run *run = &port->run;
     memcpy(&port->to, to, sizeof port->to);
     port->tried = port->ready = 0;
+    port->step.stage = MSFP_NO_STEP;
+    port->step.finished = 0;
     port->time_count = 0;
     if (t == port->committed.now.t) {
         copy_state(run, &port->committed);
@@ -222,6 +225,8 @@ int msfp_port_commit(msfp_port *port)
 
 void msfp_port_revert(msfp_port *port)
 {
+    port->step.stage = MSFP_NO_STEP;
+    port->step.finished = 0;
     port->tried = port->ready = 0;
     port->time_count = 0;
     copy_state(&port->run, &port->committed);
@@ -289,7 +294,6 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     port->from = h.from;
     memcpy(port->step.moves, h.moves, sizeof h.moves);
     port->step.moved = h.moved != 0.0;
-    port->step.stage = port->step.finished = 0;
     msfp_port_revert(port);
     return MSFP_OK;
 }

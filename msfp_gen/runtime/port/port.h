@@ -11,6 +11,7 @@
 #define MSFP_PORT_H
 #include "run.h"
 
+enum { MSFP_NO_STEP = -1 };
 enum { MSFP_ENDS = 2, MSFP_ORDERS = 3, MSFP_END_FREEDOMS = 6, MSFP_PORT_FREEDOMS = MSFP_ENDS * MSFP_END_FREEDOMS };
 
 /* Of an end [rad]: a run ends at this tilt, next to the singularity of the Euler angles. */
@@ -29,7 +30,7 @@ typedef struct {
 /* A step by stages from the committed state: those of `committed.now` and `next`. */
 typedef struct {
     msfp_stages stages;
-    int stage;         /* that is being solved; 0: none */
+    int stage;         /* that is being solved; 0: none yet, -1: no step was begun */
     double anchor[2];  /* where the horizontal springs of the interface are fixed in this step [m] */
     double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* derivatives of the rates of a stage with respect to those of end B */
     int moved;         /* those are of the latest stage that was differentiated; otherwise there was none */

@@ -68,7 +68,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     memcpy(&to, ends, sizeof to);
     const int again = i == port->step.stage;
     if (!again) {
-        if (port->step.stage)
+        if (port->step.stage > 0)
             msfp_stage_end(run, s, port->step.stage);
         msfp_stage_begin(run, s, i);
         port->step.stage = i;
@@ -234,7 +234,7 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
     *share = 1.0;
     msfp_stage_end(run, &step->stages, step->stage);
     msfp_stages_end(run, &step->stages, error);
-    step->stage = 0;
+    step->stage = MSFP_NO_STEP;
     if (!(*error < INFINITY))
         return MSFP_E_FINITE;
     if (*error > 1.0)

@@ -124,6 +124,7 @@ def test_messages_of_bad_bearings():
             BuildingBearing(BEARING, INTERFACE, effects=effects)
 
 
-def test_options_of_a_bearing_are_rejected():
-    with pytest.raises(InputError, match="stream: the run of a building has no such option"):
-        simulate(scene(frame()), stream="out.nc")
+@pytest.mark.parametrize("option", [{"strict": True}, {"stream": "run.nc"}, {"gradients": ["motion.scale"]}])
+def test_options_of_a_bearing_are_rejected(option):
+    with pytest.raises(InputError, match=f"{next(iter(option))}: the run of a building has no such option"):
+        simulate(scene(frame()), **option)

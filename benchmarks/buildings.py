@@ -1,0 +1,227 @@
+"""Cost of the run of a building: prints the tables of docs/buildings.md.
+
+`python benchmarks/buildings.py` measures cost over the number of bearings, and a hundred bearings under a record of 60 s;
+`python benchmarks/buildings.py opensees` time and error beside OpenSees with its own triple pendulum (needs
+openseespy). The record is that of the preset ridgecrest-clc. Seconds are those of the processors; with two threads also
+those of the clock.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from msfp_gen import (
+    BaseSlab,
+    Bearing,
+    Body,
+    Building,
+    BuildingBearing,
+    BuildingScene,
+    Effects,
+    Layout,
+    Motion,
+    Solver,
+    Storey,
+    Surface,
+    Top,
+    load_scene,
+    presets,
+)
+from msfp_gen.buildings.compiled_run import start_run
+from msfp_gen.buildings.result import BuildingResult, result_of
+from msfp_gen.common.arrays import Array
+from msfp_gen.studies.accuracy.series import Series
+
+CLIENT = Path(__file__).parents[1] / "tests" / "support" / "opensees_buildings.py"
+SPACING = 6.0  # of the bearings [m]
+DAMPING_TIME = 1e-3  # of the storeys, damping over stiffness [s]
+
+
+def record(duration: float, axes: tuple[int, ...] = (1, 1, 1)) -> tuple[Array, Motion]:
+    """Accelerations of the record at 0.01 s, shape (k, 3) [m/s^2], and its motion."""
+    times = np.arange(round(duration / 0.01) + 1) * 0.01
+    found = load_scene("ridgecrest-clc").motion.acceleration(times) * axes
+    found = (found - found[0]) * np.minimum(1.0, times / 0.2)[:, None]
+    return found, Motion.from_acceleration(times, found)
+
+
+def floors(mass: float, frequency: float, width: float) -> list[BaseSlab | Storey]:
+    """A base and three storeys of that whole mass; each storey would swing at the frequency on its own columns [Hz]."""
+    plan = mass * width**2 / 6
+    stiffness = 0.2 * mass * (2 * np.pi * frequency) ** 2
+    storey = Storey(
+        height=3.5,
+        mass=0.2 * mass,
+        inertia=(0.1 * plan, 0.1 * plan, 0.2 * plan),
+        stiffness=stiffness,
+        torsional_stiffness=stiffness * width**2 / 6,
+        mass_centre=(0.05 * width, 0.0),
+        vertical_stiffness=0.2 * mass * (2 * np.pi * 15.0) ** 2,
+        rocking_stiffness=0.2 * mass * (2 * np.pi * 15.0) ** 2 * width**2 / 6,
+    )
+    return [BaseSlab(0.4 * mass, (0.2 * plan, 0.2 * plan, 0.4 * plan)), *3 * [storey]]
+
+
+def frame(parts: list[BaseSlab | Storey]) -> Building:
+    """The frame, with damping in proportion to stiffness."""
+    made = Building.shear(parts[0], parts[1:], 0.0)  # type: ignore[arg-type]
+    return Building(made.mass, DAMPING_TIME * made.stiffness, made.stiffness, made.nodes, made.columns)
+
+
+def grid(count: int) -> list[tuple[float, float]]:
+    """Places of the bearings in a square."""
+    side = round(count**0.5)
+    middle = 0.5 * SPACING * (side - 1)
+    return [(SPACING * i - middle, SPACING * j - middle) for i in range(side) for j in range(side)]
+
+
+def tower(count: int, duration: float, solver: Solver | None = None) -> BuildingScene:
+    """A frame on so many triple pendulums (preset prototype-tfp), each below 112 kN, under all components."""
+    bearing = presets.bearing("prototype-tfp").replace(contact_damping=1e-4)
+    parts = floors(count * 112e3 / bearing.gravity, 2.0, SPACING * count**0.5)
+    interface = Top.node(1e7, 2e8, 1e6, 1e4, 4e5, 1e3)
+    bearings = [BuildingBearing(bearing, interface, place) for place in grid(count)]
+    return BuildingScene(frame(parts), bearings, record(duration)[1], solver or Solver())
+
+
+def timed(scene: BuildingScene, threads: int = 1) -> tuple[BuildingResult, float, float]:
+    """The result, and seconds of the processors and of the clock, without the building of the model."""
+    run = start_run(scene, threads)
+    begin, clock = time.process_time(), time.perf_counter()
+    while run.run.advance(1000):
+        pass
+    seconds = time.process_time() - begin, time.perf_counter() - clock
+    assert run.run.status[0] == "ok", run.run.status
+    return result_of(run), *seconds
+
+
+def scaling() -> None:
+    print("| bearings | steps | seconds | microseconds a step and bearing |\n|---|---|---|---|")
+    for count in (4, 16, 36, 64, 100):
+        result, seconds, _ = timed(tower(count, 15.0))
+        steps = result.counts["steps"]
+        print(f"| {count} | {steps} | {seconds:.2f} | {1e6 * seconds / steps / count:.1f} |")
+    for threads in (1, 2):
+        result, seconds, clock = timed(tower(100, 60.0), threads)
+        largest = np.abs(result.bearing_displacement[:, :, :2]).max()
+        print(
+            f"100 bearings, 60 s, threads {threads}: {result.counts['steps']} steps, {seconds:.1f} s of the processors, "
+            f"{clock:.1f} s of the clock; bearings {1e3 * largest:.0f} mm"
+        )
+
+
+# Dao's example: shallow geometry times four and friction over three, so that tilts are small as the element assumes.
+RADII, FRICTIONS, CAPACITIES, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 2.5e-4
+WEIGHT = 1e6  # on a bearing [N]
+VERTICAL = 1e9  # stiffness of a bearing [N/m]
+
+
+def shallow() -> tuple[Bearing, dict[str, Any]]:
+    """The same bearing for this package and for OpenSees (tests/physics/test_opensees_client.py)."""
+    inner, lower, upper = zip(RADII, CAPACITIES, FRICTIONS, strict=True)
+    surfaces = [
+        Surface(r, c, mu, YIELD * share, rim_stiffness=1e9, contact_damping=1e-4)
+        for (r, c, mu), share in ((lower, 1.0), (inner, 0.5), (inner, 0.5), (upper, 1.0))
+    ]
+    light = [Body(height=2e-3, centroid=1e-3, mass=10.0, inertia=(1e-3, 1e-3), rim_radius=0.05) for _ in range(4)]
+    bearing = Bearing(Layout.tfp(), 2e-3, surfaces, light, gravity=9.81)
+    links = {link.surface: link for link in Series(bearing, rims=True).links}
+    radii = [links[k].effective for k in (1, 0, 3)]
+    begins = FRICTIONS[0] * RADII[0]
+    outer = [(mu * r - begins) / (r - RADII[0]) for mu, r in zip(FRICTIONS[1:], RADII[1:], strict=True)]
+    native = {"lengths": radii, "frictions": [FRICTIONS[0], *outer], "capacities": CAPACITIES}
+    return bearing, {**native, "weight": WEIGHT, "yield_displacement": YIELD, "vertical_stiffness": VERTICAL}
+
+
+def client(**arguments: Any) -> dict[str, Any]:
+    """The answer of OpenSees."""
+    done = subprocess.run([sys.executable, str(CLIENT)], input=json.dumps(arguments), capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
+
+
+def floors_given(parts: list[BaseSlab | Storey]) -> list[dict[str, Any]]:
+    """The floors as the client takes them."""
+    found, level = [], 0.0
+    for part in parts:
+        each: dict[str, Any] = {"mass": part.mass, "inertia": part.inertia, "mass_centre": part.mass_centre}
+        if isinstance(part, Storey):
+            level += part.height
+            springs = {"springs": list(part.springs), "stiffness_centre": part.stiffness_centre}
+            each |= {**springs, "damping_time": DAMPING_TIME}
+        found.append({**each, "level": level})
+    return found
+
+
+def beside_opensees(count: int, duration: float) -> None:
+    """Time and error of both, each against its own fine run: relative to the largest value."""
+    bearing, native = shallow()
+    parts = floors(count * WEIGHT / 9.81, 2.0, SPACING * count**0.5)
+    accelerations, motion = record(duration, (1, 1, 0))
+    # A plate that tilts by N u/k under the moment of its load loses the share N R/k of the stiffness N/R.
+    interface = Top.node(1e9, VERTICAL, 1e10, 1e6, 2e6, 1e7)
+    effects = Effects(bouc_wen="plastic")
+    bearings = [BuildingBearing(bearing, interface, place, effects=effects) for place in grid(count)]
+    scene = BuildingScene(frame(parts), bearings, motion)
+    found = {"msfp-gen": own(scene, parts[-1].mass_centre), "OpenSees": theirs(scene, native, parts, accelerations)}
+    print(f"{count} bearings, {duration:g} s\n| program | setting | seconds | bearings | roof |\n|---|---|---|---|---|")
+    for program, runs in found.items():
+        _, _, paths, roofs = runs[-1]
+        for setting, seconds, path, roof in runs:
+            errors = [np.abs(a - b).max() / np.abs(b).max() for a, b in ((path, paths), (roof, roofs))]
+            print(f"| {program} | {setting} | {seconds:.2f} | {100 * errors[0]:.3g} % | {100 * errors[1]:.3g} % |")
+    largest = [float(np.abs(runs[-1][2]).max()) for runs in found.values()]
+    print(f"largest displacement of a bearing: {largest[0]:.4f} m, OpenSees {largest[1]:.4f} m")
+
+
+def own(scene: BuildingScene, centre: tuple[float, float]) -> list[tuple[str, float, Array, Array]]:
+    """Runs of this package to ever smaller tolerances: setting, seconds, paths of the bearings, roof accelerations."""
+    found = []
+    for rtol in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        result, seconds, _ = timed(replace(scene, solver=Solver(rtol=rtol)))
+        roof = result.acceleration[1:] @ scene.building.node("floor 3").linked([*centre, 10.5])[:2].T
+        found.append((f"rtol {rtol:g}", seconds, result.bearing_displacement[1:, :, :2], roof))
+    return found
+
+
+def theirs(
+    scene: BuildingScene, native: dict[str, Any], parts: list[BaseSlab | Storey], ground: Array
+) -> list[tuple[str, float, Array, Array]]:
+    """The same of OpenSees, with ever shorter steps."""
+    found = []
+    for step in (0.01, 0.005, 0.0025, 0.00125, 0.000625):
+        loads = zip(scene.bearings, scene.axial_loads.tolist(), strict=True)
+        bearings = [{**native, "position": each.position, "load": load, "weight": load} for each, load in loads]
+        answer = client(
+            floors_given=floors_given(parts),
+            bearings_given=bearings,
+            ground=ground.T.tolist(),
+            ground_step=0.01,
+            step=step,
+            count=round(scene.end / step),
+            every=round(0.01 / step),
+            tolerance=1e-6 * WEIGHT,
+        )
+        if answer["status"]:
+            print(f"OpenSees, step {step:g} s: it ends after {len(answer['acceleration'])} rows")
+            continue
+        roof = np.array(answer["acceleration"])[:, :2] + ground[1:, :2]
+        found.append((f"step {step:g} s", answer["seconds"], np.array(answer["displacement"])[:, :, :2], roof))
+    return found
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["opensees"]:
+        beside_opensees(4, 12.0)
+    else:
+        scaling()
