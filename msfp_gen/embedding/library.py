@@ -94,7 +94,7 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary) -> Tree:
 
 def _content(models: dict[str, ModelSpec], built: BuiltLibrary) -> dict[str, Any]:
     """What the templates need."""
-    from msfp_gen.generator.emit import word_enums  # it imports SymPy
+    from msfp_gen.generator.header import word_enums  # it imports SymPy
 
     return {
         "stamp": f"written by msfp-gen {__version__}",

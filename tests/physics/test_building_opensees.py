@@ -119,7 +119,7 @@ def peaks(roof: Array, displacement: Array, compression: Array) -> list[float]:
 
 # Dao's example with radii times four and a third of the friction: tilts below 0.06 rad, as the element assumes. With
 # its yield displacement of 1 mm the element dissipates less than a stack of surfaces of 1 mm; both tend to one limit.
-RADII, FRICTIONS, CAPACITIES, WEIGHT, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 1000.0, 1e-4
+RADII, FRICTIONS, CAPACITIES, WEIGHT, YIELD = (1.44, 5.0, 5.0), (0.004, 0.0173, 0.0467), (0.1, 0.2, 0.2), 1000.0, 3e-5
 
 
 def shallow() -> tuple[Bearing, dict[str, Any]]:
@@ -139,10 +139,11 @@ def shallow() -> tuple[Bearing, dict[str, Any]]:
     return bearing, {**native, "load": WEIGHT, "yield_displacement": YIELD, "vertical_stiffness": 1e6}
 
 
-def test_a_slab_on_shallow_bearings_moves_as_on_those_of_opensees():
-    """Four bearings under both horizontal components: peak displacement to 1 %, the whole path to 5 % of it."""
+@pytest.mark.parametrize(("axes", "whole"), [((0, 1, 0), 1.5e-2), ((1, 1, 0), 5e-2)], ids=["one", "two directions"])
+def test_a_slab_on_shallow_bearings_moves_as_on_those_of_opensees(axes, whole):
+    """Four bearings: peak displacement to 1 %; the whole path, less well where frictions turn (docs/buildings.md)."""
     bearing, native = shallow()
-    ground, motion = record(0.0, 20.0, (1, 1, 0))
+    ground, motion = record(0.0, 20.0, axes)
     mass = 4 * WEIGHT / 9.81
     slab, places = BaseSlab(mass, (10 * mass,) * 3), [(3.0, 3.0), (-3.0, 3.0), (-3.0, -3.0), (3.0, -3.0)]
     interface = Top.node(1e7, native["vertical_stiffness"], 1e6, 1e3, 2e2, 1e2)
@@ -162,4 +163,4 @@ def test_a_slab_on_shallow_bearings_moves_as_on_those_of_opensees():
     largest = np.linalg.norm(expected, axis=1).max()
     assert largest > 0.2
     assert np.linalg.norm(path, axis=1).max() == pytest.approx(largest, rel=1e-2)
-    assert np.abs(path - expected).max() < 0.05 * largest
+    assert np.abs(path - expected).max() < whole * largest
