@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from msfp_gen import Scene, simulate, simulate_batch
-from msfp_gen.scene.file.loader import changed_scene
+from msfp_gen.buildings.opening import changed_scene
 from msfp_gen.simulation.batch import usable_cores
 
 STUDIES = {

@@ -82,6 +82,15 @@ def draw_layouts(folder: Path) -> None:
             axes.set_axis_off()
 
 
+def draw_hospital(folder: Path) -> None:
+    """The figure of docs/hospital.md, made by its own commands."""
+    with TemporaryDirectory() as name:
+        page = Path(__file__).with_name("hospital.md")
+        for _ in run_tutorial.follow(Path(name), page=page):
+            pass
+        shutil.copy(Path(name) / "hospital.png", folder)
+
+
 def draw_tutorial(folder: Path) -> None:
     """The figures of the tutorial, made by its own commands."""
     with TemporaryDirectory() as name:
@@ -141,6 +150,7 @@ def main(folder: Path = FOLDER) -> None:
     draw_runs(folder)
     draw_layouts(folder)
     draw_tutorial(folder)
+    draw_hospital(folder)
     draw_record(folder)
     draw_cost(folder)
     draw_study(folder)

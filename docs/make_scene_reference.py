@@ -9,6 +9,9 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
+from msfp_gen.buildings import file as buildings
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.storey import BaseSlab, Storey
 from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
 from msfp_gen.motions.records import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
@@ -18,7 +21,7 @@ from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
 from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
+from msfp_gen.scene.top import MassTop, NodeTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
 
 TARGET = Path(__file__).with_name("scene.md")
@@ -178,6 +181,50 @@ MEANINGS = {
     "q": "psi, theta, phi of bodies 2 to n.",
     "v": "Their rates.",
     "h": "Friction state Y, Z of each surface, within the unit disc.",
+    "building": "The superstructure and its bearings: `[building]` ([buildings.md](buildings.md)).",
+    "bearings": "Bearings by name, tables as `[bearing]`, for several places of a building.",
+    "building_scene.motion": "Motion of the ground: `[motion]`.",
+    "building_scene.duration": "Length of the run; without it that of the motion.",
+    "building_scene.solver": "Settings of the integration, of building and bearings together: `[solver]`.",
+    "building_scene.output_step": "Distance of the rows of results, at which steps end; without it 10 ms.",
+    "building.mass": "File of the mass matrix (`.mtx`, `.npz`), in place of `base` and `storey`.",
+    "building.stiffness": "File of the stiffness matrix.",
+    "building.damping": "File of the damping matrix; without it by `damping_ratio`.",
+    "damping_ratio": "Damping ratio of the modes on fixed attachments.",
+    "rayleigh_frequencies": "Two frequencies at which Rayleigh damping has that ratio.",
+    "highest_frequency": "Reduction by Craig and Bampton: modes up to this frequency are kept.",
+    "base": "The slab above the bearings: `[building.base]`.",
+    "storey": "One table for each storey, from below: `[[building.storey]]`.",
+    "node": "One table for each node of matrices: `[[building.node]]`.",
+    "building.bearing": "One table for each bearing: `[[building.bearing]]`.",
+    "interface": "Between top plate and building: `[building.interface]`, for all bearings without one of their own.",
+    "building.effects": "`[effects]` of all bearings that have none of their own.",
+    "building.base.mass": "Mass of the slab.",
+    "building.base.inertia": "Moments of inertia about E1, E2, E3 through the centre of mass.",
+    "mass_centre": "Centre of mass in plan.",
+    "building.storey.height": "Height above the floor below.",
+    "building.storey.mass": "Mass of the floor.",
+    "building.storey.inertia": "Moments of inertia of the floor about E1, E2, E3 through the centre of mass.",
+    "building.storey.stiffness": "Of all columns along E1 and E2, or one number for both.",
+    "torsional_stiffness": "About E3 through the stiffness centre.",
+    "stiffness_centre": "Stiffness centre in plan.",
+    "building.storey.vertical_stiffness": "Of columns that shorten; without it floors follow the base vertically.",
+    "rocking_stiffness": "About E1 and E2, with `vertical_stiffness`.",
+    "coordinates": "Indices from 0 of its displacements along E1, E2, E3 and rotations about them.",
+    "building.node.name": "Name of the node, to which bearings refer.",
+    "building.node.position": "Its position.",
+    "building.bearing.bearing": "Name of a table in `[bearings]` or of a preset, or a table as `[bearing]`.",
+    "building.bearing.position": "Position in plan; without it that of the node.",
+    "building.bearing.node": "Node to which a rigid link attaches the bearing.",
+    "building.bearing.interface": "As `[building.interface]`, for this bearing.",
+    "building.bearing.effects": "As `[effects]`, for this bearing.",
+    "building.bearing.motion": "Motion of the ground below it, as `[motion]`; without it that of the scene.",
+    "building.interface.stiffness": "Along E1 and E2.",
+    "building.interface.vertical_stiffness": "Along E3: steel, liner, column head, ground.",
+    "building.interface.vertical_damping": "Along E3.",
+    "building.interface.rotational_stiffness": "Against tilt of the top plate relative to the building.",
+    "building.interface.rotational_damping": "Against the rate of that tilt.",
+    "building.interface.damping": "Along E1 and E2.",
     "displacement": "Horizontal displacement across the bearing.",
     "all_rims": "Whether contact at every rim ends the run.",
 }
@@ -198,6 +245,13 @@ SECTIONS: list[tuple[str, str, type]] = [
     ("`[solver]`", "solver", Solver),
     ("`[initial_state]`", "initial_state", InitialState),
     ("`[stop]`", "stop", Stop),
+    ("A building on bearings", "", BuildingScene),
+    ("`[building]`", "building", buildings.FrameTable),
+    ("`[building.base]`", "building.base", BaseSlab),
+    ("`[[building.storey]]`", "building.storey", Storey),
+    ("`[[building.node]]`", "building.node", buildings.NodeTable),
+    ("`[[building.bearing]]`", "building.bearing", BuildingBearing),
+    ("`[building.interface]`", "building.interface", NodeTop),
     ("Suites: `[[records]]`", "records", motion_tables.RecordMotion),
     ("Suites: `[scale_to]`", "scale_to", ScaleTo),
 ]
@@ -249,7 +303,9 @@ def section(title: str, path: str, kind: type) -> str:
     """One table of the page: the keys in the order of the schema, those that are required first."""
     rules = {name: (rule, default) for name, rule, default in ruled_fields(kind)}
     lines = [f"## {title}", "", "| key | takes | default | meaning |", "|---|---|---|---|"]
-    fields = schema._TABLES[path].model_fields
+    tables = buildings.TABLES if kind is BuildingScene or path.startswith("building") else schema._TABLES
+    path = path or ("" if kind is Scene else "building_scene")
+    fields = tables["" if path == "building_scene" else path].model_fields
     for key in sorted(fields, key=lambda name: not fields[name].is_required()):
         rule, given = EXTRA.get(key) or rules.get(key, (None, MISSING if fields[key].is_required() else None))
         shown = f'`"{kind.kind}"`' if key == "kind" else takes(rule)  # type: ignore[attr-defined]

@@ -1,8 +1,8 @@
-"""Run the commands of docs/tutorial.md: `python docs/run_tutorial.py FOLDER`. Its test and its figures use this script.
+"""Run the commands of docs/tutorial.md: `python docs/run_tutorial.py FOLDER [PAGE]`. Tests and figures use this script.
 
 A block marked `sh` contains commands, one per line. A block marked `toml` or `python` is a file named in its first
 line. A block marked `text` is the output of the preceding commands; lines, and the rest of a line after `...`, may be
-left out. The first block of commands installs the package and is not run.
+left out. The first block of commands of the tutorial installs the package and is not run.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class Step(NamedTuple):
     shown: str
 
 
-def blocks() -> list[Block]:
-    """All fenced blocks of the page, in order."""
-    text = PAGE.read_text(encoding="utf-8")
+def blocks(page: Path = PAGE) -> list[Block]:
+    """All fenced blocks of a page, in order."""
+    text = page.read_text(encoding="utf-8")
     return [Block(*found) for found in re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)]
 
 
@@ -51,10 +51,11 @@ def run(command: str, folder: Path) -> str:
     return done.stdout
 
 
-def follow(folder: Path, run: Callable[[str, Path], str] = run) -> Iterator[Step]:
-    """Follow the page in `folder`; yields one step per block of commands. `run` runs a command in the folder."""
-    install, *rest = blocks()
-    assert install.language == "sh", "the page begins with the installation"
+def follow(folder: Path, run: Callable[[str, Path], str] = run, page: Path = PAGE) -> Iterator[Step]:
+    """Follow a page in `folder`; yields one step per block of commands. `run` runs a command in the folder."""
+    rest = blocks() if page == PAGE else blocks(page)
+    if page == PAGE:
+        assert rest.pop(0).language == "sh", "the page begins with the installation"
     step = None
     for language, text in rest:
         if language == "text" and step is not None:
@@ -75,5 +76,5 @@ def follow(folder: Path, run: Callable[[str, Path], str] = run) -> Iterator[Step
 if __name__ == "__main__":
     where = Path(sys.argv[1])
     where.mkdir(parents=True, exist_ok=True)
-    for done in follow(where):
+    for done in follow(where, page=Path(sys.argv[2]) if len(sys.argv) > 2 else PAGE):
         print(*(f"$ {command}" for command in done.commands), done.printed, sep="\n")

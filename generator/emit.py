@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from importlib import resources
-from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -17,14 +15,12 @@ from msfp_gen.version import __version__
 
 from .derive import Equations
 from .gradients import COLUMNS, contact_lists
+from .header import environment, word_enums
 from .heat import HEAT_KERNEL
-from .interface import ABI_VERSION, CALL_ERRORS, interface_context, model_name
+from .interface import interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
 from .printer import to_c
 from .program import Block, Use
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 # Each is made from the template of its name.
 GRADIENT_FILES = ("msfp_gradient_kernels.h",)  # of models with gradients
@@ -211,29 +207,6 @@ def value_enums(effects: Effects) -> list[tuple[str, str, str, str, list[tuple[s
     ]
 
 
-def word_enums() -> list[tuple[str, str, str, str, list[tuple[str, str, str]]]]:
-    """Enumerations whose names Python knows: type, prefix, meaning, count, (name, enumerator, meaning)."""
-    statuses = tuple(status for status in contract.STATUSES if status.compiled)
-    plain = {"ok": "MSFP_OK", "stopped": "MSFP_STOPPED"}
-    return [
-        (
-            kind,
-            prefix,
-            meaning,
-            last,
-            [(e.name, plain.get(e.name, prefix + e.name.upper()), e.meaning) for e in entries],
-        )
-        for kind, prefix, meaning, last, entries in (
-            ("status", "MSFP_E_", "How a run or an evaluation ended", "MSFP_STATUSES", statuses),
-            ("integral", "MSFP_WORK_", "Integrals over a run [J]", "MSFP_WORKS", contract.WORKS),
-            ("event_kind", "MSFP_EVENT_", "Kinds of events", "MSFP_EVENT_KINDS", contract.EVENT_KINDS),
-            ("count", "MSFP_COUNT_", "Counters of a run", "MSFP_COUNTS", contract.COUNTERS),
-            ("method", "MSFP_METHOD_", "Methods of integration", "MSFP_METHODS", contract.METHODS),
-            ("monitor", "MSFP_MONITOR_", "Monitors of what a model leaves out", "MSFP_MONITORS", contract.MONITORS),
-        )
-    ]
-
-
 def description(spec: ModelSpec) -> str:
     """What the wrapper states about a model, as JSON. The wrapper itself is the same text for every model."""
     shape = shape_of(spec)
@@ -247,27 +220,6 @@ def description(spec: ModelSpec) -> str:
             "extremes": [(q.name, shape(q)) for q in rows.extremes(spec.effects)],
         }
     )
-
-
-def environment() -> Environment:
-    """Templates of the package, in which an undefined name is an error."""
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    folder = resources.files("msfp_gen.templates")
-    return Environment(
-        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-
-
-def public_header() -> str:
-    """Text of `msfp.h`, the same for every model."""
-    context = {"version": __version__, "words": word_enums(), "abi": ABI_VERSION, "errors": CALL_ERRORS}
-    return environment().get_template("msfp.h.jinja").render(context, file="msfp.h")
 
 
 def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:

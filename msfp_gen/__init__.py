@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
-    from msfp_gen.analysis.characterise import characterise
     from msfp_gen.buildings.building import Building
-    from msfp_gen.buildings.file import load_building
+    from msfp_gen.buildings.characterise import characterise
+    from msfp_gen.buildings.opening import changed_scene, load_scene
     from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
     from msfp_gen.buildings.storey import BaseSlab, Storey
     from msfp_gen.coupling.two_port import TwoPort
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing, Body, Surface
     from msfp_gen.scene.file import presets
-    from msfp_gen.scene.file.loader import changed_scene, load_scene
     from msfp_gen.scene.parts import InitialState, Stop
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
@@ -66,11 +65,10 @@ _MODULES = {
     "TwoPort": "coupling.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
-    "changed_scene": "scene.file.loader",
-    "characterise": "analysis.characterise",
+    "changed_scene": "buildings.opening",
+    "characterise": "buildings.characterise",
     "fit": "studies.calibration",
-    "load_building": "buildings.file",
-    "load_scene": "scene.file.loader",
+    "load_scene": "buildings.opening",
     "presets": "scene.file.presets",
     "simulate": "simulation.either",
     "simulate_batch": "simulation.batch",
@@ -110,7 +108,6 @@ __all__ = [
     "changed_scene",
     "characterise",
     "fit",
-    "load_building",
     "load_scene",
     "presets",
     "simulate",

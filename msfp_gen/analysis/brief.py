@@ -39,29 +39,41 @@ def brief_rows(result: RunData) -> list[tuple[str, str]]:
 
 def brief_text(result: RunData) -> str:
     """The main results, ten lines at most."""
-    lines = [f"{label:<18}{_one_line(value)}" for label, value in brief_rows(result)]
-    return "\n".join([f"Result of {result.scene.name or 'an unnamed scene'}", *(f"  {line}" for line in lines)])
+    return text_of(f"Result of {result.scene.name or 'an unnamed scene'}", brief_rows(result))
+
+
+def text_of(title: str, rows: list[tuple[str, str]]) -> str:
+    """A title and rows of label and value, one line each."""
+    return "\n".join([title, *(f"  {label:<18}{_one_line(value)}" for label, value in rows)])
 
 
 def brief_html(result: RunData) -> str:
     """The main results as a table, beside the horizontal force over the displacement."""
-    rows = "".join(f"<tr><th>{escape(k)}</th><td>{escape(_one_line(v))}</td></tr>" for k, v in brief_rows(result))
-    title = escape(result.scene.name or "unnamed scene")
+    return html_of(result.scene.name, brief_rows(result), *_loop(result), "force over displacement")
+
+
+def html_of(name: str, rows: list[tuple[str, str]], x: Array, y: Array, caption: str) -> str:
+    """Rows of label and value as a table, beside a curve of points x, y, each of shape (k,)."""
+    cells = "".join(f"<tr><th>{escape(k)}</th><td>{escape(_one_line(v))}</td></tr>" for k, v in rows)
     return (
-        f"<div><b>{title}</b><div style='display:flex;gap:1em'><table>{rows}</table>"
-        f"<figure style='margin:0'>{_loop(result)}<figcaption>force over displacement</figcaption></figure></div></div>"
+        f"<div><b>{escape(name or 'unnamed scene')}</b><div style='display:flex;gap:1em'><table>{cells}</table>"
+        f"<figure style='margin:0'>{_curve(x, y)}<figcaption>{escape(caption)}</figcaption></figure></div></div>"
     )
 
 
-def _loop(result: RunData) -> str:
-    """Force over displacement, along the direction of the largest displacement, as SVG."""
+def _loop(result: RunData) -> tuple[Array, Array]:
+    """Displacement and force along the direction of the largest displacement."""
     history = result.history
     peak = history.displacement[history.peak_row, :2]
     size = float(np.hypot(*peak))
     direction = peak / size if size else np.array([1.0, 0.0])
-    rows = np.unique(np.linspace(0, len(history.time) - 1, min(MAX_POINTS, len(history.time))).astype(int))
-    x = _scaled(history.displacement[rows, :2] @ direction, WIDTH)
-    y = HEIGHT - _scaled(history.top_force[rows, :2] @ direction, HEIGHT)
+    return history.displacement[:, :2] @ direction, history.top_force[:, :2] @ direction
+
+
+def _curve(x: Array, y: Array) -> str:
+    """A curve as SVG."""
+    rows = np.unique(np.linspace(0, len(x) - 1, min(MAX_POINTS, len(x))).astype(int))
+    x, y = _scaled(x[rows], WIDTH), HEIGHT - _scaled(y[rows], HEIGHT)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
     return (
         f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="loop">'

@@ -154,7 +154,7 @@ def _entries(port: TwoPort) -> Array:
 def _port(scene: BuildingScene, index: int) -> TwoPort:
     given, load = scene.bearings[index], float(scene.axial_loads[index])
     try:
-        return TwoPort(given.bearing, given.interface, load, given.effects, scene.solver)
+        return TwoPort(given.bearing, given.interface, load, scene.modelled[index], scene.solver)
     except InputError as error:
         raise InputError(f"scene.bearings[{index}]: {error}") from None
 

@@ -1,4 +1,4 @@
-"""Buildings in TOML files: `load_building`."""
+"""Tables of buildings, as in TOML files: `building_from_table`."""
 
 from __future__ import annotations
 
@@ -14,35 +14,54 @@ from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.file.loader import bearing_from_table, toml_file
-from msfp_gen.scene.file.motion_tables import KINDS, is_file, resolved
-from msfp_gen.scene.file.schema import MOTION, PARTS, model_of, rows_of, validate
-from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
+from msfp_gen.scene.file.motion_tables import KINDS, resolved
+from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
-from msfp_gen.specification.layout import Effects
 
 Table = dict[str, Any]
-_FREQUENCY = Quantity("Hz", above=0.0)
+MATRICES = ("mass", "stiffness", "damping")
+FILES = {"motion": ("file",), "building": MATRICES}  # table -> its keys that are paths of files
 
 
 @dataclass(frozen=True)
 class FrameTable:
-    """The numbers of `[building]`: damping as in `Building.shear`, and the frequency of `Building.reduced` [Hz]."""
+    """`[building]` beside its tables.
 
+    mass, stiffness, damping: files of matrices, as of `Building.from_matrices`, in place of base and storeys.
+    damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency [Hz]: as in `Building.reduced`.
+    """
+
+    mass: str | None = None
+    stiffness: str | None = None
+    damping: str | None = None
     damping_ratio: Annotated[float, Quantity("", least=0.0)] = 0.02
     rayleigh_frequencies: Annotated[tuple[float, float] | None, Quantity("Hz", above=0.0, shape=(2,))] = None
-    highest_frequency: Annotated[float | None, _FREQUENCY] = None
+    highest_frequency: Annotated[float | None, Quantity("Hz", above=0.0)] = None
 
 
-_INTERFACE, _BASE, _STOREY, _EFFECTS = (model_of(kind) for kind in (NodeTop, BaseSlab, Storey, Effects))
-_BEARING = model_of(BuildingBearing, bearing=(Any, ...), interface=(_INTERFACE, None), effects=(_EFFECTS, None))
+@dataclass(frozen=True)
+class NodeTable:
+    """`[[building.node]]`: indices of the six coordinates of a node from 0, and its position [m]."""
+
+    name: str
+    coordinates: Annotated[tuple[int, ...], Quantity("", least=0, whole=True, shape=(6,))]
+    position: Annotated[tuple[float, float, float], Quantity("m", shape=(3,))]
+
+
+_INTERFACE, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, BaseSlab, Storey, NodeTable))
+_BEARING = model_of(
+    BuildingBearing, bearing=(Any, ...), interface=(_INTERFACE, None), effects=(EFFECTS, None), motion=(MOTION, None)
+)
 _BUILDING = model_of(
     FrameTable,
-    base=(_BASE, ...),
+    base=(_BASE, None),
     storey=(rows_of(_STOREY), []),
+    node=(rows_of(_NODE), []),
     bearing=(rows_of(_BEARING), ...),
     interface=(_INTERFACE, None),
+    effects=(EFFECTS, None),
 )
 _SCENE = model_of(
     BuildingScene,
@@ -51,70 +70,99 @@ _SCENE = model_of(
     motion=(MOTION, ...),
     solver=(PARTS["solver"], None),
 )
-_TABLES = {
+TABLES = {
     "": _SCENE,
     "building": _BUILDING,
     "building.base": _BASE,
     "building.storey": _STOREY,
+    "building.node": _NODE,
     "building.bearing": _BEARING,
     "building.interface": _INTERFACE,
+    "building.effects": PARTS["effects"],
     "building.bearing.interface": _INTERFACE,
-    "building.bearing.effects": _EFFECTS,
+    "building.bearing.effects": PARTS["effects"],
     "solver": PARTS["solver"],
 }
+COMMON = ("interface", "effects")  # tables of [building] for all bearings that have none of their own
 
 
-def load_building(path: str | Path) -> BuildingScene:
-    """The building in a TOML file. Paths inside it are relative to it.
-
-    Raises InputError of one line that names the file, the path of the field, the value and the remedy.
-    """
-    file = Path(path)
-    if not is_file(file):
-        raise InputError(f"building = {str(path)!r}: no such file; give the path of a TOML file")
-    try:
-        return building_from_table(toml_file(file), file.parent)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-
-
-def building_from_table(table: Mapping[str, Any], folder: Path | None = None) -> BuildingScene:
-    """The building of a plain table, as in a file; `folder`: as in `scene_from_table`. Raises InputError."""
-    given = validate(_SCENE, table, _TABLES)
+def building_from_table(
+    table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None
+) -> BuildingScene:
+    """The building of a plain table, as in a file; folder, motion: as in `scene_from_table`. Raises InputError."""
+    still = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
+    given = validate(_SCENE, table if motion is None else {**table, "motion": still}, TABLES)
     frame, named = given.pop("building"), given.pop("bearings", {})
-    parts: Table = {"building": _building(frame), "motion": _motion(given.pop("motion"), folder)}
+    made = given.pop("motion")
+    parts: Table = {"building": _building(frame, folder), "motion": motion or _motion(made, folder)}
     if "solver" in given:
         parts["solver"] = Solver(**given.pop("solver"))
-    common = frame.get("interface")
+    common = {name: frame[name] for name in COMMON if name in frame}
     rows = enumerate(frame["bearing"])
-    parts["bearings"] = [_bearing(row, f"building.bearing[{index}]", common, named) for index, row in rows]
+    parts["bearings"] = [
+        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder) for index, row in rows
+    ]
     return BuildingScene(**given, **parts)
 
 
-def _building(given: Table) -> Building:
+def _building(given: Table, folder: Path | None) -> Building:
+    options: Table = {name: given[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in given}
+    files = [name for name in MATRICES if name in given]
+    frames = [name for name in ("base", "storey") if given.get(name)]
+    if files and frames:
+        raise InputError(f"building.{frames[0]}: not together with building.{files[0]}; give a frame or its matrices")
+    building = _of_matrices(given, folder, options) if files else _of_storeys(given, options)
+    return building.reduced(given["highest_frequency"]) if "highest_frequency" in given else building
+
+
+def _of_storeys(given: Table, options: Table) -> Building:
+    if "base" not in given:
+        raise InputError("building.base is missing: give this table, or mass and stiffness as files of matrices")
+    if given.get("node"):
+        raise InputError("building.node: a frame of storeys makes its nodes; leave it out")
     with errors_at("base", "building.base"):
         base = BaseSlab(**given["base"])
     storeys = []
     for index, row in enumerate(given.get("storey", [])):
         with errors_at("storey", f"building.storey[{index}]"):
             storeys.append(Storey(**row))
-    options = {name: given[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in given}
-    building = Building.shear(base, storeys, **options)
-    return building.reduced(given["highest_frequency"]) if "highest_frequency" in given else building
+    return Building.shear(base, storeys, **options)
 
 
-def _bearing(given: Table, path: str, common: Table | None, named: Table) -> BuildingBearing:
+def _of_matrices(given: Table, folder: Path | None, options: Table) -> Building:
+    for name in MATRICES[:2]:
+        if name not in given:
+            raise InputError(f"building.{name} is missing: give the path of a .mtx or .npz file")
+    files = {name: resolved(given[name], folder, f"building.{name}") if name in given else None for name in MATRICES}
+    nodes: dict[str, Any] = {}
+    for index, row in enumerate(given.get("node", [])):
+        if row["name"] in nodes:
+            raise InputError(f"building.node[{index}].name = {row['name']!r}: a node has it already; give another")
+        nodes[row["name"]] = (row["coordinates"], row["position"])
+    return Building.from_matrices(**files, nodes=nodes, **options)  # type: ignore[arg-type]
+
+
+def stored_bearing(row: Table, index: int) -> BuildingBearing:
+    """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
+    path = f"bearing[{index}]"
+    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {}, None)
+
+
+def _bearing(given: Table, path: str, named: Table, folder: Path | None) -> BuildingBearing:
     values = dict(given)
-    interface = values.pop("interface", common)
-    if interface is None:
+    if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
-    values["bearing"] = bearing = _values(values["bearing"], path, named)
-    if "effects" in values:
-        chosen = values["effects"]
-        word = select_friction(bearing, chosen.get("friction_law"))
-        values["effects"] = Effects(**{"friction": word, **chosen})
-    with errors_at("top", f"{path}.interface"), errors_at("building_bearing", path):
-        return BuildingBearing(interface=NodeTop(**interface), **values)
+    values["bearing"] = _values(values["bearing"], path, named)
+    with errors_at("effects", f"{path}.effects"):
+        if "effects" in values:
+            values["effects"] = effects_from_table(values["effects"])
+    if "motion" in values:
+        with errors_at("motion", f"{path}.motion"):
+            values["motion"] = _motion(values["motion"], folder)
+    with errors_at("top", f"{path}.interface"):
+        values["interface"] = NodeTop(**values["interface"])
+    with errors_at("building_bearing", path):
+        return BuildingBearing(**values)
 
 
 def _values(given: Any, path: str, named: Table) -> Bearing:

@@ -3,105 +3,95 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
 from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
-from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.data import BuildingData
 from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.response import DISSIPATED
+from msfp_gen.results.note import Note
 from msfp_gen.specification.contract import WORKS, names
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-@dataclass(frozen=True, eq=False)
-class BuildingResult:
-    """Motion of a building, and forces and sliding of its bearings, at k times.
+    from msfp_gen.buildings.characterise import BuildingCharacterisation
 
-    time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
-    the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
-    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
-    (k, bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape
-    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of each bearing, a list of arrays of shape
-    (k, n-1) [N], [m]. Energies, shape (k,) or (k, bearings) [J]: dissipated: in each bearing; stored: in each bearing,
-    with the springs of its interface; damped: by the damping of the building; received: work of the bearings on the
-    building, by their forces beyond those at rest; input: work of the ground. counts: of the run.
-    """
 
-    scene: BuildingScene
-    time: Array
-    displacement: Array
-    velocity: Array
-    acceleration: Array
-    ground: Array
-    wrench: Array
-    normal_force: list[Array]
-    sliding: list[Array]
-    dissipated: Array
-    stored: Array
-    damped: Array
-    received: Array
-    input: Array
-    support: Array
-    counts: dict[str, int]
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class BuildingResult(BuildingData):
+    """The result of `simulate` of a building; a RunError has one in `.result` if the run failed after its start."""
 
-    def node(self, name: str) -> Array:
-        """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m], [rad] and per s, s^2."""
-        rows = self.scene.building.node(name).rows
-        return np.stack([each @ rows.T for each in (self.displacement, self.velocity, self.acceleration)], axis=1)
+    def __repr__(self) -> str:
+        """The main results in ten lines at most."""
+        from msfp_gen.buildings.summary import brief_text
 
-    @property
-    def bearing_displacement(self) -> Array:
-        """Displacement of the upper end of each bearing relative to the ground, shape (k, bearings, 3) [m]."""
-        upper: Array = np.einsum("bin,kn->kbi", self.scene.attachments[:, :3], self.displacement)
-        return upper - self.support[:, :, 0]
+        return brief_text(self)
 
-    @property
-    def axial_force(self) -> Array:
-        """Compression between the building and each bearing, shape (k, bearings) [N]."""
-        return -self.wrench[:, :, 1, 2]
+    def _repr_html_(self) -> str:
+        """The main results and the orbit of the bearing that moves most, for a notebook."""
+        from msfp_gen.buildings.summary import brief_html
 
-    @property
-    def drift(self) -> Array:
-        """Deformation of the columns of each storey, along and about E1, E2, E3, shape (k, storeys, 6) [m], [rad]."""
-        rows = np.array([each.deformation for each in self.scene.building.columns]).reshape(-1, 6, self._size)
-        found: Array = np.einsum("sin,kn->ksi", rows, self.displacement)
-        return found
+        return brief_html(self)
 
-    @property
-    def storey_force(self) -> Array:
-        """Force and moment that accelerate the floors above, at half height of each storey, shape (k, storeys, 6).
+    @cached_property
+    def bearings(self) -> tuple[BearingResult, ...]:
+        """The result of every bearing."""
+        return bearings_of(self)
 
-        [N], [N m]; the first two are the storey shears. Weights are not included.
+    @cached_property
+    def notes(self) -> tuple[Note, ...]:
+        """Messages of the monitors in order of time; each names its bearing (docs/buildings.md)."""
+        from msfp_gen.buildings.notes import notes_of
+
+        return notes_of(self)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Main results in SI units, as values that JSON can hold; `buildings.summary.summarise` lists the keys."""
+        from msfp_gen.buildings.summary import summarise
+
+        return summarise(self)
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Rows as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
+        from msfp_gen.buildings.dataset import to_dataset
+
+        return to_dataset(self)
+
+    def characterise(self) -> BuildingCharacterisation:
+        """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
+
+        Raises InputError where the bearings did not move.
         """
-        rows = np.array([each.inertia for each in self.scene.building.columns]).reshape(-1, 6, self._size)
-        found: Array = np.einsum("sin,kn->ksi", rows, self.acceleration)
-        return found
+        from msfp_gen.buildings.characterise import characterise_building
 
-    @property
-    def base_reaction(self) -> Array:
-        """Sum of the forces that the ground exerts on the bearings, shape (k, 3) [N]."""
-        forces: Array = self.wrench[:, :, 0, :3].sum(axis=1)
-        return forces
+        return characterise_building(self)
 
-    @property
-    def kinetic(self) -> Array:
-        """Kinetic energy of the building, shape (k,) [J]."""
-        return 0.5 * _squares(self.velocity, self.scene.building.mass)
+    def to_netcdf(self, path: str | Path) -> Path:
+        """Write rows and scene as netCDF-4 file, completely or not at all. Raises InputError as `Result.to_netcdf`."""
+        from msfp_gen.buildings.files import write_netcdf
 
-    @property
-    def strain(self) -> Array:
-        """Energy of deformation of the building, from the place at rest, shape (k,) [J]."""
-        return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
+        return write_netcdf(self, path)
 
-    @property
-    def _size(self) -> int:
-        return len(self.scene.building.mass)
+    def save(self, path: str | Path) -> Path:
+        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as `Result.save`."""
+        from msfp_gen.buildings.files import save
 
+        return save(self, path)
 
-def _squares(rows: Array, matrix: Array) -> Array:
-    """x^T A x of every row x, shape (k,)."""
-    found: Array = ((rows @ matrix) * rows).sum(axis=1)
-    return found
+    @classmethod
+    def from_netcdf(cls, path: str | Path) -> BuildingResult:
+        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
+        from msfp_gen.buildings.reading import read_building
+
+        return read_building(path, cls)
 
 
 def result_of(run: BuildingRun) -> BuildingResult:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 
 from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.effects import select_effects
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields, require_type
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
-from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 BALANCE = 1e-6  # largest part of the weight that the bearings do not balance at rest
 ROW_STEP = 0.01  # between rows [s]
@@ -30,16 +32,15 @@ class BuildingBearing:
 
     bearing: its values; the same one may carry the building at several places. interface: `Top.node(...)`, stiffness
     and damping between its top plate and the building. position: in plan [m]; None: that of the node. node: of the
-    building, to which a rigid link attaches it. effects: `Effects` of its model; None: the default ones, with the
-    friction law whose parameters its surfaces have. name: for messages and results. motion: of the ground below it;
-    None: that of the scene. Raises InputError.
+    building, to which a rigid link attaches it. effects: of its model, or `Auto`: selected from the scene, as None is.
+    name: for messages and results. motion: of the ground below it; None: that of the scene. Raises InputError.
     """
 
     bearing: Bearing
     interface: NodeTop
     position: Annotated[tuple[float, float] | None, Quantity("m", shape=(2,))] = None
     node: str = "base"
-    effects: Effects | None = None
+    effects: Effects | Auto | None = None
     name: str = ""
     motion: Motion | None = None
 
@@ -47,8 +48,14 @@ class BuildingBearing:
         require_type(self.bearing, Bearing, "building_bearing.bearing")
         require_type(self.motion, (Motion, type(None)), "building_bearing.motion")
         require_type(self.interface, NodeTop, "building_bearing.interface")
-        require_type(self.effects, (Effects, type(None)), "building_bearing.effects")
+        require_type(self.effects, (Effects, Auto, type(None)), "building_bearing.effects")
         check_fields(self, "building_bearing")
+        for name, needed in (("dimension", "spatial"), ("spin", "locked")):
+            if (value := getattr(self.effects, name, None)) not in (None, needed):
+                raise InputError(
+                    f"building_bearing.effects.{name} = {value!r}: a building moves its bearings in space and twists "
+                    f"none of them; give {needed!r}"
+                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +118,26 @@ class BuildingScene:
         """Acceleration of gravity, that of the bearings [m/s^2]."""
         return self.bearings[0].bearing.gravity
 
+    @property
+    def weight(self) -> float:
+        """Weight of the building [N]."""
+        return -float(self.building.rigid_motions[:, 2] @ self.weights)
+
+    @cached_property
+    def mass_centre(self) -> Array:
+        """Centre of mass of the building in plan, shape (2,) [m]."""
+        motions = self.building.rigid_motions
+        inertia = motions.T @ self.building.mass @ motions
+        centre: Array = np.array([inertia[1, 5], -inertia[0, 5]]) / inertia[0, 0]
+        return centre
+
+    @cached_property
+    def places(self) -> Array:
+        """Places of the bearings in plan, shape (bearings, 2) [m]."""
+        nodes = [self.building.node(each.node).position[:2] for each in self.bearings]
+        pairs = zip(self.bearings, nodes, strict=True)
+        return np.array([node if each.position is None else each.position for each, node in pairs], dtype=float)
+
     def label(self, index: int) -> str:
         """What messages call a bearing."""
         name = self.bearings[index].name
@@ -152,6 +179,23 @@ class BuildingScene:
             if load <= 0:
                 raise InputError(f"scene.bearings[{index}].position: it carries {load:.4g} N at rest; move it [m]")
         return loads
+
+    @cached_property
+    def effect_selections(self) -> tuple[EffectSelection, ...]:
+        """The effects of every bearing, with the reason for each that is selected."""
+        return select_effects(self)
+
+    @property
+    def modelled(self) -> tuple[Effects, ...]:
+        """The effects of the model of every bearing: as given, or selected from the scene."""
+        return tuple(each.effects for each in self.effect_selections)
+
+    @property
+    def specs(self) -> tuple[ModelSpec, ...]:
+        """Layouts and effects of the models of the bearings, each once."""
+        pairs = zip(self.bearings, self.modelled, strict=True)
+        found = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
+        return tuple(dict.fromkeys(found))
 
     def _attachment(self, index: int) -> Array:
         given = self.bearings[index]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, SceneName, note, say, show
-from msfp_gen.cli.inputs import build, load_source, result_of
+from msfp_gen.cli.inputs import build, load_source, of_building, one_bearing, result_of
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
@@ -34,20 +34,23 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise import characterise as characterise_run
     from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, characterisation_tables, write_csv
+    from msfp_gen.buildings.characterise import building_tables
     from msfp_gen.common.output import check_output
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")
-    result, failure = result_of(load_source(source))
+    loaded = load_source(source)
+    if output is not None:
+        one_bearing(loaded, f"--output = {str(output)!r}")
+    result, failure = result_of(loaded)
     if failure is not None:
         raise failure
-    found = characterise_run(result)
+    found = result.characterise()
     if as_json:
         say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
-        show(characterisation_tables(found))
+        show(building_tables(found) if of_building(result) else characterisation_tables(found))
     if output is not None:
         note(f"wrote {write_csv(found, output)}")
 
@@ -68,8 +71,8 @@ def bound(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
+    from msfp_gen.buildings.opening import load_scene
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.loader import load_scene
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors
     from msfp_gen.studies.bounding.tables import bounding_tables

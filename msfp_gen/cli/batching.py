@@ -16,8 +16,8 @@ from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.file.parameter_sweep import Variation
     from msfp_gen.studies.sweep import Row
+    from msfp_gen.studies.sweep.variations import Variation
 
 app = typer.Typer()
 LONGEST = 80  # characters of the name of a file, without its number
@@ -60,9 +60,9 @@ def batch(
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
     from msfp_gen.results.export import require_pyarrow
-    from msfp_gen.scene.file.parameter_sweep import variations, varied_field
     from msfp_gen.scene.file.suite import load_suite
     from msfp_gen.studies.sweep import TABLE_SUFFIXES
+    from msfp_gen.studies.sweep.variations import variations, varied_field
 
     if table is not None:
         require_pyarrow(check_output(table, TABLE_SUFFIXES, "--table"), "--table", ".csv")

@@ -109,11 +109,11 @@ def _report(
     name: str, duration: float | None, folder: Path | None, as_json: bool, study: Callable[[Scene], Study]
 ) -> None:
     """Load the scene, run the study, print it and write its files."""
+    from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.loader import load_scene
     from msfp_gen.studies.accuracy.output import as_dict, tables, write
 
-    scene = load_scene(name)
+    scene = load_bearing_scene(name)
     if duration is not None:
         scene = replace(scene, duration=duration)
     if folder is not None:

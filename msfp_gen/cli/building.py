@@ -49,20 +49,20 @@ def generate(
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen explain fenz-test2\n  msfp-gen explain scene.toml")
 def explain(scene: SceneName) -> None:
-    """Describe a scene: bearing, motion, top, what is modelled and how it is solved."""
-    from msfp_gen.scene.explain import explain as describe
-    from msfp_gen.scene.file.loader import load_scene
+    """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
+    from msfp_gen.buildings.explain import explain as describe
+    from msfp_gen.buildings.opening import load_scene
 
     show(describe(load_scene(scene)))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen presets")
 def presets() -> None:
-    """List the scenes and bearings that come with msfp-gen."""
+    """List the scenes, buildings and bearings that come with msfp-gen."""
     from msfp_gen.common.tables import Table
     from msfp_gen.scene.file import presets as catalogue
 
-    show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "bearing"))
+    show(Table(f"preset {kind}s", (), list(catalogue.names(kind).items())) for kind in ("scene", "building", "bearing"))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")

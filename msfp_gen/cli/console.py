@@ -92,7 +92,8 @@ def scenes(incomplete: str) -> list[tuple[str, str]]:
     """Completions of a scene for the shell, with descriptions: presets, scene files and folders."""
     from msfp_gen.scene.file.catalogue import descriptions
 
-    presets = [(name, line) for name, line in descriptions("scene").items() if name.startswith(incomplete)]
+    known = {**descriptions("scene"), **descriptions("building")}
+    presets = [(name, line) for name, line in known.items() if name.startswith(incomplete)]
     folder, _, start = incomplete.rpartition("/")
     files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
     found = [path for path in files if path.is_dir() or path.suffix == ".toml"]

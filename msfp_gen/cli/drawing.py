@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from msfp_gen.cli.console import Progress, SignOption, note, number, whole_number
-from msfp_gen.cli.inputs import load_source, result_of
+from msfp_gen.cli.inputs import load_source, of_building, one_bearing, result_of
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
 from msfp_gen.errors import InputError
 from msfp_gen.results.sign import DEFAULT, sign_of
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
+    from collections.abc import Callable, Collection, Mapping
+
+    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.cli.inputs import AnyResult
     from msfp_gen.scene.scene import Scene
 
 ROWS = 4000  # rows of a run made for figures: the steps of the solver may be too long for smooth curves
@@ -41,7 +44,11 @@ def plot(
     source: Source,
     figure: Annotated[
         str,
-        typer.Option(metavar="NAME", help="overview|loops|orbit|sliding|stages|force-path|energy|section|all"),
+        typer.Option(
+            metavar="NAME",
+            help="overview|loops|orbit|sliding|stages|force-path|energy|section|all; of a building "
+            "overview|plan|profile|spectra|axial|all.",
+        ),
     ] = "overview",
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE|DIR", help="A .png, .svg or .pdf, or a folder for NAME.png.")
@@ -57,15 +64,16 @@ def plot(
     sign: SignOption = DEFAULT,
 ) -> None:
     """Draw a run: one figure, or all of them."""
-    targets = _targets(figure, output)
+    _check_figure_output(figure, output)
     sign_of(sign, "--sign")
+    loaded = _load_for_figures(source)
+    targets = _targets(figure, output, _figures(loaded))
     angle = None if azimuth is None else math.radians(azimuth)
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
-    loaded = _load_for_figures(source)
     make_folder(next(iter(targets.values())).parent, "--output")
     result, failure = result_of(loaded)
-    from msfp_gen.figures import FIGURES, plot_force_path, plot_section, using_sign
+    from msfp_gen.figures import plot_force_path, plot_section, using_sign
     from msfp_gen.results.resample import at_times
 
     if time is not None:
@@ -77,7 +85,7 @@ def plot(
             elif name == "force-path":
                 plot_force_path(result, path, time=time)
             else:
-                FIGURES[name](result, path)
+                _figures(result)[name](result, path)
         note(f"wrote {path}")
     if failure is not None:
         raise failure
@@ -107,7 +115,7 @@ def animate(
 
     check_movie(output, "--output")
     sign_of(sign, "--sign")
-    result, failure = result_of(_load_for_figures(source))
+    result, failure = result_of(one_bearing(_load_for_figures(source), f"SCENE = {source!r}"))
     angle = None if azimuth is None else math.radians(azimuth)
     with Progress("frames") as progress, using_sign(sign):
         write_movie(
@@ -125,17 +133,32 @@ def animate(
         raise failure
 
 
-def _targets(figure: str, output: Path) -> dict[str, Path]:
-    """Name -> file of each figure. Raises InputError for an unknown name or a path that cannot be written."""
-    from msfp_gen.figures import FIGURES
+def _figures(loaded: object) -> Mapping[str, Callable[..., Any]]:
+    """The figures of a scene or result, of one bearing or of a building, by their names."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
 
-    if figure not in (*FIGURES, EVERY):
+    return BUILDING_FIGURES if of_building(loaded) else FIGURES
+
+
+def _check_figure_output(figure: str, output: Path) -> None:
+    """Raise InputError for a name that no figure has, or a path that cannot be written."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+
+    if figure not in (*FIGURES, *BUILDING_FIGURES, EVERY):
         raise InputError(f"--figure = {figure!r}: give one of {', '.join((*FIGURES, EVERY))}")
     if figure != EVERY and output.suffix:
-        return {figure: check_output(output, FIGURE_SUFFIXES, "--output")}
-    if output.suffix.lower() in FIGURE_SUFFIXES:
+        check_output(output, FIGURE_SUFFIXES, "--output")
+    elif output.suffix.lower() in FIGURE_SUFFIXES:
         raise InputError(f"--output = {str(output)!r}: --figure all writes several files; give a folder")
-    return {name: output / f"{name}.png" for name in (FIGURES if figure == EVERY else (figure,))}
+
+
+def _targets(figure: str, output: Path, known: Collection[str]) -> dict[str, Path]:
+    """Name -> file of each figure, of those that this scene or result has. Raises InputError for an unknown name."""
+    if figure not in (*known, EVERY):
+        raise InputError(f"--figure = {figure!r}: give one of {', '.join((*known, EVERY))} here")
+    if figure != EVERY and output.suffix:
+        return {figure: output}
+    return {name: output / f"{name}.png" for name in (known if figure == EVERY else (figure,))}
 
 
 def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], users: tuple[str, ...]) -> None:
@@ -145,12 +168,12 @@ def _reject_unused(targets: dict[str, Path], options: dict[str, float | None], u
             raise InputError(f"{option}: only {' and '.join(users)} have it; give --figure {users[0]} with it")
 
 
-def _load_for_figures(source: str) -> Result | Scene:
-    """A saved result, or a scene with an output step for smooth figures."""
-    from msfp_gen.result import Result
+def _load_for_figures(source: str) -> AnyResult | AnyScene:
+    """A saved result, or a scene with an output step for smooth figures; a building has the rows of its steps."""
+    from msfp_gen.scene.scene import Scene
 
     loaded = load_source(source)
-    return loaded if isinstance(loaded, Result) else _with_output_step(loaded)
+    return _with_output_step(loaded) if isinstance(loaded, Scene) else loaded
 
 
 def _with_output_step(scene: Scene) -> Scene:

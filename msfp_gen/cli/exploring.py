@@ -25,13 +25,13 @@ def explore(
     ] = Path("explorer.html"),
 ) -> None:
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
+    from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.common.output import check_output
     from msfp_gen.explorer import write_explorer
     from msfp_gen.explorer.page import SUFFIXES
-    from msfp_gen.scene.file.loader import load_scene
 
     path = check_output(output, SUFFIXES, "--output")
-    given = None if scene is None else load_scene(scene)
+    given = None if scene is None else load_bearing_scene(scene)
     with Progress("explorer") as progress:
         write_explorer(path, given, progress)
     note(f"wrote {path}")

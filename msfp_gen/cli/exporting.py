@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from msfp_gen.cli.console import SignOption, building, note, show, with_effects
-from msfp_gen.cli.inputs import load_source, result_of
+from msfp_gen.cli.inputs import load_source, of_building, result_of
 from msfp_gen.common.output import check_output
 from msfp_gen.errors import InputError
 from msfp_gen.jit.platforms import TARGETS
@@ -86,8 +86,17 @@ def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> N
     require_pyarrow(check_output(output, TABLE_WRITERS, "--output"), "--output", ".csv")
     names = None if columns is None else [name.strip() for name in columns.split(",")]
     sign_of(sign, "--sign")
-    result, failure = result_of(load_source(source))
-    note(f"wrote {export_columns(result, output, names, sign)}")
+    loaded = load_source(source)
+    if of_building(loaded) and sign != DEFAULT:
+        raise InputError(f"--sign = {sign!r}: columns of a building have one sign, base - top; leave it out")
+    result, failure = result_of(loaded)
+    if of_building(result):
+        from msfp_gen.buildings.files import export_columns as export_building
+
+        path = export_building(result, output, names)
+    else:
+        path = export_columns(result, output, names, sign)
+    note(f"wrote {path}")
     if failure is not None:
         raise failure
 

@@ -60,16 +60,16 @@ def fit(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
 ) -> None:
     """Fit friction and other values of a scene to laboratory tests, with 95 % intervals."""
+    from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
-    from msfp_gen.scene.file.loader import load_scene
     from msfp_gen.studies.calibration import fit as run_fit
     from msfp_gen.studies.calibration.fitting import start_fit
     from msfp_gen.studies.calibration.tables import fit_tables
 
     if report is not None:
         check_output(report, REPORT_SUFFIXES, "--report")
-    chosen = load_scene(scene)
+    chosen = load_bearing_scene(scene)
     read = _measurements(tests, column or (), axial_load, weights)
     paths = [path for text in parameters for path in text.split(",")]
     limits = dict(_limits(text) for text in bounds or ())

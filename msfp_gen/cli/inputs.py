@@ -1,61 +1,90 @@
-"""Input of commands: load a saved result or a scene, build its model, run it."""
+"""Input of commands: load a saved result or a scene, build its models, run it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.cli.console import Progress, building
-from msfp_gen.errors import RunError
+from msfp_gen.errors import InputError, RunError
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
-    from msfp_gen.scene.scene import Scene
+
+    AnyResult = Result | BuildingResult
 
 
-def load_source(source: str) -> Result | Scene:
-    """Load a saved result (.nc), or the scene of a file or preset."""
+def load_source(source: str) -> AnyResult | AnyScene:
+    """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
+        from msfp_gen.buildings.reading import is_building
+        from msfp_gen.buildings.result import BuildingResult
         from msfp_gen.result import Result
 
-        return Result.from_netcdf(source)
-    from msfp_gen.scene.file.loader import load_scene
+        return (BuildingResult if is_building(source) else Result).from_netcdf(source)
+    from msfp_gen.buildings.opening import load_scene
 
     return load_scene(source)
 
 
-def build(scene: Scene, gradients: bool = False) -> None:
-    """Build the model of a scene, with progress, unless it is in the cache. gradients: one that has them."""
+def is_result(loaded: object) -> bool:
+    """Whether this is a result, not a scene."""
+    from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.result import Result
+
+    return isinstance(loaded, Result | BuildingResult)
+
+
+def of_building(loaded: object) -> bool:
+    """Whether this is the scene or the result of a building."""
+    from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.buildings.scene import BuildingScene
+
+    return isinstance(loaded, BuildingScene | BuildingResult)
+
+
+def one_bearing(loaded: Any, what: str) -> Any:
+    """A scene or result of one bearing. Raises InputError that begins with `what` for one of a building."""
+    if of_building(loaded):
+        raise InputError(f"{what}: this is a building; give a scene or result of one bearing, or `report` and `plot`")
+    return loaded
+
+
+def build(scene: AnyScene, gradients: bool = False) -> None:
+    """Build the models of a scene, with progress, unless they are in the cache. gradients: ones that have them."""
     from msfp_gen.model.model import build_model
+    from msfp_gen.scene.scene import Scene
 
     with building() as progress:
-        build_model(scene.bearing.layout, scene.modelled, gradients, progress=progress)
+        for spec in [scene.spec] if isinstance(scene, Scene) else scene.specs:
+            build_model(spec.layout, spec.effects, gradients, progress=progress)
 
 
-def run_scene(scene: Scene, **options: Any) -> tuple[Result | None, RunError | None]:
+def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
-    from msfp_gen.result import Result
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.either import simulate
     from msfp_gen.simulation.memory import require_room
-    from msfp_gen.simulation.simulate import simulate
 
-    require_room(scene, options.get("stream"))
+    if isinstance(scene, Scene):
+        require_room(scene, options.get("stream"))
     build(scene)
     with Progress(scene.name or "run") as progress:
         try:
             return simulate(scene, progress=progress, **options), None
         except RunError as error:
-            return error.result if isinstance(error.result, Result) else None, error
+            return error.result if is_result(error.result) else None, error
 
 
-def result_of(loaded: Result | Scene) -> tuple[Result, RunError | None]:
+def result_of(loaded: AnyResult | AnyScene) -> tuple[Any, RunError | None]:
     """A loaded result, or the run of a loaded scene, and the error of a failed run.
 
     Raises RunError if nothing was computed.
     """
-    from msfp_gen.result import Result
-
-    if isinstance(loaded, Result):
+    if is_result(loaded):
         return loaded, None
-    result, failure = run_scene(loaded)
+    result, failure = run_scene(loaded)  # type: ignore[arg-type]
     if result is None:
         assert failure is not None
         raise failure

@@ -12,14 +12,17 @@ import typer
 from msfp_gen.cli.checkpoint_options import NO_CHECKPOINT, CheckpointFile, CheckpointOptions, Every, ResumeFile
 from msfp_gen.cli.console import Output, SceneName, choices_of, note, number, say, show
 from msfp_gen.cli.error_options import Budget, ErrorTarget, Explain, TargetError
-from msfp_gen.cli.inputs import run_scene
+from msfp_gen.cli.inputs import of_building, one_bearing, run_scene
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
-    from msfp_gen.scene.scene import Scene
+    from collections.abc import Callable
+
+    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.cli.inputs import AnyResult
+    from msfp_gen.common.tables import Table
 
 DEMO = ("ridgecrest-ccc", "fenz-test5")
 
@@ -78,7 +81,7 @@ def run(
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.buildings.opening import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
@@ -92,8 +95,8 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
+    from msfp_gen.buildings.opening import load_scene
     from msfp_gen.common.output import make_folder
-    from msfp_gen.scene.file.loader import load_scene
 
     scenes = [load_scene(name) for name in DEMO]
     make_folder(output, "--output")
@@ -102,7 +105,22 @@ def demo(
         say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
 
 
-def _with_options(scene: Scene, duration: float | None, **solver: Any) -> Scene:
+def tables_of(result: AnyResult) -> list[Table]:
+    """The tables of a run, of one bearing or of a building."""
+    from msfp_gen.analysis.tables import summary_tables as of_bearing
+    from msfp_gen.buildings.summary import summary_tables as of_whole
+
+    return of_whole(result) if of_building(result) else of_bearing(result)  # type: ignore[arg-type]
+
+
+def overview_of(result: AnyResult) -> Callable[..., Any]:
+    """The figure of `--plot`."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+
+    return (BUILDING_FIGURES if of_building(result) else FIGURES)["overview"]
+
+
+def _with_options(scene: AnyScene, duration: float | None, **solver: Any) -> AnyScene:
     """`scene` with the duration and solver options of the command line."""
     given = {name: value for name, value in solver.items() if value is not None}
     scene = replace(scene, solver=replace(scene.solver, **given)) if given else scene
@@ -110,7 +128,7 @@ def _with_options(scene: Scene, duration: float | None, **solver: Any) -> Scene:
 
 
 def _run(
-    scene: Scene,
+    scene: AnyScene,
     output: Path | None,
     plot: Path | None,
     as_json: bool = False,
@@ -123,8 +141,8 @@ def _run(
 
     stream: the run writes the output itself.
     """
-    found = None if target is None else target.simulate(scene)
-    options = {"strict": strict} | checkpoints.arguments | ({"stream": output} if stream else {})
+    found = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
+    options = ({"strict": True} if strict else {}) | checkpoints.arguments | ({"stream": output} if stream else {})
     with checkpoints.hint_on_write_error():
         result, failure = run_scene(scene, **options) if found is None else (found.result, None)
     saved: list[Path] = []
@@ -142,24 +160,20 @@ def _run(
     return saved
 
 
-def _report(result: Result, as_json: bool, more: dict[str, Any] | None = None) -> None:
+def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None) -> None:
     """Print the summary of a run, as JSON with the keys `more` added, or as tables and notes."""
     if as_json:
         say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
-    from msfp_gen.analysis.tables import summary_tables
-
-    show(summary_tables(result))
+    show(tables_of(result))
     for line in (entry.line for entry in result.notes):
         note(line)
 
 
-def _save(result: Result, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:
+def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:
     """Write the result and the figure to the given paths; returns them. written: the result is there already."""
     if output is not None and not written:
         result.save(output)
     if plot is not None:
-        from msfp_gen.figures import plot_result
-
-        plot_result(result, plot)
+        overview_of(result)(result, plot)
     return [path for path in (output, plot) if path is not None]

@@ -35,9 +35,9 @@ def serve(
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
 ) -> None:
     """Serve bearings to `element genericClient` of OpenSees: every element is a bearing of its own."""
+    from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.coupling.server import Server
     from msfp_gen.coupling.two_port import TwoPort
-    from msfp_gen.scene.file.loader import load_scene
 
     if up not in AXES:
         raise typer.BadParameter(f"--up = {up!r}: give one of {', '.join(AXES)}")
@@ -47,7 +47,7 @@ def serve(
         raise typer.BadParameter(f"--port = {port}: give at least 1")
     makers = []
     for source in sources:
-        make = partial(TwoPort.of_scene, load_scene(source))
+        make = partial(TwoPort.of_scene, load_bearing_scene(source))
         make()  # what is wrong with a scene is said before anybody connects
         makers.append((source, make))
     with Server(makers, port, report=note, host=host, up=up) as server:

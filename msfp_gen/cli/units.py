@@ -35,12 +35,12 @@ def fmu(
     """Write a bearing as a unit (FMU) for Co-Simulation: a rig takes motion and gives wrenches, a mass takes forces."""
     from msfp_gen.common.tables import Table
     from msfp_gen.fmu import write_fmu
-    from msfp_gen.scene.file.loader import load_scene
+    from msfp_gen.buildings.opening import load_bearing_scene
 
     if kind not in TYPES:
         raise InputError(f"--type = {kind!r}: give one of {', '.join(TYPES)}")
     with building(kept=False) as progress:
-        unit = write_fmu(load_scene(source), output, version=fmi, exchange=kind == "me", progress=progress)
+        unit = write_fmu(load_bearing_scene(source), output, version=fmi, exchange=kind == "me", progress=progress)
     counts = {block.name.lower(): 0 for block in dict.fromkeys(each.block for each in unit.variables)}
     for variable in unit.variables:
         counts[variable.block.name.lower()] += 1

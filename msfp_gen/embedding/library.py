@@ -102,7 +102,7 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform,
 
 def _content(models: dict[str, ModelSpec], platform: Platform, target: str | None) -> dict[str, Any]:
     """What the templates need."""
-    from msfp_gen.generator.emit import word_enums  # it imports SymPy
+    from msfp_gen.generator.header import word_enums  # it imports SymPy
 
     found = [
         {

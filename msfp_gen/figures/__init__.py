@@ -9,6 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msfp_gen.figures.building import (
+    plot_axial_forces,
+    plot_building,
+    plot_floor_spectra,
+    plot_plan,
+    plot_profile,
+)
 from msfp_gen.figures.energy import plot_energy
 from msfp_gen.figures.force_path import plot_force_path
 from msfp_gen.figures.loops import moving_axes, plot_loops, plot_orbit
@@ -36,9 +43,11 @@ from msfp_gen.results.sign import using_sign
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from msfp_gen.buildings.data import BuildingData
     from msfp_gen.results.run_data import RunData
 
 __all__ = [
+    "BUILDING_FIGURES",
     "COLOURS",
     "FAINT",
     "FIGURES",
@@ -55,11 +64,16 @@ __all__ = [
     "moving_axes",
     "page",
     "panels",
+    "plot_axial_forces",
+    "plot_building",
     "plot_correction",
     "plot_energy",
+    "plot_floor_spectra",
     "plot_force_path",
     "plot_loops",
     "plot_orbit",
+    "plot_plan",
+    "plot_profile",
     "plot_response_spectrum",
     "plot_result",
     "plot_section",
@@ -79,4 +93,13 @@ FIGURES: dict[str, Callable[[RunData, str | Path | None], Figure]] = {
     "force-path": plot_force_path,
     "energy": plot_energy,
     "section": plot_section,
+}
+
+# Figures of the run of a building, likewise.
+BUILDING_FIGURES: dict[str, Callable[[BuildingData, str | Path | None], Figure]] = {
+    "overview": plot_building,
+    "plan": plot_plan,
+    "profile": plot_profile,
+    "spectra": plot_floor_spectra,
+    "axial": plot_axial_forces,
 }

@@ -46,7 +46,7 @@ def sources(folder: Traversable) -> dict[str, str]:
 
 
 def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
-    from msfp_gen.generator.emit import public_header
+    from msfp_gen.generator.header import public_header
 
     begin = perf_counter()
     extension = compile_extension({**files, "msfp.h": public_header()}, entry.module, folder, libraries=LIBRARIES)

@@ -13,6 +13,7 @@ from msfp_gen.scene.explain import explain
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
+    from msfp_gen.scene.bearing import Bearing
 
 MILLI, KILO = 1e3, 1e-3
 MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine
@@ -53,11 +54,11 @@ class TitleBlock:
     revision: str = ""
     code: str = ""
 
-    def rows(self, result: Result) -> list[tuple[str, str]]:
-        """Names and texts of the entries that are given, the device in any case."""
+    def rows(self, device: str) -> list[tuple[str, str]]:
+        """Names and texts of the entries that are given, the device in any case; `device`: its kind."""
         entries = {
             "project": self.project,
-            "device": self.device or device_name(result),
+            "device": self.device or device,
             "date": self.date,
             "revision": self.revision,
             "code edition": self.code,
@@ -66,8 +67,13 @@ class TitleBlock:
 
 
 def device_name(result: Result) -> str:
-    """The kind of the bearing by its sliding surfaces, with its layout."""
-    layout = result.scene.bearing.layout
+    """The kind of the bearing of a run."""
+    return kind_of(result.scene.bearing)
+
+
+def kind_of(bearing: Bearing) -> str:
+    """The kind of a bearing by its sliding surfaces, with its layout."""
+    layout = bearing.layout
     kind = DEVICES.get(layout.surfaces)
     surfaces = f"{layout.surfaces} sliding surface{'s' if layout.surfaces > 1 else ''}"
     return f"{kind} friction pendulum, {surfaces}" if kind else f"friction pendulum of {surfaces}"
@@ -118,10 +124,10 @@ def provenance_table(result: Result) -> Table:
     return Table("versions, model and counters of the solver", (), [*provenance.items(), *counters.items()])
 
 
-def outcome(result: Result) -> str:
-    """How the run ended, in one sentence."""
+def outcome(status: str, message: str) -> str:
+    """How a run ended, in one sentence."""
     ends = {"ok": "The run reached its end.", "stopped": "The run ended at its stop condition."}
-    return ends.get(result.status, f"The run failed ({result.status}): {result.message}")
+    return ends.get(status, f"The run failed ({status}): {message}")
 
 
 def _run_table(result: Result) -> Table:

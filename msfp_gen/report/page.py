@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.report.content import (
     TERMS,
     TitleBlock,
     characterisation_page,
+    device_name,
+    kind_of,
     outcome,
     provenance_table,
     settings_page,
@@ -23,12 +26,14 @@ from msfp_gen.report.template import asset, picture, render
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from msfp_gen.result import Result
 
 NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
-SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "section.js", "scene.js", "page.js")
+SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "section.js", "scene.js", "player.js", "page.js")
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 FIGURES = {
     "overview": "Loops and sliding",
@@ -48,7 +53,7 @@ EXPLANATION = (
 
 
 def write_report(
-    result: Result,
+    result: Result | BuildingResult,
     path: str | Path,
     frames: int = FRAMES,
     progress: Progress | None = None,
@@ -64,42 +69,92 @@ def write_report(
 
 
 def report_html(
-    result: Result, frames: int = FRAMES, progress: Progress | None = None, title: TitleBlock = NO_TITLE
+    result: Result | BuildingResult,
+    frames: int = FRAMES,
+    progress: Progress | None = None,
+    title: TitleBlock = NO_TITLE,
 ) -> str:
     """The HTML report of a run as text; the file loads no other file.
 
     Args:
-        result: the run.
+        result: the run, of one bearing or of a building.
         frames: number of instants in the interactive view, about. Tables and figures use all rows.
         progress: called with the number of finished figures and of all figures.
         title: project, device, date, revision and code edition.
     """
     from markupsafe import Markup
 
+    if isinstance(result, BuildingResult):
+        given = _of_building(result, frames, progress)
+    else:
+        given = _of_bearing(result, frames, progress)
+    scripts, data = given.pop("scripts"), given.pop("data")
+    return render(
+        "page.html.jinja",
+        **given,
+        name=result.scene.name or "unnamed scene",
+        kind="report",
+        title_block=title.rows(given["device"]),
+        outcome=outcome(result.status, result.message),
+        succeeded=result.succeeded,
+        speeds=SPEEDS,
+        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        scripts=[Markup(asset(name)) for name in scripts],
+    )
+
+
+def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[str, Any]:
+    """What the page of one bearing shows."""
+    from markupsafe import Markup
+
+    from msfp_gen.figures import FIGURES as PLOTS
     from msfp_gen.scene.file.stored_motion import scene_attribute
 
     data = view(result, frames)
-    explanation = EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time))
-    return render(
-        "page.html.jinja",
-        name=result.scene.name or "unnamed scene",
-        kind="report",
-        lead=_introduction(result),
-        title_block=title.rows(result),
-        terms=TERMS,
-        outcome=outcome(result),
-        succeeded=result.succeeded,
-        summary=summary_page(result),
-        characterisation=characterisation_page(result),
-        settings=settings_page(result),
-        provenance=provenance_table(result),
-        scene=scene_attribute(result.scene),
-        figures=list(_pictures(result, progress)),
-        speeds=SPEEDS,
-        explanation=explanation,
-        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
-        scripts=[Markup(asset(name)) for name in SCRIPTS],
-    )
+    return {
+        "moving": "The bearing in motion",
+        "stage": Markup(asset("bearing.html.jinja")),
+        "lead": _introduction(result),
+        "device": device_name(result),
+        "terms": TERMS,
+        "summary": summary_page(result),
+        "characterisation": characterisation_page(result),
+        "settings": settings_page(result),
+        "provenance": provenance_table(result),
+        "scene": scene_attribute(result.scene),
+        "explanation": EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time)),
+        "figures": list(_pictures(result, FIGURES, PLOTS, progress)),
+        "data": data,
+        "scripts": SCRIPTS,
+    }
+
+
+def _of_building(result: BuildingResult, frames: int, progress: Progress | None) -> dict[str, Any]:
+    """What the page of a building shows."""
+    from markupsafe import Markup
+
+    from msfp_gen.buildings.text import scene_text
+    from msfp_gen.figures import BUILDING_FIGURES
+    from msfp_gen.report import building
+
+    data = building.building_view(result, frames)
+    stage = render("building.html.jinja", scales=building.SCALES, chosen=data["scale"])
+    return {
+        "moving": "The building in motion",
+        "stage": Markup(stage),
+        "lead": building.introduction(result),
+        "device": ", ".join(dict.fromkeys(kind_of(each.bearing) for each in result.scene.bearings)),
+        "terms": building.TERMS,
+        "summary": building.summary_page(result),
+        "characterisation": building.characterisation_page(result),
+        "settings": building.settings_page(result),
+        "provenance": building.provenance_table(result),
+        "scene": scene_text(result.scene),
+        "explanation": building.explanation(data["frames"]["time"]["shape"][0], len(result.time)),
+        "figures": list(_pictures(result, building.FIGURES, BUILDING_FIGURES, progress)),
+        "data": data,
+        "scripts": building.SCRIPTS,
+    }
 
 
 def _introduction(result: Result) -> str:
@@ -111,14 +166,14 @@ def _introduction(result: Result) -> str:
     )
 
 
-def _pictures(result: Result, progress: Progress | None) -> Iterator[dict[str, str]]:
+def _pictures(
+    result: Any, titles: Mapping[str, str], plots: Mapping[str, Callable[..., Figure]], progress: Progress | None
+) -> Iterator[dict[str, str]]:
     """Every figure of the report, for its template."""
-    from msfp_gen.figures import FIGURES as PLOTS
-
-    for done, (name, title) in enumerate(FIGURES.items(), start=1):
-        drawn = picture(title, PLOTS[name](result, None))
+    for done, (name, title) in enumerate(titles.items(), start=1):
+        drawn = picture(title, plots[name](result, None))
         if progress is not None:
-            progress(done, len(FIGURES))
+            progress(done, len(titles))
         yield drawn
 
 

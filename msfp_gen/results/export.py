@@ -16,7 +16,7 @@ from msfp_gen.common.output import check_output, replacing, write_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import to_dataset
 from msfp_gen.results.netcdf import write_netcdf
-from msfp_gen.results.sign import DEFAULT, sign_of, signed
+from msfp_gen.results.sign import DEFAULT, Sign, sign_of, signed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,15 +112,24 @@ def write_csv(result: RunData, path: str | Path, names: Sequence[str] | None = N
     shown, result = sign_of(sign), signed(result, sign)
     dataset = to_dataset(result)
     table = selected_columns(columns(dataset), names)
+    title = f"{result.scene.name or 'unnamed scene'}, status {result.status}; {_sign_text(shown)}"
+    write_csv_table(target, table, title, _provenance(result, dataset))
+    return target
+
+
+def write_csv_table(path: Path, table: list[Column], title: str, origin: list[str]) -> None:
+    """Write columns as CSV, with a comment before them, and the lines of their origin as comments after them."""
     rows = np.column_stack([column.values for column in table]).tolist()
-    title = " ".join(f"{result.scene.name or 'unnamed scene'}, status {result.status}".split())
-    with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        u = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
-        file.write(f"# {title}; {u}; {len(rows)} rows; versions, events and scene stand after them\n")
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        about = "versions, events and scene stand after them"
+        file.write(f"# {' '.join(title.split())}; {len(rows)} rows; {about}\n")
         file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
-        file.writelines(f"# {line}\n" for line in _provenance(result, dataset))
-    return target
+        file.writelines(f"# {line}\n" for line in origin)
+
+
+def _sign_text(shown: Sign) -> str:
+    return f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
 
 
 def _provenance(result: RunData, dataset: xr.Dataset) -> list[str]:
@@ -151,27 +160,36 @@ def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None
     """
     target = check_result_path(check_output(path, (".parquet",)))
     shown, result = sign_of(sign), signed(result, sign)
+    dataset = to_dataset(result)
+    about = {str(key): str(value) for key, value in dataset.attrs.items()}
+    about |= {"sign": _sign_text(shown), "events": json.dumps(_events(result))}
+    write_parquet_table(target, selected_columns(columns(dataset), names), about)
+    return target
+
+
+def write_parquet_table(path: Path, table: list[Column], about: dict[str, str]) -> None:
+    """Write columns as Parquet, with metadata of the file. Needs pyarrow."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    dataset = to_dataset(result)
-    table = selected_columns(columns(dataset), names)
     fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
-    about = {str(key): str(value) for key, value in dataset.attrs.items()}
-    about["sign"] = f"u = {shown.difference.replace('−', '-')}, F {shown.force}"
-    schema = pa.schema(fields, metadata=about | {"events": json.dumps(_events(result))})
     content = BytesIO()
-    pq.write_table(pa.table([np.ascontiguousarray(c.values) for c in table], schema=schema), content)
-    write_bytes(target, [content.getbuffer()])
-    return target
+    arrays = [np.ascontiguousarray(c.values) for c in table]
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=about)), content)
+    write_bytes(path, [content.getbuffer()])
 
 
 def write_mat(result: RunData, path: str | Path) -> Path:
     """Write a MATLAB 5 file: every variable of the dataset by name, and structs `units`, `meaning`, `attributes`."""
     target = check_output(path, (".mat",))
+    write_mat_dataset(target, to_dataset(result))
+    return target
+
+
+def write_mat_dataset(path: Path, dataset: xr.Dataset) -> None:
+    """Write a dataset as MATLAB 5 file, as `write_mat` does."""
     from scipy.io import savemat
 
-    dataset = to_dataset(result)
     # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
     content: dict[str, Any] = {str(name): _matlab(variable.to_numpy()) for name, variable in dataset.variables.items()}
     for key, attribute in (("units", "units"), ("meaning", "long_name")):
@@ -179,8 +197,7 @@ def write_mat(result: RunData, path: str | Path) -> Path:
     content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
     stream = BytesIO()
     savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
-    write_bytes(target, [stream.getbuffer()])
-    return target
+    write_bytes(path, [stream.getbuffer()])
 
 
 def _matlab(values: Any) -> Any:

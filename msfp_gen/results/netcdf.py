@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 
 def write_netcdf(result: RunData, path: str | Path) -> Path:
     """Write the dataset of `result` to `path`, completely or not at all. Raises InputError for an invalid path."""
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
-
-    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, PIECES, to_pieces
+    from msfp_gen.scene.file.stored_motion import GROUP, PIECES, to_pieces
 
     path = check_output(path, DATASET_SUFFIXES)
     dataset = to_dataset(result)
@@ -36,20 +33,36 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
     gradient = None if result.gradients is None else gradient_group(result, result.gradients)
     groups = {name: each for name, each in ((GROUP, pieces), (stored_gradient.GROUP, gradient)) if each is not None}
     dataset.attrs[DIGEST] = digest_of_dataset(dataset, groups)
-    # The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
-    encoding = {name: compressed_rows(each) for name, each in groups.items() if name != GROUP} | {GROUP: COMPRESSED}
+    write_groups(path, dataset, groups)
+    return path
+
+
+def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset]) -> None:
+    """Write a dataset, and others as groups, as one netCDF-4 file, completely or not at all."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
     content = BytesIO()
     with h5netcdf.File(content, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file), encoding=compressed_rows(dataset))
         for name, each in groups.items():
-            each.dump_to_store(H5NetCDFStore(file, group=name), encoding=encoding[name])
+            each.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(each))
     write_bytes(path, [content.getbuffer()])
-    return path
+
+
+def _encoding(group: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
+    """Of a group: of rows, or of the pieces of a motion."""
+    from msfp_gen.scene.file.stored_motion import COMPRESSED
+
+    return compressed_rows(group) | {name: each for name, each in COMPRESSED.items() if name in group}
 
 
 def compressed_rows(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
-    """The encoding of the variables along the time."""
+    """The encoding of the variables along the time.
+
+    The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
+    """
     return {
         name: {"zlib": True, "complevel": 1}
         for name, variable in dataset.data_vars.items()

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from msfp_gen.errors import InputError
+from msfp_gen.motions.motion import Motion
 from msfp_gen.results import stored_gradient
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.gradient import Gradients
@@ -129,23 +130,32 @@ def _without(prefix: str, attributes: dict[str, Attribute]) -> dict[str, Attribu
 def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Scene:
     """The scene of the file; its motion is in the scene, or as polynomials in a group of the file."""
     from msfp_gen.scene.file.loader import scene_from_table, toml_table
-    from msfp_gen.scene.file.stored_motion import GROUP, PIECES, RECIPE, from_pieces
+    from msfp_gen.scene.file.stored_motion import PIECES, RECIPE
 
     table, motion = toml_table(str(about["scene"])), None
     if about["motion"] == PIECES:
-        group = root.group(GROUP)
-        count = group.length("knots")
-        shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
-        pieces = {name: group.array(name, shape, compressed=name != "knots") for name, shape in shapes.items()}
-        motion_about = group.attributes(lambda name: name in ("name", "metadata", "max_step"))
-        motion = from_pieces(pieces, motion_about)
-        arrays |= {f"{GROUP}/{name}": values for name, values in pieces.items()}
-        about |= {f"{GROUP}/{name}": value for name, value in motion_about.items()}
+        motion, pieces, motion_about = motion_in(root)
+        arrays |= pieces
+        about |= motion_about
     elif about["motion"] != RECIPE:
         raise ValueError(f"motion = {about['motion']!r} is unknown")
     elif isinstance(table.get("motion"), dict) and table["motion"].get("file") is not None:
         raise InputError(f"motion.file = {table['motion']['file']!r}: a result opens no other file; {REMEDY}")
     return scene_from_table(table, motion=motion)
+
+
+def motion_in(root: StoredGroup, name: str = "motion") -> tuple[Motion, Arrays, dict[str, Attribute]]:
+    """The motion that a group of a file has as polynomials, its arrays and attributes by their paths in the file."""
+    from msfp_gen.scene.file.stored_motion import from_pieces
+
+    group = root.group(name)
+    count = group.length("knots")
+    shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
+    pieces = {key: group.array(key, shape, compressed=key != "knots") for key, shape in shapes.items()}
+    about = group.attributes(lambda each: each in ("name", "metadata", "max_step"))
+    motion = from_pieces(pieces, about)
+    arrays, named = ({f"{name}/{key}": value for key, value in each.items()} for each in (pieces, about))
+    return motion, arrays, named
 
 
 def _history(root: StoredGroup, surfaces: int, arrays: Arrays) -> History:

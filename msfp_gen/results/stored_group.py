@@ -61,6 +61,13 @@ class StoredGroup:
             raise ValueError(f"{name} is no list of numbers")
         return int(shape[0])
 
+    def rows(self, name: str) -> int:
+        """Number of rows of an array."""
+        shape = self._dataset(name).shape
+        if not shape:
+            raise ValueError(f"{name} has no rows")
+        return int(shape[0])
+
     def array(self, name: str, shape: tuple[int, ...], kind: Any = np.float64, compressed: bool = True) -> Any:
         """An array of this shape and type, ndarray. compressed: whether it may be stored so."""
         dataset = self._dataset(name)

@@ -10,7 +10,7 @@ import numpy as np
 from msfp_gen.common.fields import Choice, Quantity, ruled_fields
 from msfp_gen.common.tables import Table, vector, yes
 from msfp_gen.scene.bearing import Surface
-from msfp_gen.scene.effect_selection import GIVEN, damping_share, quasistatic
+from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, damping_share, quasistatic
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.plausibility import doubtful_values
 from msfp_gen.specification.layout import Effects
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
+    from msfp_gen.specification.friction_laws import Law
 
 SURFACE_COLUMNS = {
     "R [mm]": ("radius", 1e3),
@@ -60,20 +61,21 @@ TOPS = {
 def explain(scene: Scene) -> list[Table]:
     """Tables that describe `scene`: bearing, motion, top, histories, effects with their meaning, friction, solver."""
     return [
-        _surfaces(scene.bearing),
-        *_doubts(scene.bearing),
-        _bodies(scene.bearing),
-        _motion(scene.motion),
+        surface_table(scene.bearing),
+        *doubt_tables(scene.bearing),
+        body_table(scene.bearing),
+        motion_table(scene.motion),
         _top(scene.top),
         *_history("load on the top plate", scene.load),
         *_history("rotation of the top", scene.top_rotation),
-        _effects(scene),
-        *_friction_parameters(scene),
+        effect_table(scene.effect_selection),
+        *friction_tables(scene.modelled.law, scene.bearing),
         _solver(scene),
     ]
 
 
-def _surfaces(bearing: Bearing) -> Table:
+def surface_table(bearing: Bearing) -> Table:
+    """Surfaces of a bearing."""
     layout, shapes = bearing.layout, {1: "up", -1: "down"}
     rows = [
         (str(number), shapes[sign], *_cells(surface, SURFACE_COLUMNS))
@@ -86,13 +88,15 @@ def _surfaces(bearing: Bearing) -> Table:
     return Table(title, ("surface", "concave", *SURFACE_COLUMNS), rows)
 
 
-def _doubts(bearing: Bearing) -> Iterator[Table]:
+def doubt_tables(bearing: Bearing) -> Iterator[Table]:
+    """Values of a bearing that are hardly meant; no table without them."""
     rows = [(text,) for _, _, text in doubtful_values(bearing)]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)
 
 
-def _bodies(bearing: Bearing) -> Table:
+def body_table(bearing: Bearing) -> Table:
+    """Moving bodies of a bearing."""
     rows = [(str(number), *_cells(body, BODY_COLUMNS)) for number, body in enumerate(bearing.bodies, start=2)]
     return Table("moving bodies, bottom first", ("body", *BODY_COLUMNS), rows)
 
@@ -101,7 +105,8 @@ def _cells(part: object, columns: dict[str, tuple[str, float]]) -> Iterator[str]
     return (vector(np.atleast_1d(getattr(part, name)), scale) for name, scale in columns.values())
 
 
-def _motion(motion: Motion) -> Table:
+def motion_table(motion: Motion) -> Table:
+    """Peaks and origin of a motion of the ground."""
     t = np.union1d(motion.knots, np.linspace(0, motion.duration, 4001))
     peaks = [np.abs(of(t)).max(axis=0) for of in (motion.displacement, motion.velocity, motion.acceleration)]
     sources = [
@@ -133,10 +138,10 @@ def _top(top: Top) -> Table:
     return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
 
 
-def _effects(scene: Scene) -> Table:
+def effect_table(selection: EffectSelection, monitors: str = "monitors add others when needed") -> Table:
     """The effects and their meaning; of each selected effect also the reason and what the selection saves."""
-    effects: Effects = scene.modelled
-    reasons = {reason.effect: reason for reason in scene.effect_selection.reasons}
+    effects = selection.effects
+    reasons = {reason.effect: reason for reason in selection.reasons}
     rows = []
     for name, rule, _ in ruled_fields(Effects):
         if not isinstance(rule, Choice):  # friction_law: shown below as "mu ="
@@ -150,8 +155,8 @@ def _effects(scene: Scene) -> Table:
         rows.append(("", "mu =", effects.law.text))
     if not reasons:
         return Table("effects as given; monitors note where an effect left out becomes significant", (), rows)
-    error = scene.effect_selection.error
-    title = f"effects selected for an error of {error:.3g} of the friction force; monitors add others when needed"
+    error = f"{selection.error:.3g} of the friction force"
+    title = f"effects selected for an error of {error}; {monitors}"
     return Table(title, (), rows)
 
 
@@ -168,9 +173,8 @@ def _history(title: str, history: Prescribed | None) -> list[Table]:
     return [Table(f"{title}, given until {history.duration:.6g} s", (), rows)]
 
 
-def _friction_parameters(scene: Scene) -> list[Table]:
+def friction_tables(law: Law | None, bearing: Bearing) -> list[Table]:
     """Parameters of the friction law on each surface, defaults included."""
-    law, bearing = scene.modelled.law, scene.bearing
     if law is None:
         return []
     rows = [law_parameters(law, bearing, index) for index in range(len(bearing.surfaces))]

@@ -12,10 +12,13 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from msfp_gen.buildings.opening import AnyScene
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.effect_switching import check
+from msfp_gen.simulation.either import simulate
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling
 from msfp_gen.simulation.simulate import RunSequence, settle
@@ -23,20 +26,20 @@ from msfp_gen.simulation.simulate import RunSequence, settle
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from msfp_gen.result import Result
+    from msfp_gen.specification.layout import ModelSpec
 
 Progress = Callable[[int, int], None]
 T = TypeVar("T")
 
 
 def simulate_batch(
-    scenes: Iterable[Scene],
+    scenes: Iterable[AnyScene],
     *,
     workers: int | None = None,
     processes: bool = False,
     strict: bool = False,
     progress: Progress | None = None,
-) -> list[Result]:
+) -> list[Any]:
     """Integrate many scenes at the same time; every result is bit by bit that of `simulate`.
 
     All models are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
@@ -57,7 +60,7 @@ def simulate_batch(
 
     Returns
     -------
-    list of Result
+    list of Result, or of BuildingResult for buildings
         In the order of the scenes. A run that fails raises no error: its `status` and `message` describe the failure,
         and its history has the rows until then.
 
@@ -71,11 +74,12 @@ def simulate_batch(
 
     """
     given = _checked(scenes)
-    results: dict[int, Result] = {}
+    results: dict[int, Any] = {}
     with Workers(worker_count(workers), processes) as pool:
         settled = dict(enumerate(given))
-        settled |= pool.results(settle, {index: (scene,) for index, scene in settled.items() if needs_settling(scene)})
-        for spec in dict.fromkeys(scene.spec for scene in settled.values()):
+        loose = {i: (each,) for i, each in settled.items() if isinstance(each, Scene) and needs_settling(each)}
+        settled |= pool.results(settle, loose)
+        for spec in dict.fromkeys(spec for scene in settled.values() for spec in specs_of(scene)):
             build_model(spec.layout, spec.effects)
         # Long runs start first, so that all workers end at about the same time.
         order = sorted(settled, key=lambda index: -settled[index].end)
@@ -87,18 +91,29 @@ def simulate_batch(
     return [results[index] for index in range(len(given))]
 
 
-def _checked(scenes: Iterable[Scene]) -> list[Scene]:
+def _checked(scenes: Iterable[AnyScene]) -> list[AnyScene]:
     """The scenes as a list; raises InputError where one is no scene or its method does not support its effects."""
-    if isinstance(scenes, Scene):
+    if isinstance(scenes, Scene | BuildingScene):
         raise InputError("scenes: this is one scene; give a list of them")
     given = list(scenes)
     for index, scene in enumerate(given):
-        if not isinstance(scene, Scene):
+        if not isinstance(scene, Scene | BuildingScene):
             raise InputError(f"scenes[{index}]: a {type(scene).__name__} is no scene; give what load_scene returns")
         with _located(index):
-            check(scene, scene.modelled)
-    require_memory(given)
+            check_method(scene)
+    require_memory([scene for scene in given if isinstance(scene, Scene)])
     return given
+
+
+def check_method(scene: AnyScene) -> None:
+    """Raise InputError where the method of a scene does not support its effects; that of a building always does."""
+    if isinstance(scene, Scene):
+        check(scene, scene.modelled)
+
+
+def specs_of(scene: AnyScene) -> tuple[ModelSpec, ...]:
+    """The models with which a run starts: one, or those of the bearings of a building."""
+    return (scene.spec,) if isinstance(scene, Scene) else scene.specs
 
 
 def usable_cores() -> int:
@@ -115,12 +130,23 @@ def worker_count(requested: int | None) -> int:
     return requested
 
 
-def run_to_end(scene: Scene, settled: Scene, strict: bool, proceed: Callable[[float, float], None]) -> Result:
+def run_to_end(scene: AnyScene, settled: AnyScene, strict: bool, proceed: Callable[[float, float], None]) -> Any:
     """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run."""
+    if not (isinstance(scene, Scene) and isinstance(settled, Scene)):
+        return _building_to_end(scene, proceed)
     sequence = RunSequence.of(scene, strict, settled)
     while sequence.effects is not None:
         sequence.run_segment(proceed)
     return sequence.result(with_initial_row=True)
+
+
+def _building_to_end(scene: AnyScene, proceed: Callable[[float, float], None]) -> Any:
+    try:
+        return simulate(scene, progress=proceed)
+    except RunError as error:
+        if error.result is None:
+            raise
+        return error.result
 
 
 @contextmanager
@@ -134,7 +160,7 @@ def _located(index: int) -> Iterator[None]:
         raise RunError(f"scenes[{index}]: {error}", status=error.status, result=error.result) from error
 
 
-def _run(scene: Scene, settled: Scene, strict: bool) -> Result:
+def _run(scene: AnyScene, settled: AnyScene, strict: bool) -> Any:
     """One run of a batch, in a worker."""
     return run_to_end(scene, settled, strict, raise_if_stopped)
 

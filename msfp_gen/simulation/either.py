@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
+from time import monotonic
 from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
+
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.errors import InputError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, fingerprint, require_no_checkpoint
+from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from msfp_gen.buildings.compiled_run import BuildingRun
-    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
 
@@ -48,6 +53,10 @@ def simulate(
 ) -> Result: ...
 
 
+@overload
+def simulate(scene: Scene | BuildingScene, *, progress: bearings.Progress | None = None) -> Any: ...
+
+
 def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingResult:
     """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
     if not isinstance(scene, BuildingScene):
@@ -55,7 +64,20 @@ def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingR
     for name, value in options.items():
         if name not in _OF_BUILDINGS and value not in (False, None, ()):
             raise InputError(f"{name}: the run of a building has no such option; leave it out")
-    return _simulate_building(scene, **{name: options[name] for name in _OF_BUILDINGS if name in options})
+    return _timed(scene, {name: options[name] for name in _OF_BUILDINGS if name in options})
+
+
+def _timed(scene: BuildingScene, options: dict[str, Any]) -> BuildingResult:
+    """The run of a building, whose result states how it ended, with what and how long it took."""
+    begin, about = monotonic(), {"msfp_gen": __version__, "numpy": np.__version__}
+    try:
+        return replace(_simulate_building(scene, **options), provenance=about, wall_time=monotonic() - begin)
+    except RunError as error:
+        result = error.result
+        if isinstance(result, BuildingResult):
+            ended = {"status": error.status, "message": str(error), "wall_time": monotonic() - begin}
+            result = replace(result, provenance=about, **ended)  # type: ignore[arg-type]
+        raise RunError(str(error), status=error.status, result=result) from None
 
 
 def _simulate_building(

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import shlex
-from decimal import Decimal
 
 import numpy as np
 import pytest
 import run_tutorial
-from matplotlib.image import imread
 from support import ROOT
+from support.pages import coarse, same
 
 from msfp_gen import load_scene
 from msfp_gen.cli import main
-
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-BLOCK = 24  # pixels: coarse enough for fonts and edges of other versions not to count
 
 
 @pytest.fixture(params=["2500 kN", pytest.param("2500.000000001 kN", marks=pytest.mark.slow)])
@@ -29,7 +24,7 @@ def followed(request, tmp_path, monkeypatch, capsys):
     shown = run_tutorial.blocks()
     given = [block._replace(text=block.text.replace('"2500 kN"', f'"{request.param}"')) for block in shown]
     assert sum(block not in shown for block in given) == (request.param != "2500 kN")
-    monkeypatch.setattr(run_tutorial, "blocks", lambda: given)
+    monkeypatch.setattr(run_tutorial, "blocks", lambda *_: given)
 
     def run(command, folder):
         program, *arguments = shlex.split(command, comments=True)
@@ -39,29 +34,6 @@ def followed(request, tmp_path, monkeypatch, capsys):
         return capsys.readouterr().out
 
     return list(run_tutorial.follow(tmp_path, run))
-
-
-def rounds_to(printed, shown):
-    """Whether a number that is printed is the one shown, to the digits that the page shows."""
-    last_digit = Decimal(1).scaleb(Decimal(shown).as_tuple().exponent)
-    return abs(Decimal(printed) - Decimal(shown)) <= last_digit / 2
-
-
-def same(shown, printed):
-    """Whether two lines say the same; the page may show fewer digits."""
-    head, dots, _ = shown.partition("...")
-    wanted, found = head.split(), printed.split()
-    if NUMBER.sub("#", " ".join(wanted)) != NUMBER.sub("#", " ".join(found[: len(wanted)] if dots else found)):
-        return False
-    pairs = zip(NUMBER.findall(" ".join(wanted)), NUMBER.findall(" ".join(found)), strict=False)
-    return all(rounds_to(b, a) for a, b in pairs)
-
-
-def coarse(path):
-    """Mean brightness of blocks of a picture."""
-    grey = imread(path)[..., :3].mean(axis=-1)
-    rows, columns = (length // BLOCK for length in grey.shape)
-    return grey[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK).mean(axis=(1, 3))
 
 
 def test_a_newcomer_gets_what_the_page_shows(followed, tmp_path):

@@ -141,7 +141,7 @@ def shallow() -> tuple[Bearing, dict[str, Any]]:
 
 @pytest.mark.parametrize(("axes", "whole"), [((0, 1, 0), 1.5e-2), ((1, 1, 0), 5e-2)], ids=["one", "two directions"])
 def test_a_slab_on_shallow_bearings_moves_as_on_those_of_opensees(axes, whole):
-    """Four bearings: peak displacement to 1 %, and the whole path, less well where frictions turn (docs/buildings.md)."""
+    """Four bearings: peak displacement to 1 %; the whole path, less well where frictions turn (docs/buildings.md)."""
     bearing, native = shallow()
     ground, motion = record(0.0, 20.0, axes)
     mass = 4 * WEIGHT / 9.81

@@ -12,6 +12,7 @@ from typing import Any
 from msfp_gen.errors import InputError
 
 Table = dict[str, Any]
+KINDS = ("bearing", "scene", "building")
 
 # Effects of a preset unless its table gives others: the complete model of PEER 2017/07.
 PRESET_EFFECTS = {"dimension": "spatial", "sliders": "inertial", "rims": True, "uplift": False}
@@ -19,21 +20,25 @@ PRESET_EFFECTS = {"dimension": "spatial", "sliders": "inertial", "rims": True, "
 
 def bearing_table(name: str) -> Table:
     """The bearing preset `name`, without its description; raises InputError for an unknown name."""
-    return _find("bearing", _catalogue()[0], name)
+    return _find("bearing", name)
 
 
 def scene_table(name: str) -> Table:
     """The scene preset `name`, complete, without its description; raises InputError for an unknown name."""
-    table = _find("scene", _catalogue()[1], name)
+    table = _find("scene", name)
     return table | {"name": name, "effects": {**PRESET_EFFECTS, **table.get("effects", {})}}
 
 
+def building_table(name: str) -> Table:
+    """The building preset `name`, complete, without its description; raises InputError for an unknown name."""
+    return _find("building", name) | {"name": name}
+
+
 def descriptions(kind: str) -> dict[str, str]:
-    """Name -> one line of description of each preset of a kind, "bearing" or "scene". Raises InputError for another."""
-    kinds = dict(zip(("bearing", "scene"), _catalogue(), strict=True))
-    if kind not in kinds:
-        raise InputError(f"kind = {kind!r}: give 'bearing' or 'scene'")
-    return {name: table["description"] for name, table in kinds[kind].items()}
+    """Name -> one line of description of each preset of a kind, a word of `KINDS`. Raises InputError for another."""
+    if kind not in KINDS:
+        raise InputError(f"kind = {kind!r}: give one of {', '.join(map(repr, KINDS))}")
+    return {name: table["description"] for name, table in _catalogue()[kind].items()}
 
 
 def suggestion(word: str, known: Mapping[str, Any] | list[str]) -> str:
@@ -42,7 +47,8 @@ def suggestion(word: str, known: Mapping[str, Any] | list[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
-def _find(kind: str, tables: dict[str, Table], name: str) -> Table:
+def _find(kind: str, name: str) -> Table:
+    tables = _catalogue()[kind]
     if name not in tables:
         hint = suggestion(str(name), tables) or f"; the presets are {', '.join(tables)}"
         raise InputError(f"{kind} = {name!r}: no preset of that name{hint}")
@@ -50,16 +56,16 @@ def _find(kind: str, tables: dict[str, Table], name: str) -> Table:
 
 
 @lru_cache(maxsize=1)
-def _catalogue() -> tuple[dict[str, Table], dict[str, Table]]:
-    bearings: dict[str, Table] = {}
-    scenes: dict[str, Table] = {}
+def _catalogue() -> dict[str, dict[str, Table]]:
+    found: dict[str, dict[str, Table]] = {kind: {} for kind in KINDS}
     folder = files(__package__) / "presets"
     for path in sorted(folder.iterdir(), key=lambda path: path.name):
         if not path.name.endswith(".toml"):
             continue
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
         common = tables.pop("common", {})
-        (bearings if path.name == "bearings.toml" else scenes).update(
-            {name: common | table for name, table in tables.items()}
-        )
-    return bearings, scenes
+        for name, table in tables.items():
+            whole = common | table
+            kind = "bearing" if path.name == "bearings.toml" else "building" if "building" in whole else "scene"
+            found[kind][name] = whole
+    return found

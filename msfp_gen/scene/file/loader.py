@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
-from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop, Top
+from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
 
 Table = dict[str, Any]
@@ -31,60 +30,23 @@ _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # v
 _PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
 
 
-def load_scene(source: str | Path) -> Scene:
-    """The scene in a TOML file, or the preset of that name. Paths inside a file are relative to it.
-
-    Raises InputError of one line that names the file, the path of the field, the value and the remedy.
-    """
-    return changed_scene(source, {})
-
-
-def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> Scene:
-    """The scene of `load_scene(source)` with some fields changed.
-
-    changes: dotted path of a field, such as `motion.scale` -> value. Raises InputError as `load_scene` does.
-    """
-    table, path = scene_table(source)
-    try:
-        return scene_from_table(changed_table(table, changes), None if path is None else path.parent)
-    except InputError as error:
-        if path is None:
-            raise
-        raise InputError(f"{path}: {error}") from None
-
-
 def scene_table(source: str | Path) -> tuple[Table, Path | None]:
-    """The table of a scene file, not validated, and the path of the file; of a preset, which has no file, None.
+    """The table of a scene file or a building's, not validated, and the path of the file; of a preset None.
 
-    Raises InputError as `load_scene` does.
+    Raises InputError of one line that names the file, or the preset that does not exist.
     """
-    known = catalogue.descriptions("scene")
-    if str(source) in known:
-        return catalogue.scene_table(str(source)), None
+    for kind, table in (("scene", catalogue.scene_table), ("building", catalogue.building_table)):
+        if str(source) in catalogue.descriptions(kind):
+            return table(str(source)), None
     path = Path(source)
     if not is_file(path):
+        known = [*catalogue.descriptions("scene"), *catalogue.descriptions("building")]
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
     try:
         return toml_file(path), path
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def changed_table(table: Table, changes: Mapping[str, Any]) -> Table:
-    """A copy of a table with the fields at dotted paths set; the schema checks afterwards that they exist."""
-    table = deepcopy(table)
-    for path, value in changes.items():
-        *parents, last = path.split(".")
-        inner: Any = table
-        for name in parents:
-            if name == "bearing" and isinstance(inner.get(name), str):  # the name of a preset
-                inner[name] = {"preset": inner[name]}
-            inner = inner.setdefault(name, {})
-            if not isinstance(inner, dict):
-                raise InputError(f"{path} = {value!r}: {name} is {inner!r} here, which has no fields to change")
-        inner[last] = value
-    return table
 
 
 def toml_file(path: Path) -> Table:
@@ -127,7 +89,7 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, motio
     top = dict(given["top"])
     parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
     if "effects" in given:
-        parts["effects"] = _effects(given.pop("effects"))
+        parts["effects"] = effects_from_table(given.pop("effects"))
     for name, kinds in (("load", LOADS), ("top_rotation", ROTATIONS)):
         if name in given:
             parts[name] = history_from(kinds, given.pop(name), name)
@@ -144,6 +106,16 @@ def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     return _bearing(schema.validate_bearing(table))
 
 
+def bearing_table(bearing: Bearing) -> Table:
+    """The complete `[bearing]` table of a bearing, in SI units."""
+    return {
+        "layout": plain_table(bearing.layout),
+        **plain_table(bearing),
+        "surfaces": [plain_table(surface) for surface in bearing.surfaces],
+        "bodies": [plain_table(body) for body in bearing.bodies],
+    }
+
+
 def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     """The scene as TOML text from which `load_scene` makes an equal scene; in SI units, with the complete bearing.
 
@@ -155,22 +127,17 @@ def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     return dumps(
         {
             **values,
-            "bearing": {
-                "layout": _plain(scene.bearing.layout),
-                **_plain(scene.bearing),
-                "surfaces": [_plain(surface) for surface in scene.bearing.surfaces],
-                "bodies": [_plain(body) for body in scene.bearing.bodies],
-            },
+            "bearing": bearing_table(scene.bearing),
             **({} if motion == {} else {"motion": _motion_table(scene) if motion is None else motion}),
-            "top": {"kind": scene.top.kind, **_plain(scene.top)},
-            **{name: _plain(value) for name, value in tables.items() if value is not None},
+            "top": {"kind": scene.top.kind, **plain_table(scene.top)},
+            **{name: plain_table(value) for name, value in tables.items() if value is not None},
             **{name: table_of(value) for name, value in histories.items() if value is not None},
         }
     )
 
 
-def _effects(given: Mapping[str, Any]) -> Effects | Auto:
-    """`Effects` where the table gives every effect that could be selected, else `Auto`."""
+def effects_from_table(given: Mapping[str, Any]) -> Effects | Auto:
+    """`Effects` where a table gives every effect that could be selected, else `Auto`."""
     if "error" in given or any(name not in given for name in SELECTABLE):
         return Auto(**given)
     return Effects(**given)
@@ -208,7 +175,7 @@ def _motion_table(scene: Scene) -> Table:
     return Pieces.of(scene.motion)
 
 
-def _plain(value: Top | Bearing | Layout | Surface | Body | Effects | Auto | Solver | InitialState | Stop) -> Table:
+def plain_table(value: Any) -> Table:
     """Fields of a part as a table. `top_rotation` is omitted: it follows from the table `[top_rotation]`."""
     names = [name for name, _, _ in ruled_fields(type(value)) if name != "top_rotation"]
     return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}

@@ -219,27 +219,27 @@ def _stamp(path: Path) -> tuple[int, int]:
     return status.st_mtime_ns, status.st_size
 
 
-def resolved(file: str | tuple[str, ...], folder: Path | None) -> str | tuple[str, ...]:
+def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "motion.file") -> str | tuple[str, ...]:
     """The path or paths of a `file` key as absolute paths; relative ones start from the folder of the scene file.
 
     Security: a scene file can only read files in or below its own folder and the folders in `MSFP_GEN_RECORDS`. For a
-    table made in Python (`folder` None) there is no restriction. Raises InputError.
+    table made in Python (`folder` None) there is no restriction. Raises InputError that begins with `name`.
     """
     if isinstance(file, str):
-        return _resolved(file, folder)
-    return tuple(_resolved(each, folder) for each in file)
+        return _resolved(file, folder, name)
+    return tuple(_resolved(each, folder, name) for each in file)
 
 
-def _resolved(file: str, folder: Path | None) -> str:
+def _resolved(file: str, folder: Path | None, name: str) -> str:
     try:
         path = ((folder or Path()) / file).resolve()
     except (OSError, ValueError, RuntimeError) as error:  # such as a null character, or a loop of symbolic links
-        raise InputError(f"motion.file = {file!r}: this is no path ({error}); give that of a record") from None
+        raise InputError(f"{name} = {file!r}: this is no path ({error}); give that of a file") from None
     records = os.environ.get(RECORDS, "").split(os.pathsep)
     permitted = [folder, *(Path(each).expanduser() for each in records if each)] if folder is not None else []
     if permitted and not any(path.is_relative_to(each.resolve()) for each in permitted):
         raise InputError(
-            f"motion.file = {file!r}: outside the folder of the scene file; put the record there, or name its folder "
+            f"{name} = {file!r}: outside the folder of the scene file; put the file there, or name its folder "
             f"in the environment variable {RECORDS}"
         )
     return str(path)

@@ -131,6 +131,7 @@ PARTS: dict[str, Model] = {
     name: model_of(kind)
     for name, kind in (("effects", Auto), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
 }
+EFFECTS = _auto(PARTS["effects"])
 _SCENE = model_of(
     Scene,
     bearing=(_EITHER, ...),
@@ -138,7 +139,7 @@ _SCENE = model_of(
     top=(_TOP, ...),
     load=(_LOAD, None),
     top_rotation=(_ROTATION, None),
-    **{name: (_auto(model) if name == "effects" else model, None) for name, model in PARTS.items()},
+    **{name: (EFFECTS if name == "effects" else model, None) for name, model in PARTS.items()},
 )
 # Every table by its path, union tags included: the known keys for messages about a misspelt or missing key.
 _TABLES: dict[str, Model] = {

@@ -15,13 +15,13 @@ def dumps(table: Mapping[str, Any]) -> str:
     """
     import tomli_w
 
-    return tomli_w.dumps(_python_values(table))
+    return tomli_w.dumps(plain_values(table))
 
 
-def _python_values(value: Any) -> Any:
+def plain_values(value: Any) -> Any:
     """`value` without entries that are None, and with NumPy scalars as Python numbers."""
     if isinstance(value, Mapping):
-        return {key: _python_values(item) for key, item in value.items() if item is not None}
+        return {key: plain_values(item) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):
-        return [_python_values(item) for item in value]
+        return [plain_values(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, moving_axes, page
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.common.arrays import Array
+from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
+from msfp_gen.figures.loops import SIDE
 from msfp_gen.figures.style import THIN, headline, subscript
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.studies.bounding.runs import CASES
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from msfp_gen.result import Result
     from msfp_gen.studies.bounding.runs import Bounds, Case
 
 # In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
@@ -32,7 +36,7 @@ def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
     A run that failed is drawn up to its last row. Raises InputError for a path that cannot be written.
     """
     drawn = [case for name in LINE_STYLES for case in found.cases if case.name == name and case.result is not None]
-    axes = sorted({axis for case in drawn if case.result for axis in moving_axes(case.result)}) or [0]
+    axes = sorted({axis for case in drawn for axis in _moving(_loop(case.result))}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in found.cases if case.name == "nominal") or "unnamed scene"
         headline(figure, f"{name}: bounds by {found.table.name}")
@@ -42,12 +46,17 @@ def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
 
 
 def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
-    forces = [case.result.history.top_force[:, axis] for case in cases if case.result]
+    loops = [_loop(case.result) for case in cases]
+    forces = [force[:, axis] for _, force in loops]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
-    for case, values in zip(cases, forces, strict=True):
-        assert case.result is not None
-        u = displacement(case.result.history.displacement[:, axis])
-        axes.plot(u, force(values, scale), label=_label(found, case), linewidth=THIN, **LINE_STYLES[case.name])
+    for case, (u, _), values in zip(cases, loops, forces, strict=True):
+        axes.plot(
+            displacement(u[:, axis]),
+            force(values, scale),
+            label=_label(found, case),
+            linewidth=THIN,
+            **LINE_STYLES[case.name],
+        )
     sign = subscript(axis + 1)
     axes.set(
         title=f"Force and displacement along E{sign}",
@@ -58,6 +67,21 @@ def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
     handles, labels = axes.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda i: CASES.index(cases[i].name))
     axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
+
+
+def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
+    """Displacement across the bearing and force on its top, or of a building their mean and sum, shapes (k, 3)."""
+    if isinstance(result, BuildingResult):
+        u = np.mean([each.displacement for each in result.bearings], axis=0)
+        return u, np.sum([each.top_force for each in result.bearings], axis=0)
+    assert result is not None
+    return result.history.displacement, result.history.top_force
+
+
+def _moving(loop: tuple[Array, Array]) -> list[int]:
+    """Horizontal axes along which a loop moves."""
+    peaks = np.abs(loop[0][:, :2]).max(axis=0)
+    return [axis for axis in (0, 1) if peaks[axis] > SIDE * peaks.max()]
 
 
 def _label(found: Bounds, case: Case) -> str:

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from msfp_gen.analysis.characterise import Characterisation, characterise
+from msfp_gen.analysis.characterise import Characterisation
+from msfp_gen.buildings.characterise import BuildingCharacterisation
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.friction_parameters import proportional
-from msfp_gen.simulation.simulate import simulate
+from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.either import simulate
+from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
+from msfp_gen.studies.bounding.measures import Measure, measures_of
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.scene import Scene
 
 CASES = ("lower", "nominal", "upper")
 # Word in the name of a model -> the effect that is then prescribed for all cases.
@@ -28,20 +35,6 @@ WIDER: dict[str, tuple[str, Any]] = {
     "pvt": ("friction", "pvt"),
 }
 Progress = Callable[[str], Callable[[float, float], None] | None]
-
-
-class Measure(NamedTuple):
-    """A quantity that is compared.
-
-    Attributes:
-        unit: SI unit.
-        governs: whether its largest or its least value governs a design; "" if neither does.
-        read: its value from a characterisation; None if it is not defined.
-    """
-
-    unit: str
-    governs: Literal["most", "least", ""]
-    read: Callable[[Characterisation], float | None]
 
 
 @dataclass(frozen=True)
@@ -57,9 +50,9 @@ class Case:
     """
 
     name: str
-    scene: Scene
-    result: Result | None
-    found: Characterisation | None
+    scene: AnyScene
+    result: Result | BuildingResult | None
+    found: Characterisation | BuildingCharacterisation | None
     failure: str = ""
 
 
@@ -83,20 +76,30 @@ class Bounds:
         return not any(case.failure for case in self.cases)
 
     @property
+    def bearing(self) -> Bearing:
+        """The nominal bearing; of a building that with the most surfaces."""
+        return _typical(next(case for case in self.cases if case.name == "nominal").scene)
+
+    @property
     def surfaces(self) -> int:
-        """Number of surfaces of the bearing."""
-        return len(self.cases[0].scene.bearing.surfaces)
+        """Number of its surfaces."""
+        return len(self.bearing.surfaces)
+
+    @property
+    def measures(self) -> dict[str, Measure]:
+        """Name -> quantity that is compared."""
+        return measures_of(self.cases[0].scene)
 
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
         return {
             name: {case.name: None if case.found is None else measure.read(case.found) for case in self.cases}
-            for name, measure in measures(self.surfaces).items()
+            for name, measure in self.measures.items()
         }
 
     def governing(self) -> dict[str, str]:
         """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
-        worst, kinds = {}, measures(self.surfaces)
+        worst, kinds = {}, self.measures
         for name, values in self.quantities().items():
             known = {case: value for case, value in values.items() if value is not None}
             if kinds[name].governs and len(known) == len(values) and len(set(known.values())) > 1:
@@ -125,8 +128,9 @@ class Bounds:
         }
 
 
-def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
-    """Run `scene` with its properties at their lower bounds, nominal values and upper bounds.
+def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = None) -> Bounds:
+    """Run `scene` with its properties at their lower bounds, nominal values and upper bounds; of a
+    building those of all bearings.
 
     A case that fails is part of the result, and the other cases are run. All cases have the same effects: where `Auto`
     ends with different ones, they are run again with what any of them needs.
@@ -141,9 +145,9 @@ def bound(scene: Scene, table: FactorTable, *, progress: Progress | None = None)
         RunError: only if the user interrupts.
     """
     cases = _cases(scene, table, progress)
-    if (common := _common_effects(scene, cases)) is not None:
+    if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
         cases = _cases(replace(scene, effects=common), table, progress)
-    return Bounds(table, _lambdas(scene.bearing, table), tuple(cases))
+    return Bounds(table, _lambdas(_typical(scene), table), tuple(cases))
 
 
 def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
@@ -158,7 +162,7 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     return replace(scene.effects, **{name: value for word, (name, value) in WIDER.items() if word in used})
 
 
-def _cases(scene: Scene, table: FactorTable, progress: Progress | None) -> list[Case]:
+def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> list[Case]:
     """The runs of `bound`."""
     cases = []
     for name, bounded in bounded_scenes(scene, table).items():
@@ -171,29 +175,71 @@ def _cases(scene: Scene, table: FactorTable, progress: Progress | None) -> list[
             partial: Any = error.result
             cases.append(Case(name, bounded, partial, None, str(error)))
         else:
-            cases.append(Case(name, bounded, result, characterise(result)))
+            cases.append(Case(name, bounded, result, result.characterise()))
     return cases
 
 
-def bounded_scenes(scene: Scene, table: FactorTable) -> dict[str, Scene]:
-    """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`."""
-    return {case: bounded_scene(scene, table, case) for case in CASES}
+def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
+    """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`.
+
+    The bearings of a building have the same effects in all cases: with uplift where any case needs it.
+    """
+    scenes = {case: bounded_scene(scene, table, case) for case in CASES}
+    buildings = [each for each in scenes.values() if isinstance(each, BuildingScene)]
+    if not buildings:
+        return scenes
+    common = [
+        max(found, key=lambda effects: effects.uplift) for found in zip(*(b.modelled for b in buildings), strict=True)
+    ]
+    return {
+        case: replace(
+            each,
+            bearings=[replace(one, effects=chosen) for one, chosen in zip(each.bearings, common, strict=True)],
+        )
+        if isinstance(each, BuildingScene) and each.modelled != tuple(common)
+        else each
+        for case, each in scenes.items()
+    }
 
 
-def bounded_scene(scene: Scene, table: FactorTable, case: str) -> Scene:
+def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:
     """The scene of one case of CASES. Raises InputError as `bound`."""
-    lambdas, law = _lambdas(scene.bearing, table), scene.law[1]
-    if "friction" in lambdas and law is not None and not proportional(law, scene.bearing):
+    label = f"{scene.name or 'scene'}, {case}"
+    if isinstance(scene, Scene):
+        bearing = _bounded(scene.bearing, scene.law[1], table, case)
+        return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
+    bearings = []
+    for index, each in enumerate(scene.bearings):
+        requested = each.effects or Auto()
+        formula = requested.friction_law
+        word = requested.friction or select_friction(each.bearing, formula)
+        try:
+            bearing = _bounded(each.bearing, law_of(word, formula), table, case)
+        except InputError as error:
+            raise InputError(f"{scene.label(index)}: {error}") from None
+        bearings.append(replace(each, bearing=bearing))
+    return scene if case == "nominal" else replace(scene, bearings=bearings, name=label)
+
+
+def _bounded(bearing: Bearing, law: Law | None, table: FactorTable, case: str) -> Bearing:
+    """A bearing with its properties multiplied."""
+    lambdas = _lambdas(bearing, table)
+    if "friction" in lambdas and law is not None and not proportional(law, bearing):
         raise InputError(
             f"effects.friction_law = {law.text!r}: lambda factors multiply `friction`, to which this formula is not "
             "proportional; give a formula of the form mu * (...)"
         )
-    bearing = scene.bearing
     for named, factors in lambdas.items():
         for column in PROPERTIES[named]:
             bearing = _scaled(bearing, column, factors[case])
-    label = f"{scene.name or 'scene'}, {case}"
-    return scene if case == "nominal" else replace(scene, bearing=bearing, name=label)
+    return bearing
+
+
+def _typical(scene: AnyScene) -> Bearing:
+    """The bearing of a scene; of a building that with the most surfaces."""
+    if isinstance(scene, Scene):
+        return scene.bearing
+    return max((each.bearing for each in scene.bearings), key=lambda bearing: len(bearing.surfaces))
 
 
 def _scaled(bearing: Bearing, column: str, factors: tuple[float, ...]) -> Bearing:
@@ -229,40 +275,3 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
         }
         for named, found in pairs.items()
     }
-
-
-def measures(surfaces: int) -> dict[str, Measure]:
-    """Name -> quantity that is compared, for a stack with this number of surfaces; loop properties are cycle means."""
-    whole = {
-        "peak_displacement": Measure("m", "most", lambda found: found.peak_displacement),
-        "peak_force": Measure("N", "most", lambda found: found.peak_force),
-        "secant_stiffness": Measure("N/m", "", lambda found: found.secant_stiffness),
-        "effective_stiffness": Measure("N/m", "", _mean("effective_stiffness")),
-        "effective_period": Measure("s", "", _mean("effective_period")),
-        "energy_dissipated": Measure("J", "", _mean("energy_dissipated")),
-        "effective_damping": Measure("1", "", _mean("effective_damping")),
-        "zero_displacement_force": Measure("N", "", _mean("zero_displacement_force")),
-        "residual_displacement": Measure(
-            "m", "most", lambda found: found.residual_displacement if found.at_rest else None
-        ),
-        "maximum_uplift": Measure("m", "most", lambda found: found.maximum_uplift),
-    }
-    kinds: dict[str, tuple[str, Literal["most", "least"]]] = {
-        "capacity_left": ("m", "least"),
-        "peak_velocity": ("m/s", "most"),
-        "peak_heat_flux": ("W/m^2", "most"),
-    }
-    each = {
-        f"{name}_{surface}": Measure(unit, governs, _of_surface(name, surface))
-        for name, (unit, governs) in kinds.items()
-        for surface in range(1, surfaces + 1)
-    }
-    return whole | each
-
-
-def _mean(name: str) -> Callable[[Characterisation], float | None]:
-    return lambda found: found.envelope[name].mean if name in found.envelope else None
-
-
-def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
-    return lambda found: getattr(found.surfaces[surface - 1], name)

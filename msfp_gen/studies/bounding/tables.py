@@ -8,7 +8,7 @@ from pathlib import Path
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.common.tables import Table
 from msfp_gen.studies.bounding.factors import RULES, FactorTable
-from msfp_gen.studies.bounding.runs import CASES, Bounds, measures
+from msfp_gen.studies.bounding.runs import CASES, Bounds
 
 # SI unit -> (unit shown, scale).
 SHOWN = {
@@ -34,7 +34,7 @@ def write_quantities(found: Bounds, path: str | Path) -> Path:
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
     path = check_output(path, (".csv",))
-    units, governing = measures(found.surfaces), found.governing()
+    units, governing = found.measures, found.governing()
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["quantity", *CASES, "governs"])
@@ -67,7 +67,7 @@ def _factor_table(table: FactorTable) -> Table:
 
 
 def _lambda_table(found: Bounds) -> Table:
-    nominal = next(case for case in found.cases if case.name == "nominal").scene.bearing.surfaces
+    nominal = found.bearing.surfaces
     rows = [
         (
             f"{named} {surface + 1}",
@@ -81,7 +81,7 @@ def _lambda_table(found: Bounds) -> Table:
 
 
 def _quantity_table(found: Bounds) -> Table:
-    units, governing = measures(found.surfaces), found.governing()
+    units, governing = found.measures, found.governing()
     rows = []
     for name, values in found.quantities().items():
         if any(value is not None for value in values.values()):

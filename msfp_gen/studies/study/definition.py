@@ -10,15 +10,16 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from msfp_gen.buildings.opening import AnyScene, scene_of
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.effect_switching import check
+from msfp_gen.scene.bearing import Bearing
+from msfp_gen.simulation.batch import check_method
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, rule_of, surface_values
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, bearings_at, rule_of, surface_values
 from msfp_gen.studies.study.sampling import Sampling
 
 MOST_RUNS = 100_000_000
@@ -145,7 +146,7 @@ class Study:
         *codes, sample = np.unravel_index(np.arange(first, min(first + self.chunk, self.runs)), self.shape)
         return Task(number, first, tuple(codes), self.samples[sample])
 
-    def scene(self, run: int) -> Scene:
+    def scene(self, run: int) -> AnyScene:
         """The scene of a run, numbered from 1 as in the table, to look at it alone. Raises InputError."""
         if not 1 <= run <= self.runs:
             raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
@@ -164,7 +165,7 @@ def check_study(study: Study) -> Study:
     if study.runs > MOST_RUNS:
         raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
     try:
-        plain = scene_from_table(study.recipe.scene)
+        plain = scene_of(study.recipe.scene)
     except InputError as error:
         raise InputError(f"scene: {error}") from None
     for axis in study.axes:
@@ -172,8 +173,9 @@ def check_study(study: Study) -> Study:
             _check_axis(axis, plain, bool(study.recipe.records))
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
-    surfaces = max(len(scene.bearing.surfaces) for scene in _tried(study, SceneMaker(study.recipe)))
-    found = replace(study, keep=replace(study.keep, surfaces=surfaces))
+    tried = list(_tried(study, SceneMaker(study.recipe)))
+    surfaces = max(len(bearing.surfaces) for scene in tried for bearing in _bearings(scene))
+    found = replace(study, keep=replace(study.keep, surfaces=surfaces, building=_counts(tried[0])))
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
     if twice := [name for name in names if names.count(name) > 1]:
@@ -181,22 +183,36 @@ def check_study(study: Study) -> Study:
     return found
 
 
-def _check_axis(axis: Axis, scene: Scene, has_records: bool) -> None:
+def _bearings(scene: AnyScene) -> list[Bearing]:
+    return [each.bearing for each in scene.bearings] if isinstance(scene, BuildingScene) else [scene.bearing]
+
+
+def _counts(scene: AnyScene) -> tuple[int, int, int] | None:
+    """Floors, storeys and bearings of a building; None for a scene of one bearing."""
+    if not isinstance(scene, BuildingScene):
+        return None
+    return len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
+
+
+def _check_axis(axis: Axis, scene: AnyScene, has_records: bool) -> None:
     """Raise InputError where an axis cannot change this scene."""
     for path in axis.paths if axis.change in ("sets", "multiplies") else ():
         if path.partition(".")[0] == "motion" and has_records:
             raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
         if axis.change == "multiplies" and rule_of(scene, path) is None:
             raise InputError(f"multiplies = {path!r}: give a number of bearing, top or solver, or set the field")
+        chosen = bearings_at(scene, path)
         if axis.surfaces is not None:
-            surface_values(scene, path)
-    count = len(scene.bearing.surfaces)
+            own = path[path.rindex("bearing.") :] if chosen else path
+            for one in [scene.bearings[index] for index in chosen] if isinstance(scene, BuildingScene) else [scene]:
+                surface_values(one, own)
+    count = min(len(bearing.surfaces) for bearing in _bearings(scene))
     for surface in axis.surfaces or ():
         if surface > count:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried(study: Study, maker: SceneMaker) -> Iterator[Scene]:
+def _tried(study: Study, maker: SceneMaker) -> Iterator[AnyScene]:
     """The scenes of the first run, and of every value of each axis with the first values of the others."""
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
@@ -212,10 +228,10 @@ def _tried(study: Study, maker: SceneMaker) -> Iterator[Scene]:
             yield _made(maker, (*base[:index], value, *base[index + 1 :]), f"axes.{axis.name}: value {value!r}")
 
 
-def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> Scene:
+def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> AnyScene:
     try:
         scene = maker.scene(values)
-        check(scene, scene.modelled)
+        check_method(scene)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     return scene

@@ -8,10 +8,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from msfp_gen.buildings.opening import files_of, with_absolute_paths
 from msfp_gen.common.fields import Quantity
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion, is_file, resolved
+from msfp_gen.scene.file.motion_tables import RecordMotion, is_file
 from msfp_gen.studies.bounding import load_factors
 from msfp_gen.studies.study.axes import Axis, axis_from
 from msfp_gen.studies.study.definition import Limits, Study, check_study
@@ -36,6 +37,9 @@ KEYS = {
     "about": "written by msfp-gen",
 }
 DEFAULT_KEEP = ("peak_displacement", "peak_top_force", "peak_sliding", "rims_met")
+BUILDING_KEEP = (
+    "peak_displacement", "peak_base_shear", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
+)  # fmt: skip
 _CHUNK = Quantity("", least=1, whole=True)
 
 
@@ -84,7 +88,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
         raise InputError("axes: [records] makes the axes record and scale; give other names")
     sampling = _sampling(table, axes)
     keep = Keep(
-        _texts(table, "keep", DEFAULT_KEEP),
+        _texts(table, "keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP),
         tuple((name, _formula(name, text)) for name, text in _table(table, "quantities").items()),
         1,
         (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if records.intensities else [])),
@@ -101,7 +105,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
         **({"records": records.table} if tables else {}),
     }
     contents = {
-        path: sha256(Path(path).read_bytes()).hexdigest() for path in _files([scene.get("motion"), *tables.values()])
+        path: sha256(Path(path).read_bytes()).hexdigest() for path in [*files_of(scene), *_files(list(tables.values()))]
     }
     return check_study(
         Study(
@@ -133,10 +137,7 @@ def _scene(value: Any, folder: Path | None) -> Table:
         found = dict(value)
     else:
         raise InputError(f"scene = {value!r}: give {KEYS['scene']}")
-    motion = found.get("motion")
-    if not isinstance(motion, Mapping) or "file" not in motion:
-        return found
-    return {**found, "motion": {**motion, "file": resolved(motion["file"], folder)}}
+    return with_absolute_paths(found, folder)
 
 
 def _beside(source: str, folder: Path | None) -> str:

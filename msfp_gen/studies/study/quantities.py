@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,8 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
-from msfp_gen.studies.bounding.runs import Measure, measures
-from msfp_gen.studies.sweep import COLUMNS, plain_cell, summary_value
-
-if TYPE_CHECKING:
-    from msfp_gen.analysis.characterise import Characterisation
-    from msfp_gen.result import Result
+from msfp_gen.studies.bounding.measures import Measure, building_measures, measures
+from msfp_gen.studies.sweep import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
 
 # Word in a formula -> what it takes of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {
@@ -72,23 +68,35 @@ class Keep:
             `last(...)` of a column of the history.
         surfaces: the most surfaces of any bearing of the study.
         axes: names of the axes that hold numbers.
+        building: floors, storeys and bearings where the base is a building.
     """
 
     names: tuple[str, ...]
     formulas: tuple[tuple[str, str], ...]
     surfaces: int
     axes: tuple[str, ...]
+    building: tuple[int, int, int] | None = None
+
+    @property
+    def known(self) -> dict[str, Source]:
+        """Column -> where it comes from, of everything that can be kept."""
+        return catalogue(self.surfaces) if self.building is None else building_catalogue(self.building)
+
+    @property
+    def history(self) -> dict[str, tuple[str, tuple[int, ...]]]:
+        """Columns of the history of which extremes can be taken; none of a building."""
+        return history_columns(self.surfaces) if self.building is None else {}
 
     def columns(self) -> tuple[Column, ...]:
         """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
         return _columns(self)
 
-    def values(self, result: Result, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
+    def values(self, result: Any, at: Mapping[str, float]) -> tuple[dict[str, Any], str]:
         """Column -> value, None where it is not defined; and a line about a characterisation that is not possible.
 
         at: the values of the axes that hold numbers.
         """
-        reader = _Reader(result, self.surfaces)
+        reader = _Reader(result, self.known, self.history)
         formulas = dict(self.formulas)
         found = {
             column.name: self._evaluated(column.name, formulas[column.name], reader, at)
@@ -115,7 +123,7 @@ class Keep:
 
 @lru_cache(maxsize=16)
 def _columns(keep: Keep) -> tuple[Column, ...]:
-    known, found = catalogue(keep.surfaces), []
+    known, found = keep.known, []
     for name in keep.names:
         each = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
         if not each:
@@ -133,12 +141,14 @@ def _columns(keep: Keep) -> tuple[Column, ...]:
 def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[str, str]]]:
     """Syntax tree of a formula, and the extremes in it: symbol -> (word, column of the history)."""
     extremes = {f"{word}_of_{column}": (word, column) for word, column in _EXTREME.findall(text)}
-    columns = history_columns(keep.surfaces)
-    for _, column in extremes.values():
+    columns = keep.history
+    for word, column in extremes.values():
+        if keep.building is not None:
+            raise InputError(f"quantities.{name}: {word}({column}): a building has no such history; give a quantity")
         if column not in columns:
             hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
             raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
-    numbers = [key for key in catalogue(keep.surfaces) if key not in TEXTS]
+    numbers = [key for key in keep.known if key not in TEXTS]
     try:
         return formula.parse(_EXTREME.sub(r"\1_of_\2", text), [*numbers, *keep.axes, *extremes]), extremes
     except ValueError as error:
@@ -167,6 +177,21 @@ def catalogue(surfaces: int) -> dict[str, Source]:
 
 
 @lru_cache(maxsize=16)
+def building_catalogue(counts: tuple[int, int, int]) -> dict[str, Source]:
+    """The same for a building of so many floors, storeys and bearings."""
+    rows = dict(zip(("floors", "storeys", "bearings"), counts, strict=True))
+    found: dict[str, Source] = {}
+    for name, (unit, path) in BUILDING_COLUMNS.items():
+        if name not in _LEFT_OUT:
+            several = rows.get(path.partition(".*")[0], 0) if ".*" in path else 0
+            each = {f"{name}_{index + 1}": Source(unit, path, index) for index in range(several)}
+            found |= each if ".*" in path else {name: Source(unit, path)}
+    for name, measure in building_measures().items():
+        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
+    return found
+
+
+@lru_cache(maxsize=16)
 def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Column of a history, named as in an exported file -> field of `History`, and index after time."""
     numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
@@ -189,12 +214,14 @@ def _finite(value: Any) -> float | None:
 class _Reader:
     """Reads quantities of one run; its summary and its characterisation are made when they are first needed."""
 
-    def __init__(self, result: Result, surfaces: int) -> None:
+    def __init__(
+        self, result: Any, known: Mapping[str, Source], columns: Mapping[str, tuple[str, tuple[int, ...]]]
+    ) -> None:
         self.result = result
         self.problem = ""
-        self._known = catalogue(surfaces)
-        self._columns = history_columns(surfaces)
-        self._found: Characterisation | None = None
+        self._known = known
+        self._columns = columns
+        self._found: Any = None
 
     def value(self, name: str) -> Any:
         """The value of a quantity; None where the run has none."""
@@ -205,8 +232,8 @@ class _Reader:
             return self._capacity_used(source.surface or 0)
         try:
             value = summary_value(self.result.summary, source.path)
-            value = value if source.surface is None else value[source.surface]
-        except (KeyError, IndexError):  # a model without the quantity, or a bearing with fewer surfaces
+            value = value if source.surface is None or value is None else value[source.surface]
+        except IndexError:  # a model without the quantity, or a bearing with fewer surfaces
             return None
         if name in TEXTS:
             return plain_cell(value)
@@ -226,7 +253,8 @@ class _Reader:
         surfaces = self.result.scene.bearing.surfaces
         if surface >= len(surfaces):
             return None
-        return 1.0 - float(self.result.summary["minimum_gap"][surface]) / surfaces[surface].capacity
+        capacity = float(surfaces[surface].capacity)
+        return 1.0 - float(self.result.summary["minimum_gap"][surface]) / capacity
 
     def _of_characterisation(self, source: Source) -> float | None:
         assert source.measure is not None
@@ -238,7 +266,7 @@ class _Reader:
         if self._found is None:
             return None
         try:
-            value = source.measure.read(self._found)
+            value: float | None = source.measure.read(self._found)
         except IndexError:
             return None
         return None if value is None else _finite(value)

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
-from msfp_gen.simulation.batch import raise_if_stopped, run_to_end
-from msfp_gen.simulation.effect_switching import check
+from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.batch import check_method, raise_if_stopped, run_to_end, specs_of
 from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.study.definition import Task
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
 
 if TYPE_CHECKING:
-    from msfp_gen.result import Result
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.buildings.opening import AnyScene
 
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
 BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run
@@ -59,11 +58,11 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
     return _part(order, rows, failed), failed
 
 
-def _run(make: Callable[[], Scene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
+def _run(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
     """Status, message and quantities of one run."""
     try:
         scene = make()
-        check(scene, scene.modelled)
+        check_method(scene)
     except InputError as error:
         return BAD_SCENE, str(error), {}
     try:
@@ -76,7 +75,7 @@ def _run(make: Callable[[], Scene], order: Order, at: dict[str, float]) -> tuple
     return result.status, result.message or problem, kept
 
 
-def _result(scene: Scene, seconds: float | None) -> Result:
+def _result(scene: AnyScene, seconds: float | None) -> Any:
     end = None if seconds is None else time.monotonic() + seconds
 
     def proceed(reached: float, of: float) -> None:
@@ -84,12 +83,12 @@ def _result(scene: Scene, seconds: float | None) -> Result:
         if end is not None and time.monotonic() > end and reached < of:
             raise _OutOfTimeError
 
-    return run_to_end(scene, settle(scene), False, proceed)
+    return run_to_end(scene, settle(scene) if isinstance(scene, Scene) else scene, False, proceed)
 
 
-def build_models(scenes: list[Scene]) -> None:
+def build_models(scenes: list[AnyScene]) -> None:
     """Build the models with which these scenes start, unless the cache of this host has them."""
-    for spec in dict.fromkeys(scene.spec for scene in scenes):
+    for spec in dict.fromkeys(spec for scene in scenes for spec in specs_of(scene)):
         build_model(spec.layout, spec.effects)
 
 

@@ -2,6 +2,7 @@
 
 from msfp_gen.studies.sweep.runs import completed_runs
 from msfp_gen.studies.sweep.table import (
+    BUILDING_COLUMNS,
     COLUMNS,
     TABLE_SUFFIXES,
     Row,
@@ -13,6 +14,7 @@ from msfp_gen.studies.sweep.table import (
 )
 
 __all__ = [
+    "BUILDING_COLUMNS",
     "COLUMNS",
     "TABLE_SUFFIXES",
     "Row",

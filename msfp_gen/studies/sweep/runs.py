@@ -7,18 +7,20 @@ from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import TYPE_CHECKING
 
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
-from msfp_gen.simulation.batch import usable_cores
-from msfp_gen.simulation.effect_switching import check
-from msfp_gen.simulation.simulate import simulate
+from msfp_gen.simulation.batch import check_method, specs_of, usable_cores
+from msfp_gen.simulation.either import simulate
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.buildings.opening import AnyScene
 
 
-def completed_runs(scenes: Sequence[Scene], workers: int | None = None) -> Generator[tuple[int, Result], None, None]:
+def completed_runs(
+    scenes: Sequence[AnyScene], workers: int | None = None
+) -> Generator[tuple[int, Result | BuildingResult], None, None]:
     """Run scenes at the same time, in threads; yields (index, result) in the order in which the runs end.
 
     Every result is that of `simulate`; that of a failed run has its rows until then. Closing the iterator, or an
@@ -30,15 +32,15 @@ def completed_runs(scenes: Sequence[Scene], workers: int | None = None) -> Gener
         raise InputError(f"workers = {workers!r}: give a whole number of runs at the same time, 1 or more")
     for scene in scenes:
         try:
-            check(scene, scene.modelled)
+            check_method(scene)
         except InputError as error:
             raise InputError(f"{scene.name}: {error}") from error
-    for spec in dict.fromkeys(scene.spec for scene in scenes):
+    for spec in dict.fromkeys(spec for scene in scenes for spec in specs_of(scene)):
         build_model(spec.layout, spec.effects)
     return _completed(scenes, workers or usable_cores())
 
 
-def _completed(scenes: Sequence[Scene], workers: int) -> Generator[tuple[int, Result], None, None]:
+def _completed(scenes: Sequence[AnyScene], workers: int) -> Generator[tuple[int, Result | BuildingResult], None, None]:
     stop = threading.Event()
     pool = ThreadPoolExecutor(workers, "msfp-gen-sweep")
     try:
@@ -57,7 +59,7 @@ class _StoppedError(Exception):
     """Ends a run in a worker after the sweep has ended."""
 
 
-def _result_of(scene: Scene, stop: threading.Event) -> Result:
+def _result_of(scene: AnyScene, stop: threading.Event) -> Result | BuildingResult:
     def proceed(_: float, __: float) -> None:
         if stop.is_set():
             raise _StoppedError
@@ -65,6 +67,6 @@ def _result_of(scene: Scene, stop: threading.Event) -> Result:
     try:
         return simulate(scene, progress=proceed)
     except RunError as error:
-        if isinstance(error.result, Result):
+        if isinstance(error.result, Result | BuildingResult):
             return error.result
         raise RunError(f"{scene.name}: {error}", status=error.status) from error

@@ -14,8 +14,9 @@ from msfp_gen.common.tables import Table
 from msfp_gen.results.export import require_pyarrow
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
-    from msfp_gen.scene.file.parameter_sweep import Variation
+    from msfp_gen.studies.sweep.variations import Variation
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 WIDTH = 80  # columns of a terminal
@@ -39,6 +40,29 @@ COLUMNS = {
     "steps": ("", "counters.steps"),
     "wall_time": ("s", "wall_time"),
 }
+# The same of a building; `.*.` stands for each floor, storey or bearing, from below or in the order of the file.
+BUILDING_COLUMNS = {
+    "status": ("", "status"),
+    "message": ("", "message"),
+    "duration": ("s", "duration"),
+    "peak_displacement": ("m", "peak_displacement.radial"),
+    "peak_base_shear": ("N", "peak_base_shear.radial"),
+    "base_shear_ratio": ("", "base_shear_ratio"),
+    "peak_base_torsion": ("N m", "peak_base_torsion"),
+    "peak_floor_acceleration": ("m/s^2", "peak_floor_acceleration.radial"),
+    "peak_vertical_acceleration": ("m/s^2", "peak_floor_acceleration.E3"),
+    "peak_drift_ratio": ("", "peak_drift_ratio"),
+    "minimum_load_ratio": ("", "minimum_load_ratio"),
+    "maximum_load_ratio": ("", "maximum_load_ratio"),
+    "rims_met": ("", "rims_met"),
+    "floor_acceleration": ("m/s^2", "floors.*.peak_acceleration.radial"),
+    "storey_drift_ratio": ("", "storeys.*.peak_drift_ratio"),
+    "storey_shear": ("N", "storeys.*.peak_shear.radial"),
+    "bearing_displacement": ("m", "bearings.*.peak_displacement.radial"),
+    "bearing_load_ratio": ("", "bearings.*.minimum_load_ratio"),
+    "closure_error": ("", "energy.closure_error"),
+    "wall_time": ("s", "wall_time"),
+}
 
 
 class Row(NamedTuple):
@@ -56,7 +80,7 @@ class Row(NamedTuple):
         return {**about, **self.summary}
 
 
-def row_of(number: int, variation: Variation, result: Result, file: Path | None) -> Row:
+def row_of(number: int, variation: Variation, result: Result | BuildingResult, file: Path | None) -> Row:
     """The row of a run; the result itself is not kept."""
     return Row(number, variation.source, variation.varied, result.summary, "" if file is None else file.name)
 
@@ -82,23 +106,36 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
         ("scene", ""): [row.source for row in rows],
         **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
     }
-    for name, (unit, path) in COLUMNS.items():
-        key, each, _ = path.partition(".*")
-        values = [summary_value(row.summary, key) for row in rows]
-        if not each:
+    for name, (unit, path) in _known(rows).items():
+        values = [summary_value(row.summary, path) for row in rows]
+        if ".*" not in path:
             table[name, unit] = [plain_cell(value) for value in values]
             continue
-        for index in range(max(map(len, values), default=0)):
-            table[f"{name}_{index + 1}", unit] = [v[index] if index < len(v) else None for v in values]
+        for index in range(max(map(len, filter(None, values)), default=0)):
+            table[f"{name}_{index + 1}", unit] = [v[index] if v and index < len(v) else None for v in values]
     return {**table, ("file", ""): [row.file for row in rows]}
 
 
+def of_building(summary: Mapping[str, Any]) -> bool:
+    """Whether this is the summary of a building."""
+    return "bearings" in summary
+
+
+def _known(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
+    """The columns that some of the rows have."""
+    kinds = {of_building(row.summary) for row in rows}
+    return {**(COLUMNS if False in kinds else {}), **(BUILDING_COLUMNS if True in kinds else {})}
+
+
 def summary_value(summary: Mapping[str, Any], path: str) -> Any:
-    """The value of a summary at a dotted path."""
+    """The value of a summary at a dotted path, None where it has none; `*` gives a list of the values of all rows."""
     value: Any = summary
-    for part in path.split("."):
-        value = value[part]
-    return value
+    head, each, rest = path.partition(".*")
+    for part in head.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    if not each or value is None:
+        return value
+    return [summary_value(row, rest.lstrip(".")) for row in value] if rest else value
 
 
 def plain_cell(value: Any) -> Any:
@@ -146,10 +183,11 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     if len(scenes) > 1 or not paths:
         leading["scene"] = [_short(Path(row.source).stem) for row in rows]
     varied = {path: [_short(str(row.varied.get(path, ""))) for row in rows] for path in paths}
+    forces = [row.summary["peak_base_shear" if of_building(row.summary) else "peak_top_force"] for row in rows]
     peaks = {
         "status": [str(row.summary["status"]) for row in rows],
         "u [mm]": [f"{row.summary['peak_displacement']['radial'] * 1e3:.2f}" for row in rows],
-        "F [kN]": [f"{row.summary['peak_top_force']['radial'] * 1e-3:.2f}" for row in rows],
+        "F [kN]": [f"{force['radial'] * 1e-3:.2f}" for force in forces],
         "rims": [str(len(row.summary["rims_met"])) for row in rows],
         "[ms]": [f"{row.summary['wall_time'] * 1e3:.0f}" for row in rows],
     }

@@ -9,11 +9,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import mmwrite
 from support import ROOT
 from support.buildings import PLACES
 
-from msfp_gen import BaseSlab, Building, Effects, InputError, Storey, Top, load_building, presets
+from msfp_gen import (
+    Auto,
+    BaseSlab,
+    Building,
+    BuildingScene,
+    Effects,
+    InputError,
+    Scene,
+    Storey,
+    Top,
+    load_scene,
+    presets,
+)
 from msfp_gen.buildings.file import building_from_table
+from msfp_gen.buildings.opening import load_bearing_scene
 
 TEXT = """
 name = "one storey"
@@ -79,7 +93,7 @@ def written(folder: Path, text: str = TEXT) -> Path:
 
 
 def test_a_file_gives_the_scene_of_python(tmp_path: Path):
-    scene = load_building(written(tmp_path))
+    scene = load_scene(written(tmp_path))
     storey = Storey(3.0, 12e3, (6e4, 6e4, 1.2e5), 9e6, 1.8e8, (0.3, 0.1))
     building = Building.shear(BaseSlab(24e3, (1.4e5, 1.4e5, 2.7e5)), [storey], 0.05)
     for name in ("mass", "damping", "stiffness"):
@@ -88,7 +102,8 @@ def test_a_file_gives_the_scene_of_python(tmp_path: Path):
     assert [each.bearing for each in scene.bearings] == [*3 * [corner], presets.bearing("fenz-tfp")]
     assert [each.position for each in scene.bearings] == list(PLACES)
     assert scene.bearings[0].interface == Top.node(1e7, 5e7, 1e6) != scene.bearings[2].interface
-    assert scene.bearings[1].effects == Effects(uplift=True) and scene.bearings[0].effects is None
+    assert scene.bearings[1].effects == Auto(uplift=True) and scene.bearings[0].effects is None
+    assert scene.modelled == (Effects(), Effects(uplift=True), Effects(), Effects())
     assert (scene.solver.max_step, scene.end, scene.name, scene.label(3)) == (
         0.01,
         1.0,
@@ -99,8 +114,75 @@ def test_a_file_gives_the_scene_of_python(tmp_path: Path):
 
 def test_a_reduced_frame(tmp_path: Path):
     text = TEXT.replace('damping_ratio = "5 %"', 'damping_ratio = "5 %"\nhighest_frequency = "5.5 Hz"')
-    sizes = [len(load_building(written(tmp_path, each)).building.mass) for each in (TEXT, text)]
+    sizes = [len(load_scene(written(tmp_path, each)).building.mass) for each in (TEXT, text)]
     assert sizes == [9, 8]  # without the mode of torsion
+
+
+MATRICES = """
+mass = "mass.mtx"
+stiffness = "frame.npz"
+damping_ratio = "5 %"
+
+[[building.node]]
+name = "base"
+coordinates = [0, 1, 2, 3, 4, 5]
+position = [0, 0, 0]
+"""
+
+
+def with_matrices(folder: Path) -> str:
+    """The same building by the files of its matrices."""
+    building = load_scene(written(folder)).building
+    mmwrite(folder / "mass.mtx", building.mass, precision=17)
+    np.savez(folder / "frame.npz", stiffness=building.stiffness)
+    start, end = TEXT.index('damping_ratio = "5 %"'), TEXT.index("[building.interface]")
+    return TEXT[:start] + MATRICES + TEXT[end:]
+
+
+def test_matrices_from_files(tmp_path: Path):
+    frame = load_scene(written(tmp_path))
+    scene = load_scene(written(tmp_path, with_matrices(tmp_path)))
+    for name in ("mass", "stiffness", "damping"):
+        wanted = getattr(frame.building, name)
+        assert np.abs(getattr(scene.building, name) - wanted).max() < 1e-12 * np.abs(wanted).max()
+    assert scene.axial_loads == pytest.approx(frame.axial_loads, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('stiffness = "frame.npz"', "", r"building\.stiffness is missing: give the path of a \.mtx or \.npz file"),
+        ('"mass.mtx"', '"none.mtx"', r"building\.mass = '.*none\.mtx': cannot be read .*check the file"),
+        ('"mass.mtx"', '"../mass.mtx"', r"building\.mass = '\.\./mass\.mtx': outside the folder of the scene file"),
+        ("[0, 1, 2, 3, 4, 5]", "[0, 1, 2, 3, 4]", r"building\.node\[0\]\.coordinates = .*: give 6 whole numbers"),
+        ("[0, 1, 2, 3, 4, 5]", "[0, 1, 2, 3, 4, 99]", r"building\.nodes\['base'\]: .* outside of 0"),
+        ("[[building.node]]", "[building.base]\nmass = 1\ninertia = [1, 1, 1]\n\n[[building.node]]", "not together"),
+    ],
+)
+def test_messages_of_matrices(tmp_path: Path, old, new, message):
+    text = with_matrices(tmp_path)
+    assert old in text
+    with pytest.raises(InputError, match=rf"building\.toml: .*{message}"):
+        load_scene(written(tmp_path, text.replace(old, new)))
+
+
+def test_common_effects_and_those_of_one_bearing():
+    given = table()
+    given["building"]["effects"] = {"rims": False}
+    scene = building_from_table(given)
+    assert [each.rims for each in scene.modelled] == [False, True, False, False]
+    given["building"]["effects"] = {"dimension": "planar"}
+    del given["building"]["bearing"][1]["effects"]
+    with pytest.raises(InputError, match="planar"):
+        building_from_table(given)
+
+
+def test_one_opener_for_scenes_and_buildings():
+    assert isinstance(load_scene("hospital-ccc"), BuildingScene) and isinstance(load_scene("fenz-test1"), Scene)
+    with pytest.raises(InputError, match=r"'hospital-ccc': this is a building; give a scene of one bearing"):
+        load_bearing_scene("hospital-ccc")
+    with pytest.raises(InputError, match="did you mean 'hospital-c"):
+        load_scene("hospital-cc")
 
 
 def table() -> dict:
@@ -150,10 +232,10 @@ def test_a_missing_interface_is_named():
 
 def test_messages_of_files_name_them(tmp_path: Path):
     with pytest.raises(InputError, match="no such file"):
-        load_building(tmp_path / "none.toml")
+        load_scene(tmp_path / "none.toml")
     path = written(tmp_path, TEXT.replace('mass = "24 t"', "mass = 0"))
     with pytest.raises(InputError, match=r"building\.toml: building\.base\.mass = 0: give"):
-        load_building(path)
+        load_scene(path)
 
 
 def test_examples_of_the_page(tmp_path: Path):
@@ -163,7 +245,7 @@ def test_examples_of_the_page(tmp_path: Path):
     assert names["result"].axial_force.min() > 0 and names["scene"].axial_loads.sum() == pytest.approx(900e3 * 9.8)
     (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     others = "".join(f'[[building.bearing]]\nbearing = "corner"\nposition = {place}\n' for place in OTHERS)
-    scene = load_building(written(tmp_path, text.replace("# ... further bearings", others)))
+    scene = load_scene(written(tmp_path, text.replace("# ... further bearings", others)))
     assert scene.axial_loads.sum() == pytest.approx(500e3 * 9.8)
 
 

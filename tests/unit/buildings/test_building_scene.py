@@ -9,6 +9,7 @@ import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, PLACES, frame, scene
 
 from msfp_gen import (
+    Auto,
     BaseSlab,
     Building,
     BuildingBearing,
@@ -118,11 +119,9 @@ def test_messages_of_bad_bearings():
         BuildingBearing(BEARING, INTERFACE, (1,))
     with pytest.raises(InputError, match=r"building_bearing\.interface = 1: give a NodeTop"):
         BuildingBearing(BEARING, 1)
-    made = scene(frame())
-    planar = replace(made.bearings[1], effects=Effects(dimension="planar"))
-    made = replace(made, bearings=[made.bearings[0], planar, *made.bearings[2:]])
-    with pytest.raises(InputError, match=r"scene\.bearings\[1\]: effects\.dimension = 'planar'"):
-        simulate(made)
+    for effects in (Effects(dimension="planar"), Auto(dimension="planar"), Effects(spin="free")):
+        with pytest.raises(InputError, match=r"building_bearing\.effects\.\w+ = '(planar|free)': .* give '"):
+            BuildingBearing(BEARING, INTERFACE, effects=effects)
 
 
 @pytest.mark.parametrize("option", [{"strict": True}, {"stream": "run.nc"}, {"gradients": ["motion.scale"]}])

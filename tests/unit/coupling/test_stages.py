@@ -42,7 +42,7 @@ def moved(port: TwoPort) -> list[float]:
 
 @pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
 def test_derivatives_are_those_of_the_stage(effects):
-    """Central differences of solved stages: displacements change with the rates by the diagonal entry times the step."""
+    """Central differences of solved stages, in which displacements change with the rates by beta."""
     port = TwoPort(BEARING, INTERFACE, LOAD, effects)
     compiled = port.compiled
     moved(port)
@@ -54,7 +54,8 @@ def test_derivatives_are_those_of_the_stage(effects):
     assert status == "ok"
     differences = np.zeros((6, 6))
     for k, change in enumerate(1e-4 * np.eye(6)):
-        pair = [compiled.stage(1, ends(start + beta * rates, rates))[1][1] for rates in (RATES + change, RATES - change)]
+        sides = (RATES + change, RATES - change)
+        pair = [compiled.stage(1, ends(start + beta * rates, rates))[1][1] for rates in sides]
         differences[:, k] = (pair[0] - pair[1]) / 2e-4
     scale = np.sqrt(np.abs(np.outer(np.diag(differences), np.diag(differences)))) + 1e-3 * np.abs(differences).max()
     assert np.abs(derivative - differences).max() > 0

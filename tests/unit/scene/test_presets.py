@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from msfp_gen import presets
+from msfp_gen.buildings.opening import load_scene
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Body, Surface
-from msfp_gen.scene.file.loader import load_scene
 from msfp_gen.scene.parts import Stop
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Layout
@@ -23,9 +23,10 @@ def test_catalogue_is_complete_and_described():
     kinds = {"single", "single-articulated", "double", "double-articulated", "quintuple"}
     expected |= {f"{kind}-push" for kind in (*kinds, "triple")}
     assert set(presets.names("scene")) == expected
-    bearings = {"fenz-tfp", "becker-tfp", "prototype-tfp"} | {f"{kind}-fp" for kind in kinds}
+    assert set(presets.names("building")) == {"hospital-ccc", "hospital-clc"}
+    bearings = {"fenz-tfp", "becker-tfp", "prototype-tfp", "building-tfp"} | {f"{kind}-fp" for kind in kinds}
     assert set(presets.names("bearing")) == bearings
-    assert presets.names() == presets.names("bearing") | presets.names("scene")
+    assert presets.names() == presets.names("bearing") | presets.names("scene") | presets.names("building")
     assert all(line and "\n" not in line for line in presets.names().values())
 
 
@@ -136,7 +137,7 @@ def test_earthquakes_shake_all_three_ways(station):
         (lambda: presets.scene("fenz-tets2"), "did you mean 'fenz-test2'?"),
         (lambda: presets.bearing("fenz"), "no preset of that name"),
         (lambda: presets.bearing("fenz-test2"), "bearing = 'fenz-test2'"),
-        (lambda: presets.names("motions"), "give 'bearing' or 'scene'"),
+        (lambda: presets.names("motions"), "give one of 'bearing', 'scene', 'building'"),
     ],
 )
 def test_unknown_names_are_refused(call, word):

@@ -35,16 +35,16 @@ from msfp_gen import (
     simulate,
     simulate_batch,
 )
+from msfp_gen.buildings.opening import changed_scene
 from msfp_gen.cli import main
 from msfp_gen.model import model as models
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
-from msfp_gen.scene.file.loader import changed_scene
-from msfp_gen.scene.file.parameter_sweep import variations, varied_field
 from msfp_gen.scene.scene import InitialState
 from msfp_gen.simulation import batch
+from msfp_gen.studies.sweep.variations import variations, varied_field
 
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
 

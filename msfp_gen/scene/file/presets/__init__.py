@@ -1,4 +1,4 @@
-"""Presets: bearings and scenes of PEER 2017/07, and others, by name. Their data are TOML files in this folder."""
+"""Presets: bearings, scenes and buildings, by name. Their data are TOML files in this folder."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def names(kind: str | None = None) -> dict[str, str]:
-    """Name -> one line of description, of the presets of a `kind` ("bearing" or "scene"), or of all."""
-    kinds = ("bearing", "scene") if kind is None else (kind,)
+    """Name -> one line of description, of the presets of a `kind` ("bearing", "scene", "building"), or of all."""
+    kinds = catalogue.KINDS if kind is None else (kind,)
     return {name: line for each in kinds for name, line in catalogue.descriptions(each).items()}
 
 
@@ -25,7 +25,10 @@ def bearing(name: str) -> Bearing:
 
 
 def scene(name: str) -> Scene:
-    """The scene `name`, such as "fenz-test2". Raises InputError for an unknown name."""
+    """The scene of one bearing `name`, such as "fenz-test2"; `load_scene` also opens buildings.
+
+    Raises InputError for an unknown name.
+    """
     from msfp_gen.scene.file.loader import scene_from_table
 
     return scene_from_table(catalogue.scene_table(name))

@@ -9,12 +9,13 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msfp_gen.buildings.opening import AnyScene, changed_scene
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.loader import changed_scene
+from msfp_gen.scene.file.changes import keys_of
+from msfp_gen.scene.scene import Scene
 
 if TYPE_CHECKING:
     from msfp_gen.scene.file.suite import SuiteRecord
-    from msfp_gen.scene.scene import Scene
 
 MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
 
@@ -24,14 +25,18 @@ class Variation(NamedTuple):
 
     source: str
     varied: Mapping[str, Any]
-    scene: Scene
+    scene: AnyScene
 
 
 def varied_field(text: str) -> tuple[str, list[Any]]:
     """Path and values of a field from a text such as `motion.scale=0.5,1,2`; values as in TOML. Raises InputError."""
     path, equals, values = text.partition("=")
     path = path.strip()
-    if not equals or not path or not all(path.split(".")):
+    try:
+        keys = keys_of(path) if equals else []
+    except InputError:
+        keys = []
+    if not keys:
         raise InputError(f"--vary = {text!r}: give a field of the scene and its values: motion.scale=0.5,1,2")
     try:
         found = tomllib.loads(f"values = [{values}]")["values"]
@@ -72,7 +77,8 @@ def variations(
 def _variation(source: str | Path, varied: dict[str, Any], record: SuiteRecord | None) -> Variation:
     scene = changed_scene(source, varied)
     if record is not None:
-        scene, varied = record.of(scene), {"record": record.name, **varied}
+        scene = record.of(scene) if isinstance(scene, Scene) else replace(scene, motion=record.motion)
+        varied = {"record": record.name, **varied}
     values_text = ", ".join(f"{path} = {value}" for path, value in varied.items())
     name = scene.name or Path(source).stem
     return Variation(str(source), varied, replace(scene, name=f"{name}, {values_text}" if values_text else name))

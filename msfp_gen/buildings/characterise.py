@@ -1,0 +1,204 @@
+"""Characterisation of a building on bearings: its isolation system as one loop, and what is left of each bearing."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import pi, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.analysis.characterise.loops import (
+    REVERSAL,
+    Loop,
+    closed_cycles,
+    effective_properties,
+    turning_points,
+)
+from msfp_gen.analysis.characterise.report import Characterisation
+from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
+from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
+from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.summary import floor_rows, storey_rows
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.tables import Table, yes
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.results.run_data import RunData
+
+STRAIGHT = 1e-3  # transverse displacement over the largest, up to which a motion is in one direction
+REST_SHARE, REST_MOVEMENT = 0.02, 0.01  # last part of a run, and movement in it over the peak, of a building at rest
+NO_CYCLES = "no cycle closes in one direction: no effective stiffness and damping; the secant ones are at the peak"
+
+
+@dataclass(frozen=True)
+class BearingDemand:
+    """Demand on one bearing.
+
+    number: from 1. name. peak_displacement: horizontal [m]. capacity_left: least of its surfaces [m].
+    minimum_load_ratio, maximum_load_ratio: N over N at rest [-]. residual_displacement [m]. dissipated [J].
+    """
+
+    number: int
+    name: str
+    peak_displacement: float
+    capacity_left: float
+    minimum_load_ratio: float
+    maximum_load_ratio: float
+    residual_displacement: float
+    dissipated: float
+
+
+@dataclass(frozen=True)
+class BuildingCharacterisation:
+    """Result of `characterise` for a building, in SI units; None for a quantity that is not defined.
+
+    Attributes:
+        name, status: of the run.
+        direction: unit vector (E1, E2) of the largest mean displacement of the bearings.
+        weight [N].
+        peak_displacement, peak_force: of the mean over the bearings [m], and of the base shear [N].
+        secant_stiffness: base shear along the largest displacement, divided by it [N/m].
+        secant_period: of the building as a rigid mass with it [s].
+        cycles: closed cycles of a motion in one direction, base shear over mean displacement.
+        residual_displacement [m]; at_rest: whether the building is at rest by then.
+        energy_dissipated: in all bearings [J].
+        peak_floor_acceleration: horizontal, of any floor [m/s^2]. peak_drift_ratio: of any storey; None without [-].
+        bearings: demands on each.
+        notes: what is not defined, and why.
+    """
+
+    name: str
+    status: str
+    direction: tuple[float, float]
+    weight: float
+    peak_displacement: float
+    peak_force: float
+    secant_stiffness: float
+    secant_period: float | None
+    cycles: tuple[Loop, ...]
+    residual_displacement: float
+    at_rest: bool
+    energy_dissipated: float
+    peak_floor_acceleration: float
+    peak_drift_ratio: float | None
+    bearings: tuple[BearingDemand, ...]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """The main quantities in ten lines at most."""
+        return "\n".join([f"Characterisation of {self.name or 'an unnamed building'}, status {self.status}",
+                          *(f"  {label:<18}{value}" for label, value in _rows(self))])  # fmt: skip
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        return asdict(self)
+
+
+def characterise(result: RunData | BuildingData) -> Characterisation | BuildingCharacterisation:
+    """Characterise a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
+
+    Raises InputError where nothing moved.
+    """
+    return characterise_building(result) if isinstance(result, BuildingData) else characterise_bearing(result)
+
+
+def characterise_building(result: BuildingData) -> BuildingCharacterisation:
+    """Characterise the run of a building. Raises InputError if its bearings did not move."""
+    u = np.mean([each.displacement for each in bearings_of(result)], axis=0)[:, :2]
+    size = np.hypot(*u.T)
+    if not (peak := float(size.max())):
+        raise InputError("characterise: the bearings did not move in this run; give a motion, or a longer duration")
+    row = int(size.argmax())
+    direction, force = u[row] / peak, result.base_reaction[:, :2]
+    stiffness = float(force[row] @ direction) / peak
+    cycles = cycles_of(u, force, direction)
+    rest = bool(np.hypot(*np.ptp(u[result.time >= (1 - REST_SHARE) * result.time[-1]], axis=0)) <= REST_MOVEMENT * peak)
+    gravity, weight = result.scene.gravity, result.scene.weight
+    notes = [] if cycles else [NO_CYCLES]
+    if not rest:
+        notes.append("the building still moves when the run ends, so that its last displacement is no residual one")
+    return BuildingCharacterisation(
+        name=result.scene.name,
+        status=result.status,
+        direction=(float(direction[0]), float(direction[1])),
+        weight=weight,
+        peak_displacement=peak,
+        peak_force=float(np.hypot(*force.T).max()),
+        secant_stiffness=stiffness,
+        secant_period=2 * pi * sqrt(weight / (gravity * stiffness)) if stiffness > 0 and gravity else None,
+        cycles=cycles,
+        residual_displacement=float(size[-1]),
+        at_rest=rest,
+        energy_dissipated=float(result.dissipated[-1].sum()),
+        peak_floor_acceleration=max(each["peak_acceleration"]["radial"] for each in floor_rows(result)),
+        peak_drift_ratio=max((each["peak_drift_ratio"] for each in storey_rows(result)), default=None),
+        bearings=tuple(map(_demand, bearings_of(result))),
+        notes=tuple(notes),
+    )
+
+
+def cycles_of(u: Array, force: Array, direction: Array) -> tuple[Loop, ...]:
+    """Closed cycles of a motion in one direction, none of any other."""
+    along, across = u @ direction, u @ np.array([-direction[1], direction[0]])
+    if np.abs(across).max() > STRAIGHT * np.abs(along).max():
+        return ()
+    shear = force @ direction
+    found = closed_cycles(along, turning_points(along, REVERSAL * float(np.ptp(along))))
+    return tuple(
+        effective_properties(along[start : end + 1], shear[start : end + 1], middle - start)
+        for start, middle, end in found
+    )
+
+
+def _demand(one: BearingResult) -> BearingDemand:
+    s = one.summary
+    return BearingDemand(
+        s["number"],
+        s["name"],
+        s["peak_displacement"]["radial"],
+        min(s["capacity_left"]),
+        s["minimum_load_ratio"],
+        s["maximum_load_ratio"],
+        float(np.hypot(*one.displacement[-1, :2])),
+        s["dissipated"],
+    )
+
+
+def _rows(found: BuildingCharacterisation) -> list[tuple[str, str]]:
+    period = "" if found.secant_period is None else f", period {found.secant_period:.3g} s"
+    cycles = [loop for loop in found.cycles if loop.effective_damping is not None]
+    effective = [
+        ("effective", f"stiffness {1e-6 * np.mean([x.effective_stiffness for x in cycles]):.4g} kN/mm, damping "
+         f"{100 * np.mean([x.effective_damping for x in cycles]):.3g} % of {len(cycles)} cycles")
+    ] if cycles else []  # fmt: skip
+    return [
+        ("peak displacement", f"{1e3 * found.peak_displacement:.4g} mm, mean of the bearings"),
+        ("peak base shear", f"{1e-6 * found.peak_force:.4g} MN ({found.peak_force / found.weight:.3f} of the weight)"),
+        ("at the peak", f"secant stiffness {1e-6 * found.secant_stiffness:.4g} kN/mm{period}"),
+        *effective,
+        ("residual", f"{1e3 * found.residual_displacement:.4g} mm" + ("" if found.at_rest else ", still moving")),
+        ("dissipated", f"{1e-3 * found.energy_dissipated:.4g} kJ in the bearings"),
+        *([("not defined", "; ".join(found.notes))] if found.notes else []),
+    ]
+
+
+def building_tables(found: BuildingCharacterisation) -> list[Table]:
+    """Tables of the isolation system and of the demands on its bearings."""
+    rows = [
+        (
+            str(each.number),
+            each.name or "-",
+            f"{1e3 * each.peak_displacement:.1f}",
+            f"{1e3 * each.capacity_left:.1f}",
+            yes(each.capacity_left <= 0),
+            f"{each.minimum_load_ratio:.2f} ... {each.maximum_load_ratio:.2f}",
+            f"{1e3 * each.residual_displacement:.2f}",
+            f"{1e-3 * each.dissipated:.1f}",
+        )
+        for each in found.bearings
+    ]
+    columns = ("no.", "name", "u [mm]", "left [mm]", "rim", "N / N at rest", "residual [mm]", "dissipated [kJ]")
+    system = Table(f"isolation system of {found.name or 'the building'}", (), _rows(found))
+    return [system, Table("bearings; left: least capacity less sliding", columns, rows)]

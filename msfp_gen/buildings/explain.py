@@ -1,0 +1,142 @@
+"""`msfp-gen explain` of a building: its frame, its bearings with the effects of each, motion and solver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.buildings.effects import remaining_loads
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.common.fields import ruled_fields
+from msfp_gen.common.tables import Table, vector
+from msfp_gen.scene import explain as one
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.opening import AnyScene
+
+LISTED = 12  # frequencies of the frame that are listed
+
+
+def explain(scene: AnyScene) -> list[Table]:
+    """Tables that describe a scene, of one bearing or of a building."""
+    return explain_building(scene) if isinstance(scene, BuildingScene) else one.explain(scene)
+
+
+def explain_building(scene: BuildingScene) -> list[Table]:
+    """Tables that describe a building: frame, bearings and their kinds, effects of each, motion, solver."""
+    return [
+        frame_table(scene),
+        bearing_table(scene),
+        *_kinds(scene),
+        *_interfaces(scene),
+        *map(one.motion_table, scene.grounds[0]),
+        *effect_tables(scene),
+        _solver(scene),
+    ]
+
+
+def frame_table(scene: BuildingScene) -> Table:
+    """Mass, coordinates, nodes and frequencies of the building."""
+    building, shown = scene.building, scene.building.frequencies[:LISTED]
+    more = f", ... of {len(building.frequencies)}" if len(building.frequencies) > LISTED else ""
+    rows = [
+        ("weight", f"{scene.weight * 1e-6:.5g} MN at g = {scene.gravity:g} m/s^2"),
+        ("coordinates", str(len(building.mass))),
+        ("nodes", ", ".join(f"{node.name} ({vector(node.position)} m)" for node in building.nodes)),
+        ("frequencies on fixed attachments", f"{vector(shown)}{more} Hz" if len(shown) else "none: a rigid body"),
+    ]
+    return Table("building", (), rows)
+
+
+def bearing_table(scene: BuildingScene) -> Table:
+    """The bearings: kind, place, load at rest."""
+    kinds = [kind.bearing for kind, _ in grouped(scene.bearings)]
+    rows = [
+        (
+            str(index + 1),
+            each.name or "-",
+            each.bearing.layout.name,
+            str(kinds.index(each.bearing) + 1),
+            each.node,
+            *(f"{x:.4g}" for x in scene.places[index]),
+            f"{load * 1e-3:.4g}",
+        )
+        for index, (each, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True))
+    ]
+    columns = ("no.", "name", "layout", "kind", "node", "x [m]", "y [m]", "N at rest [kN]")
+    return Table(f"{len(rows)} bearings", columns, rows)
+
+
+def effect_tables(scene: BuildingScene) -> Iterator[Table]:
+    """The effects of each bearing, those with the same ones together; loads that decide are the least of them."""
+    groups: dict[object, list[int]] = {}
+    for index, selection in enumerate(scene.effect_selections):
+        asked = tuple((reason.effect, reason.chosen) for reason in selection.reasons)
+        groups.setdefault((selection.effects, asked, scene.bearings[index].bearing), []).append(index)
+    for members in groups.values():
+        selection = scene.effect_selections[_decisive(scene, members)]
+        table = one.effect_table(selection, "monitors note where they do not suffice")
+        yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
+        yield from one.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
+
+
+def _decisive(scene: BuildingScene, members: Sequence[int]) -> int:
+    """The bearing of a group that keeps the least of its load."""
+    remaining = remaining_loads(scene)
+    return min(members, key=lambda index: float(remaining[index]))
+
+
+def grouped(bearings: Sequence[BuildingBearing]) -> list[tuple[BuildingBearing, list[int]]]:
+    """The bearings of a building, each kind of values once, with the indices of those that have them."""
+    found: list[tuple[BuildingBearing, list[int]]] = []
+    for index, each in enumerate(bearings):
+        for kind, members in found:
+            if kind.bearing == each.bearing:
+                members.append(index)
+                break
+        else:
+            found.append((each, [index]))
+    return found
+
+
+def _kinds(scene: BuildingScene) -> Iterator[Table]:
+    for number, (kind, members) in enumerate(grouped(scene.bearings), start=1):
+        for table in (one.surface_table(kind.bearing), *one.doubt_tables(kind.bearing), one.body_table(kind.bearing)):
+            where = _numbers(members, len(scene.bearings))
+            yield Table(f"kind {number}, {where}: {table.title}", table.columns, table.rows)
+
+
+def _interfaces(scene: BuildingScene) -> Iterator[Table]:
+    groups: dict[object, list[int]] = {}
+    for index, each in enumerate(scene.bearings):
+        groups.setdefault(each.interface, []).append(index)
+    for interface, members in groups.items():
+        rows = [
+            (name.replace("_", " "), f"{getattr(interface, name):g} {getattr(rule, 'unit', '')}")
+            for name, rule, _ in ruled_fields(type(interface))
+        ]
+        yield Table(f"interface to the building, {_numbers(members, len(scene.bearings))}", (), rows)
+
+
+def _solver(scene: BuildingScene) -> Table:
+    solver = scene.solver
+    rows = [
+        ("method", f"{solver.method}: building and bearings together"),
+        ("rtol", f"{solver.rtol:g}, relative error of a step"),
+        ("longest step", "resolution of the motion" if solver.max_step is None else f"{solver.max_step:g} s"),
+        ("rows", f"every {scene.row_step:g} s"),
+        ("ends at", f"{scene.end:.6g} s"),
+    ]
+    return Table("solver", (), rows)
+
+
+def _numbers(members: Iterable[int], count: int) -> str:
+    """Numbers of bearings in words: ranges together."""
+    numbers = np.array(sorted(members)) + 1
+    if len(numbers) == count:
+        return "all bearings" if count > 1 else "the bearing"
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    shown = ", ".join(f"{run[0]}" if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
+    return f"bearing{'s' if len(numbers) > 1 else ''} {shown}"

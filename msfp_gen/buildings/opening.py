@@ -1,0 +1,71 @@
+"""`load_scene`: the scene of a file or a preset, of one bearing or of a building."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from msfp_gen.buildings.file import FILES, building_from_table
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.changes import changed_table
+from msfp_gen.scene.file.loader import scene_from_table, scene_table
+from msfp_gen.scene.file.motion_tables import resolved
+from msfp_gen.scene.scene import Scene
+
+AnyScene = Scene | BuildingScene
+
+
+def load_scene(source: str | Path) -> AnyScene:
+    """The scene in a TOML file, or the preset of that name. Paths inside a file are relative to it.
+
+    A file with a table `[building]` gives a `BuildingScene`. Raises InputError of one line that names the file, the
+    path of the field, the value and the remedy.
+    """
+    return changed_scene(source, {})
+
+
+def load_bearing_scene(source: str | Path) -> Scene:
+    """The scene of one bearing in a file or preset. Raises InputError as `load_scene` does, and for a building."""
+    scene = load_scene(source)
+    if not isinstance(scene, Scene):
+        raise InputError(f"scene = {str(source)!r}: this is a building; give a scene of one bearing here")
+    return scene
+
+
+def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> AnyScene:
+    """The scene of `load_scene(source)` with some fields changed.
+
+    changes: path of a field, such as `motion.scale`, `bearing.surfaces[0].friction` or
+    `building.bearing[*].bearing.friction` -> value. Raises InputError as `load_scene` does.
+    """
+    table, path = scene_table(source)
+    try:
+        return scene_of(changed_table(table, changes), None if path is None else path.parent)
+    except InputError as error:
+        if path is None:
+            raise
+        raise InputError(f"{path}: {error}") from None
+
+
+def scene_of(table: Mapping[str, Any], folder: Path | None = None) -> AnyScene:
+    """The scene of a plain table, as in a file; `folder`: as in `scene_from_table`. Raises InputError."""
+    return (building_from_table if "building" in table else scene_from_table)(table, folder)
+
+
+def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """The table of a scene with absolute paths of its files; `folder`: as in `scene_from_table`. Raises InputError."""
+    found = dict(table)
+    for part, names in FILES.items():
+        inner = found.get(part)
+        if isinstance(inner, Mapping):
+            paths = {name: resolved(inner[name], folder, f"{part}.{name}") for name in names if name in inner}
+            found[part] = {**inner, **paths}
+    return found
+
+
+def files_of(table: Mapping[str, Any]) -> list[str]:
+    """The files that the table of a scene names, in its order."""
+    given = [table[part].get(name) for part, names in FILES.items() for name in names if part in table]
+    return [path for each in given if each is not None for path in ([each] if isinstance(each, str) else each)]

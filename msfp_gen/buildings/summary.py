@@ -1,0 +1,204 @@
+"""Summary of a building: the numbers that `msfp-gen run --json` prints, its tables and its few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.analysis.brief import MAX_NOTES, html_of, text_of
+from msfp_gen.buildings.bearing_result import bearings_of, peaks
+from msfp_gen.buildings.notes import energy_error, notes_of
+from msfp_gen.common.tables import Table, yes
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.data import BuildingData
+
+
+def summarise(result: BuildingData) -> dict[str, Any]:
+    """Summary of a run as plain data, ready for JSON; SI units. Peaks are along E1, E2, E3 and in the plane (`radial`).
+
+    Keys:
+        name, status, message, notes: of the run. duration: simulated time [s].
+        peak_displacement: across any bearing [m].
+        weight [N]. peak_base_shear: of the ground on all bearings [N]; base_shear_ratio: radial, over the weight.
+        peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
+        minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
+        rims_met: bearings (from 1) of which a slider reached its rim.
+        peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey [-].
+        floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground [m].
+        storeys: of each, name, height [m], peak_drift [m], peak_drift_ratio [-], peak_shear [N], peak_torsion [N m].
+        bearings: see `BearingResult.summary`.
+        energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings) at
+            the end [J]; closure_error of the balance of the building [-].
+        counters: trials and tangents. wall_time [s]. real_time_factor: simulated time over wall time; None if unknown.
+    """
+    scene, duration = result.scene, float(result.time[-1] - result.time[0])
+    bearings = [each.summary for each in bearings_of(result)]
+    floors, storeys = floor_rows(result), storey_rows(result)
+    shear = peaks(result.base_reaction)
+    return {
+        "name": scene.name,
+        "status": result.status,
+        "message": result.message,
+        "notes": [note.line for note in notes_of(result)],
+        "duration": duration,
+        "peak_displacement": _largest([each["peak_displacement"] for each in bearings]),
+        "weight": scene.weight,
+        "peak_base_shear": shear,
+        "base_shear_ratio": shear["radial"] / scene.weight,
+        "peak_base_torsion": float(np.abs(result.base_torsion).max()),
+        "peak_twist": float(np.abs(result.node(scene.bearings[0].node)[:, 0, 5]).max()),
+        "minimum_load_ratio": min(each["minimum_load_ratio"] for each in bearings),
+        "maximum_load_ratio": max(each["maximum_load_ratio"] for each in bearings),
+        "rims_met": [each["number"] for each in bearings if each["rims_met"]],
+        "peak_floor_acceleration": _largest([each["peak_acceleration"] for each in floors]),
+        "peak_drift_ratio": max((each["peak_drift_ratio"] for each in storeys), default=None),
+        "floors": floors,
+        "storeys": storeys,
+        "bearings": bearings,
+        "energy": {
+            "peak_kinetic": float(result.kinetic.max()),
+            "peak_strain": float(result.strain.max()),
+            "damped": float(result.damped[-1]),
+            "dissipated": float(result.dissipated[-1].sum()),
+            "closure_error": energy_error(result)[0],
+        },
+        "counters": dict(result.counts),
+        "wall_time": result.wall_time,
+        "real_time_factor": duration / result.wall_time if result.wall_time > 0 else None,
+    }
+
+
+def floor_rows(result: BuildingData) -> list[dict[str, Any]]:
+    """Peaks of every node, as of `summarise`."""
+    rows = []
+    for node in result.scene.building.nodes:
+        motion = result.node(node.name)
+        moved = motion[:, 0, :3] - result.ground[:, 0]
+        acceleration = peaks(motion[:, 2, :3])
+        height = float(node.position[2])
+        rows.append(
+            {"name": node.name, "height": height, "peak_acceleration": acceleration, "peak_displacement": peaks(moved)}
+        )
+    return rows
+
+
+def storey_rows(result: BuildingData) -> list[dict[str, Any]]:
+    """Peaks of every storey, as of `summarise`."""
+    nodes, drift, force = result.scene.building.nodes, result.drift, result.storey_force
+    rows = []
+    for index, column in enumerate(result.scene.building.columns):
+        height = float(nodes[index + 1].position[2] - nodes[index].position[2])
+        drifts = peaks(drift[:, index, :3])
+        rows.append(
+            {
+                "name": column.name,
+                "height": height,
+                "peak_drift": drifts,
+                "peak_drift_ratio": drifts["radial"] / height,
+                "peak_shear": peaks(force[:, index, :3]),
+                "peak_torsion": float(np.abs(force[:, index, 5]).max()),
+            }
+        )
+    return rows
+
+
+def _largest(given: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: max(each[key] for each in given) for key in given[0]}
+
+
+def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
+    """Label and value of the main results, nine rows at most."""
+    s = summarise(result)
+    moved, shear, acceleration = s["peak_displacement"], s["peak_base_shear"], s["peak_floor_acceleration"]
+    drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
+    rows = [
+        ("status", result.status + (f": {result.message}" if result.message else "")),
+        ("time", f"{result.time[-1]:.6g} s in {len(result.time) - 1} steps, {result.wall_time:.3g} s"),
+        ("bearings", f"{len(bearings_of(result))}, peak displacement {1e3 * moved['radial']:.4g} mm"),
+        ("base shear", f"{1e-6 * shear['radial']:.4g} MN ({s['base_shear_ratio']:.3f} of the weight)"),
+        ("floors", f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}"),
+        ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
+        ("rims met", ", ".join(result.scene.label(number - 1) for number in s["rims_met"]) or "none"),
+    ]
+    lines = [note.line for note in notes_of(result)]
+    more = f"; {len(lines) - MAX_NOTES} more in .notes" if len(lines) > MAX_NOTES else ""
+    return [*rows, *([("notes", "; ".join(lines[:MAX_NOTES]) + more)] if lines else [])]
+
+
+def brief_text(result: BuildingData) -> str:
+    """The main results, ten lines at most."""
+    return text_of(f"Result of {result.scene.name or 'an unnamed building'}", brief_rows(result))
+
+
+def brief_html(result: BuildingData) -> str:
+    """The main results as a table, beside the orbit of the bearing that moves most."""
+    most = max(bearings_of(result), key=lambda each: peaks(each.displacement)["radial"])
+    x, y = most.displacement[:, :2].T
+    return html_of(result.scene.name, brief_rows(result), x, y, f"orbit of {most.label}")
+
+
+def summary_tables(result: BuildingData) -> list[Table]:
+    """Tables of the run, its floors, storeys and bearings."""
+    summary = summarise(result)
+    rows = [*brief_rows(result), ("energy", _energy(summary["energy"])), ("twist", f"{summary['peak_twist']:.3g} rad")]
+    rows = [row for row in rows if row[0] != "notes"]
+    tables = [Table(summary["name"] or "unnamed building", (), rows), _floors(summary["floors"])]
+    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), bearing_table(result)]
+
+
+def _energy(energy: Mapping[str, float]) -> str:
+    return (
+        f"bearings dissipate {1e-3 * energy['dissipated']:.4g} kJ, the frame {1e-3 * energy['damped']:.4g} kJ; balance "
+        f"of the frame closes to {energy['closure_error']:.2g}"
+    )
+
+
+def _floors(floors: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        (
+            each["name"],
+            f"{each['height']:g}",
+            *(f"{each['peak_acceleration'][key]:.3f}" for key in ("E1", "E2", "E3")),
+            *(f"{1e3 * each['peak_displacement'][key]:.1f}" for key in ("E1", "E2")),
+        )
+        for each in reversed(floors)
+    ]
+    columns = ("floor", "z [m]", "a1 [m/s^2]", "a2", "a3", "u1 [mm]", "u2")
+    return Table("peaks of floors: absolute acceleration, displacement from the ground", columns, rows)
+
+
+def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        (
+            each["name"],
+            *(f"{1e3 * each['peak_drift'][key]:.2f}" for key in ("E1", "E2")),
+            f"{100 * each['peak_drift_ratio']:.3f}",
+            *(f"{1e-6 * each['peak_shear'][key]:.3f}" for key in ("E1", "E2")),
+            f"{1e-6 * each['peak_torsion']:.3f}",
+        )
+        for each in reversed(storeys)
+    ]
+    columns = ("storey", "drift 1 [mm]", "drift 2", "[% height]", "shear 1 [MN]", "shear 2", "torsion [MN m]")
+    return Table("peaks of storeys", columns, rows)
+
+
+def bearing_table(result: BuildingData) -> Table:
+    """Peaks of every bearing."""
+    rows = [
+        (
+            str(each["number"]),
+            each["name"] or "-",
+            f"{1e3 * each['peak_displacement']['radial']:.1f}",
+            f"{1e-3 * each['peak_top_force']['radial']:.1f}",
+            f"{1e-3 * each['axial_load']:.1f}",
+            f"{each['minimum_load_ratio']:.2f} ... {each['maximum_load_ratio']:.2f}",
+            f"{1e3 * min(each['capacity_left']):.1f}",
+            yes(each["rims_met"]),
+        )
+        for each in summarise(result)["bearings"]
+    ]
+    columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rim")
+    return Table("peaks of bearings; left: capacity less sliding", columns, rows)

@@ -1,0 +1,272 @@
+"""Figures of a building on bearings: plan with orbits, profiles over the height, floor spectra, axial forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from msfp_gen.buildings.bearing_result import bearings_of
+from msfp_gen.buildings.summary import floor_rows, storey_rows
+from msfp_gen.common.arrays import Array
+from msfp_gen.figures.style import (
+    COLOURS,
+    FAINT,
+    HAIR,
+    INK,
+    LINE,
+    MILLI,
+    SMALL,
+    THIN,
+    headline,
+    page,
+    panels,
+    plain,
+    subscript,
+)
+from msfp_gen.motions.records.spectrum import response_spectrum
+from msfp_gen.results.sign import shown_sign
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.buildings.data import BuildingData
+
+ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance of two bearings
+ROUND = (1, 2, 5)  # magnifications are these times a power of ten
+LABELLED = 24  # bearings of a plan that are labelled, at most
+PERIODS = np.geomspace(0.03, 5.0, 120)  # of floor spectra [s]
+DAMPING = 0.05  # of floor spectra
+G = 9.80665  # of accelerations in figures [m/s^2]
+AXES = range(3)
+
+
+def plot_plan(result: BuildingData, path: str | Path | None = None) -> Figure:
+    """Plan with the orbit of every bearing, magnified, its peak, and the centre of mass.
+
+    Raises InputError for a path that cannot be written.
+    """
+    with page(8.6, 7.0, path) as figure:
+        headline(figure, title_of(result))
+        draw_plan(figure.subplots(), result)
+    return figure
+
+
+def plot_profile(result: BuildingData, path: str | Path | None = None) -> Figure:
+    """Peaks over the height: floor accelerations, drifts of the storeys, storey shears over the weight.
+
+    Raises InputError for a path that cannot be written.
+    """
+    with page(11.5, 4.8, path) as figure:
+        headline(figure, title_of(result))
+        draw_profile(panels(figure, *PROFILES, sharey=True), result)
+    return figure
+
+
+def plot_floor_spectra(result: BuildingData, path: str | Path | None = None) -> Figure:
+    """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3.
+
+    Raises InputError for a path that cannot be written.
+    """
+    names = [node.name for node in result.scene.building.nodes]
+    spectra = {"ground": _spectrum(result.time, result.ground[:, 2])}
+    spectra |= {name: _spectrum(result.time, result.node(name)[:, 2, :3]) for name in names}
+    with page(11.5, 4.6, path) as figure:
+        headline(figure, f"{title_of(result)}: floor spectra, {100 * DAMPING:g} % damping")
+        row = panels(figure, *(f"along E{subscript(axis + 1)}" for axis in AXES))
+        for axis, axes in zip(AXES, row, strict=True):
+            for index, (name, values) in enumerate(spectra.items()):
+                style: dict[str, Any] = (
+                    {"color": FAINT, "linestyle": "--"} if name == "ground" else {"color": _floor_colour(index - 1)}
+                )
+                axes.plot(PERIODS, values[:, axis] / G, label=plain(name), **style)
+            axes.set(
+                xscale="log", xlabel="period T [s]", ylabel=f"pseudo-acceleration along E{subscript(axis + 1)} [g]"
+            )
+            axes.set_xlim(PERIODS[0], PERIODS[-1])
+            axes.set_ylim(bottom=0.0)
+            axes.set_xticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
+            axes.minorticks_off()
+        row[-1].legend(loc="upper left", bbox_to_anchor=(1.01, 1))
+    return figure
+
+
+def plot_axial_forces(result: BuildingData, path: str | Path | None = None) -> Figure:
+    """Axial force of every bearing: over time, over that at rest, and the range of each.
+
+    Raises InputError for a path that cannot be written.
+    """
+    with page(11.5, max(4.6, 1.5 + 0.22 * len(result.scene.bearings)), path) as figure:
+        headline(figure, title_of(result))
+        left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
+        draw_axial_history(left, result)
+        draw_axial_ranges(right, result)
+    return figure
+
+
+def plot_building(result: BuildingData, path: str | Path | None = None) -> Figure:
+    """Overview: plan with orbits, profiles over the height, range of the axial force of every bearing.
+
+    Raises InputError for a path that cannot be written.
+    """
+    with page(13.0, 8.6, path) as figure:
+        headline(figure, _overview_title(result))
+        (above,), (below,) = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.35, 1))
+        left, right = above.subplots(1, 2, width_ratios=(1.35, 1))
+        draw_plan(left, result)
+        draw_axial_ranges(right, result)
+        draw_profile(panels(below, *PROFILES, sharey=True), result)
+    return figure
+
+
+def draw_plan(axes: Axes, result: BuildingData) -> None:
+    """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
+    scene, bearings = result.scene, bearings_of(result)
+    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
+    factor = _magnification(scene.places, peak)
+    for one, place in zip(bearings, scene.places, strict=True):
+        u = shown_sign().factor * factor * one.displacement[:, :2]
+        axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
+        axes.plot(*place, marker="s", markersize=3.5, color=INK, linestyle="none")
+        if len(bearings) <= LABELLED:
+            own = 1e3 * float(np.hypot(*one.displacement[:, :2].T).max())
+            name = scene.bearings[one.index].name or str(one.index + 1)
+            axes.annotate(
+                f"{plain(name)}: {own:.0f} mm",
+                place + np.array([0.0, -factor * peak]),
+                textcoords="offset points",
+                xytext=(0, -3),
+                ha="center",
+                va="top",
+                fontsize=SMALL,
+                color=INK,
+            )
+    axes.plot(*scene.mass_centre, marker="+", markersize=10, color=COLOURS[1], linestyle="none", label="centre of mass")
+    axes.set(
+        title=f"Orbits of the bearings, u = {shown_sign().difference}, {factor:g} times as large as the plan",
+        xlabel="E₁ [m]",
+        ylabel="E₂ [m]",
+    )
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.12)
+    axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.06), borderaxespad=0.0)
+
+
+PROFILES = ("Peak floor acceleration", "Peak drift of the storeys", "Peak storey shear over the weight")
+
+
+def draw_profile(row: list[Axes], result: BuildingData) -> None:
+    """Three panels over the height: accelerations of floors, drift ratios and shears of storeys, along E1 and E2."""
+    floors, storeys = floor_rows(result), storey_rows(result)
+    heights = [each["height"] for each in floors]
+    ground = np.abs(result.ground[:, 2]).max(axis=0)
+    for axis in AXES:
+        key, colour = f"E{axis + 1}", COLOURS[axis]
+        peaks = [each["peak_acceleration"][key] / G for each in floors]
+        row[0].plot(peaks, heights, marker="o", markersize=4, color=colour, label=f"E{subscript(axis + 1)}")
+        row[0].plot(ground[axis] / G, heights[0], marker="x", color=colour, linestyle="none")
+        if axis < 2 and storeys:
+            drifts = [100 * each["peak_drift"][key] / each["height"] for each in storeys]
+            shears = [each["peak_shear"][key] / result.scene.weight for each in storeys]
+            base = float(np.abs(result.base_reaction[:, axis]).max()) / result.scene.weight
+            for axes, values in ((row[1], drifts), (row[2], shears)):
+                axes.stairs(values, heights[: len(values) + 1], orientation="horizontal", color=colour, linewidth=LINE)
+            row[2].plot(base, heights[0], marker="x", color=colour, linestyle="none")
+    row[0].plot([], [], marker="x", color=FAINT, linestyle="none", label="ground")
+    row[2].plot([], [], marker="x", color=FAINT, linestyle="none", label="below the bearings")
+    row[0].set(xlabel="acceleration [g]", ylabel="height z [m]")
+    row[1].set_xlabel("drift over the height of the storey [%]")
+    row[2].set_xlabel("shear V / W [-]")
+    row[0].legend(loc="best")
+    row[2].legend(loc="best")
+    for axes in row:
+        axes.set_xlim(left=0.0)
+        axes.set_yticks(heights, [f"{each['name']}\n{each['height']:g}" for each in floors])
+
+
+def draw_axial_history(axes: Axes, result: BuildingData) -> None:
+    """Axial force over that at rest over time, the bearings with the least and the largest value highlighted."""
+    ratio = result.axial_force / result.scene.axial_loads
+    chosen = dict.fromkeys((int(ratio.min(axis=0).argmin()), int(ratio.max(axis=0).argmax())))
+    for index in range(ratio.shape[1]):
+        if index not in chosen:
+            axes.plot(result.time, ratio[:, index], color=FAINT, linewidth=0.4, alpha=0.5)
+    for colour, index in zip(COLOURS, chosen, strict=False):
+        label = result.scene.label(index)
+        axes.plot(result.time, ratio[:, index], color=colour, linewidth=HAIR, label=plain(label))
+    axes.axhline(0.0, color=INK, linewidth=THIN)
+    axes.set(title="Axial force over that at rest", xlabel="time t [s]", ylabel="N / N at rest [-]")
+    axes.margins(x=0.01)
+    axes.legend(loc="upper right", ncols=2)
+
+
+def draw_axial_ranges(axes: Axes, result: BuildingData) -> None:
+    """Least, greatest and resting axial force of every bearing [kN]."""
+    scene, force = result.scene, 1e-3 * result.axial_force
+    number = np.arange(len(scene.bearings))
+    low, high = force.min(axis=0), force.max(axis=0)
+    axes.barh(number, high - low, left=low, height=0.55, color=COLOURS[5], label="range")
+    axes.plot(1e-3 * scene.axial_loads, number, marker="|", markersize=9, color=INK, linestyle="none", label="at rest")
+    names = [plain(each.name or str(index + 1)) for index, each in enumerate(scene.bearings)]
+    shown = number[:: max(1, len(number) // 40)]
+    axes.set_yticks(shown, [names[index] for index in shown])
+    axes.invert_yaxis()
+    axes.axvline(0.0, color=INK, linewidth=THIN)
+    axes.set(title="Axial force of every bearing", xlabel="N [kN]", ylabel="bearing")
+    axes.set_xlim(left=min(0.0, float(low.min())))
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=2, borderaxespad=0.0)
+
+
+def title_of(result: BuildingData) -> str:
+    """Name of the run; of a failed one with the time that it reached."""
+    name = result.scene.name or "unnamed building"
+    return name if result.succeeded else f"{name}, run failed ({result.status}) at t = {result.time[-1]:.4g} s"
+
+
+def _overview_title(result: BuildingData) -> str:
+    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings_of(result))
+    shear = float(np.hypot(*result.base_reaction[:, :2].T).max()) / result.scene.weight
+    return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
+
+
+def _magnification(places: Array, peak: float) -> float:
+    """Factor on orbits in the plan: the largest fits between neighbours; a round number."""
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    apart = float(gaps[gaps > 1e-9].min(initial=np.inf)) if len(places) > 1 else 1.0
+    wanted = ORBIT * (apart if np.isfinite(apart) else 1.0) / peak if peak > 0 else 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(each for each in ROUND if each * power <= wanted * (1 + 1e-9)))
+
+
+def _floor_colour(index: int) -> str:
+    return COLOURS[index % len(COLOURS)]
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """The acceleration of a floor as a motion."""
+
+    time: Array
+    values: Array
+
+    @property
+    def max_step(self) -> float:
+        return 2 * float(np.diff(self.time).min())
+
+    @property
+    def duration(self) -> float:
+        return float(self.time[-1])
+
+    def acceleration(self, t: ArrayLike) -> Array:
+        return np.column_stack([np.interp(np.asarray(t), self.time, column) for column in self.values.T])
+
+
+def _spectrum(time: Array, values: Array) -> Array:
+    """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
+    found: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
+    psa: Array = found.psa[:, :3]
+    return psa

@@ -1,0 +1,171 @@
+"""What the HTML report of a building shows: tables, data of the view, figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.buildings.characterise import building_tables
+from msfp_gen.buildings.explain import explain_building
+from msfp_gen.buildings.summary import summary_tables
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.report.frames import FEWEST, packed
+from msfp_gen.version import __version__
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.result import BuildingResult
+    from msfp_gen.common.arrays import Array
+
+SCALES = (1, 2, 5, 10, 20, 50, 100)
+SHOWN = 0.12  # displacement in the view over the size of the building, about
+EDGE = 0.06  # of a floor beyond the outermost bearings, over the size of the plan
+FIGURES = {
+    "plan": "Plan with the orbits of all bearings",
+    "profile": "Peaks over the height",
+    "spectra": "Floor spectra",
+    "axial": "Axial force of every bearing",
+}
+SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
+TERMS = (
+    ("friction pendulum bearing", "steel sliders in spherical dishes, between a structure and its foundation. It "
+     "slides when the ground moves, friction dissipates energy, and the weight on the curved dishes brings it back."),
+    ("u", "horizontal displacement across a bearing: base less top, less its value at the start."),
+    ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
+     "the bearing would lift off."),
+    ("base shear", "horizontal force of the ground on all bearings."),
+    ("drift", "horizontal displacement of a floor relative to that below, tilt of the floors taken out."),
+    ("storey shear", "force that accelerates the floors above."),
+    ("floor spectrum", "largest response of oscillators of a period that stand on a floor, with 5 % damping."),
+    ("left", "capacity of a surface less its sliding: what remains until the slider meets the rim of its dish."),
+    ("rim", "the raised edge of a dish. Inner sliders of a triple pendulum meet theirs in strong motion."),
+)  # fmt: skip
+
+
+def scale_of(result: BuildingResult) -> int:
+    """The magnification with which the view opens: displacements are seen and bearings stay apart."""
+    peak = max(each.summary["peak_displacement"]["radial"] for each in result.bearings)
+    wanted = SHOWN * _size(result) / peak if peak > 0 else 1.0
+    return max((scale for scale in SCALES if scale <= wanted), default=1)
+
+
+def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
+    """Data for the scripts, ready for JSON: lengths [m], forces [N], accelerations [m/s^2], axes E1, E2, E3."""
+    scene, rows = result.scene, _rows(result, count)
+    nodes = [result.node(node.name)[rows] for node in scene.building.nodes]
+    motion = np.stack([each[:, 0] for each in nodes], axis=1)
+    motion[..., :3] -= result.ground[rows, None, 0]
+    low, high = _plan(result)
+    size = _size(result)
+    bearings = [each.displacement[rows] for each in result.bearings]
+    mean = np.mean(bearings, axis=0)
+    left = np.stack([(each.capacity - each.sliding[rows]).min(axis=1) for each in result.bearings], axis=1)
+    heights = np.diff([node.position[2] for node in scene.building.nodes])
+    drift = np.hypot(*np.moveaxis(result.drift[rows, :, :2], -1, 0))
+    frames = {
+        "time": result.time[rows],
+        "node": motion,
+        "ground": result.ground[rows, 0],
+        "top": -np.stack(bearings, axis=1),
+        "ratio": result.axial_force[rows] / scene.axial_loads,
+        "left": left,
+        "mean": mean,
+        "shear": result.base_reaction[rows, :2],
+        "acceleration": np.stack([each[:, 2, :3] for each in nodes], axis=1),
+        "drift": drift / heights[: drift.shape[1]] if drift.shape[1] else drift,
+    }
+    return {
+        "peak": int(np.hypot(*mean[:, :2].T).argmax()),
+        "azimuth": 0.0,
+        "surfaces": [],
+        "events": [],
+        "nodes": [{"name": node.name, "position": node.position.tolist()} for node in scene.building.nodes],
+        "plates": bool(scene.building.columns),
+        "storeys": [column.name for column in scene.building.columns],
+        "places": [[*place, _level(result, index)] for index, place in enumerate(scene.places.tolist())],
+        "labels": [each.name or str(index + 1) for index, each in enumerate(scene.bearings)],
+        "loads": scene.axial_loads.tolist(),
+        "plan": [low, high],
+        "size": size,
+        "height": max(float(node.position[2]) for node in scene.building.nodes),
+        "depth": 0.05 * size,
+        "radius": 0.022 * size,
+        "scale": scale_of(result),
+        "frames": {name: packed(values) for name, values in frames.items()},
+    }
+
+
+def summary_page(result: BuildingResult) -> list[Table]:
+    """Tables of the run, without times of the machine."""
+    first, *others = summary_tables(result)
+    rows = [row for row in first.rows if row[0] != "time"]
+    return [Table("the run", (), [("time simulated", f"{result.time[-1]:.6g} s"), *rows]), *others]
+
+
+def characterisation_page(result: BuildingResult) -> list[Table]:
+    """Tables of the isolation system and its bearings; none if these did not move."""
+    try:
+        return building_tables(result.characterise())
+    except InputError:
+        return []
+
+
+def settings_page(result: BuildingResult) -> list[Table]:
+    """Tables of frame, bearings, effects, motion and solver."""
+    return explain_building(result.scene)
+
+
+def provenance_table(result: BuildingResult) -> Table:
+    """Versions and counters."""
+    rows = {**result.provenance, **{name: str(count) for name, count in result.counts.items()}}
+    return Table("versions and counters", (), [(name.replace("_", " "), text) for name, text in rows.items()])
+
+
+def introduction(result: BuildingResult) -> str:
+    """One sentence about building and program."""
+    scene = result.scene
+    storeys = f"{len(scene.building.columns)} storeys" if scene.building.columns else "a structure"
+    return (
+        f"Simulation of {storeys} on {len(scene.bearings)} friction pendulum bearings, weight "
+        f"{1e-6 * scene.weight:.4g} MN, by msfp-gen {result.provenance.get('msfp_gen', __version__)}."
+    )
+
+
+def explanation(frames: int, rows: int) -> str:
+    """What charts and view show."""
+    return (
+        "The frame moves relative to the ground unless the box is cleared; displacements are drawn larger than the "
+        f"frame by the chosen factor. Charts and view show {frames} instants of {rows} rows; the summary uses all "
+        "rows. Click a chart to move to an instant."
+    )
+
+
+def _rows(result: BuildingResult, count: int) -> Array:
+    """Rows of the view: evenly in time, with the peaks of displacement and axial force."""
+    time = result.time
+    even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
+    peaks = [int(np.hypot(*each.displacement[:, :2].T).argmax()) for each in result.bearings]
+    least = result.axial_force.argmin(axis=0).tolist()
+    return np.unique([*even.round().astype(int), *peaks, *least])
+
+
+def _plan(result: BuildingResult) -> tuple[list[float], list[float]]:
+    """Corners of the floors: the outermost bearings and an edge."""
+    places = result.scene.places
+    low, high = places.min(axis=0), places.max(axis=0)
+    edge = max(EDGE * float(np.linalg.norm(high - low)), 1.0)
+    return (low - edge).tolist(), (high + edge).tolist()
+
+
+def _size(result: BuildingResult) -> float:
+    """Diagonal of plan and height [m]."""
+    low, high = map(np.array, _plan(result))
+    height = max(float(node.position[2]) for node in result.scene.building.nodes)
+    return float(np.hypot(np.linalg.norm(high - low), height))
+
+
+def _level(result: BuildingResult, index: int) -> float:
+    """Height of the upper end of a bearing [m]."""
+    scene = result.scene
+    return float(scene.building.node(scene.bearings[index].node).position[2])

@@ -1,0 +1,229 @@
+"""What the result of a building offers: few lines, summary, bearings, dataset, files, notes, characterisation."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.buildings import MOTION, PLACES, frame, scene
+
+from msfp_gen import Auto, BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
+from msfp_gen.buildings.characterise import cycles_of
+from msfp_gen.buildings.notes import TEXTS
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.summary import summary_tables
+
+
+@cache
+def made() -> BuildingScene:
+    """Four bearings, of which two have names, under a short push along E1 and E2."""
+    given = scene(
+        frame(),
+        motion=Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1),
+        duration=0.8,
+        output_step=0.02,
+        name="frame",
+    )
+    bearings = [replace(each, name=name) for each, name in zip(given.bearings, ("A", "B", "", ""), strict=True)]
+    return replace(given, bearings=bearings)
+
+
+@cache
+def result() -> BuildingResult:
+    return simulate(made())
+
+
+def test_few_lines():
+    lines = repr(result()).splitlines()
+    assert len(lines) <= 10 and lines[0] == "Result of frame" and "status" in lines[1]
+    html = result()._repr_html_()
+    assert "<polyline" in html and "orbit of bearing" in html and "base shear" in html
+    assert repr(result().bearings[1]).startswith("Bearing 2 (B), 5_2_2 at (-3, 2) m")
+    assert all(table.text for table in summary_tables(result()))
+
+
+def test_summary_is_that_of_the_rows():
+    found, s = result(), result().summary
+    assert json.loads(json.dumps(s)) == s
+    weight = made().axial_loads.sum()
+    assert s["weight"] == pytest.approx(weight, rel=1e-9)
+    shear = np.hypot(*found.base_reaction[:, :2].T).max()
+    assert s["peak_base_shear"]["radial"] == shear and s["base_shear_ratio"] == pytest.approx(shear / weight)
+    roof = found.node("floor 3")[:, 2, :2]
+    assert s["floors"][3]["peak_acceleration"]["radial"] == np.hypot(*roof.T).max()
+    assert s["storeys"][0]["peak_drift_ratio"] == s["storeys"][0]["peak_drift"]["radial"] / 3.0
+    assert s["minimum_load_ratio"] == (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
+    assert s["peak_displacement"]["E1"] == np.abs(found.bearing_displacement[:, :, 0]).max() > 0
+    assert [each["position"] for each in s["bearings"]] == [list(place) for place in PLACES]
+    assert s["wall_time"] > 0 and s["counters"]["steps"] > 0 and s["notes"] == [] and s["rims_met"] == []
+
+
+def test_bearings_have_the_signs_of_a_run_of_one_bearing():
+    """u is base less top, and F, the force of the bearing on what stands on it, has the sign of u while sliding on."""
+    for index, one in enumerate(result().bearings):
+        assert one.displacement == pytest.approx(-result().bearing_displacement[:, index], abs=1e-15)
+        row = int(np.hypot(*one.displacement[:, :2].T).argmax())
+        assert one.top_force[row, :2] @ one.displacement[row, :2] > 0
+        assert one.axial_force == pytest.approx(one.top_force[:, 2])
+    total = sum(one.top_force for one in result().bearings)
+    inertia = result().base_reaction
+    assert np.abs(total - inertia)[:, :2].max() < 0.02 * np.abs(inertia).max()  # inertia of the bearings themselves
+
+
+def test_torsion_of_the_base_is_that_of_the_masses():
+    """Its moment about the centre of mass is what turns the building."""
+    building, found = made().building, result()
+    motions = building.rigid_motions
+    moments = found.acceleration @ (building.mass @ motions)
+    x, y = made().mass_centre
+    about = moments[:, 5] - x * moments[:, 1] + y * moments[:, 0]
+    assert np.abs(found.base_torsion - about).max() < 0.05 * np.abs(about).max()
+    assert np.abs(about).max() > 0
+
+
+def test_dataset_states_units_and_signs():
+    dataset = result().dataset
+    for name, variable in dataset.data_vars.items():
+        assert variable.attrs["units"] and variable.attrs["long_name"], name
+    assert dataset["bearing_displacement"].attrs["sign"] == "base less top"
+    assert dataset["axial_force"].attrs["sign"] == "compression" and dataset["drift"].sizes["storey"] == 3
+    top = dataset["node_acceleration"].sel(node="floor 3", freedom="u1").to_numpy()
+    assert np.array_equal(top, result().node("floor 3")[:, 2, 0])
+
+
+def test_a_file_gives_the_same_result(tmp_path: Path):
+    path = result().to_netcdf(tmp_path / "frame.nc")
+    read = BuildingResult.from_netcdf(path)
+    assert read.summary == result().summary and read.provenance == result().provenance
+    for name in ("displacement", "acceleration", "ground", "wrench", "dissipated"):
+        assert np.array_equal(getattr(read, name), getattr(result(), name))
+    assert read.scene.modelled == made().modelled and read.scene.motion == made().motion
+    again = simulate(read.scene)
+    assert np.array_equal(again.wrench, result().wrench)
+
+
+def test_damaged_and_foreign_files_are_refused(tmp_path: Path):
+    path = result().save(tmp_path / "frame.nc")
+    content = bytearray(path.read_bytes())
+    with pytest.raises(InputError, match="no such file"):
+        BuildingResult.from_netcdf(tmp_path / "none.nc")
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        file["sliding"][3, 1, 2] += 1e-6
+    with pytest.raises(InputError, match="a value was changed after this file was written"):
+        BuildingResult.from_netcdf(path)
+    (tmp_path / "short.nc").write_bytes(content[: len(content) // 2])
+    with pytest.raises(InputError, match="no netCDF-4 file that can be read"):
+        BuildingResult.from_netcdf(tmp_path / "short.nc")
+    from msfp_gen.result import Result
+
+    with pytest.raises(InputError, match="no result of msfp-gen"):
+        Result.from_netcdf(result().to_netcdf(tmp_path / "again.nc"))
+
+
+def test_tables_hold_every_column(tmp_path: Path):
+    path = result().save(tmp_path / "frame.csv")
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    assert len(rows) == len(result().time)
+    drift = np.array([float(row["drift_storey_1_u1 [m or rad]"]) for row in rows])
+    assert np.array_equal(drift, result().drift[:, 0, 0])
+    for suffix in (".mat", ".parquet"):
+        assert result().save(tmp_path / f"frame{suffix}").stat().st_size > 1e4
+    with pytest.raises(InputError, match="give a name that ends in"):
+        result().save(tmp_path / "frame.txt")
+
+
+def test_bearings_of_other_layouts_have_no_values_where_they_have_no_surface():
+    from msfp_gen import presets
+
+    given = made()
+    single = replace(given.bearings[0], bearing=presets.bearing("single-fp").replace(gravity=given.gravity))
+    found = simulate(replace(given, bearings=[single, *given.bearings[1:]], duration=0.1))
+    values = found.dataset["sliding"].to_numpy()
+    assert np.isfinite(values[:, 0, 0]).all() and np.isnan(values[:, 0, 1:]).all() and np.isfinite(values[:, 1:]).all()
+    assert len(found.bearings[0].summary["peak_sliding"]) == 1
+
+
+def test_a_failed_run_states_how_it_ended():
+    with pytest.raises(RunError) as caught:
+        simulate(replace(made(), solver=Solver(max_steps=3)))
+    found = caught.value.result
+    assert isinstance(found, BuildingResult) and found.status == "steps" and found.message == str(caught.value)
+    assert "steps" in repr(found)
+
+
+def test_monitors_name_the_bearing():
+    given = made()
+    bearings = [*given.bearings[:2], replace(given.bearings[2], effects=Auto(rims=False)), given.bearings[3]]
+    found = replace(result(), scene=replace(given, bearings=bearings))
+    found.sliding[2][5:, 1] += 1.0
+    found.normal_force[0][7, 2] = 0.0
+    try:
+        notes = found.notes
+        assert [(note.kind, note.surface, note.time) for note in notes] == [("rims", 2, 0.1), ("uplift", 3, 0.14)]
+        assert notes[0].text.startswith("bearing 3: a slider is ") and notes[1].text.startswith("bearing 1 (A): ")
+        assert {note.kind for note in notes} < set(TEXTS) and "notes" in repr(found)
+    finally:
+        found.sliding[2][5:, 1] -= 1.0
+        found.normal_force[0][7, 2] = result().normal_force[0][6, 2]
+
+
+def test_characterisation_of_the_isolation_system():
+    found = characterise(result())
+    assert found.cycles == () and "no cycle closes" in found.notes[0] and len(found.bearings) == 4
+    assert len(repr(found).splitlines()) <= 10
+    assert json.dumps(found.as_dict(), allow_nan=False)
+    assert found.secant_stiffness > 0 and found.peak_force == result().summary["peak_base_shear"]["radial"]
+    with pytest.raises(InputError, match="did not move"):
+        characterise(replace(result(), displacement=0 * result().displacement, support=0 * result().support))
+
+
+def test_cycles_of_a_motion_along_one_axis():
+    """Base shear k u + Q sign(v) over u = A sin: k_eff = k + Q/A, energy 4 Q A."""
+    time = np.linspace(0.25, 3.25, 3001)
+    k, strength, amplitude, direction = 2e6, 3e5, 0.1, np.array([0.6, 0.8])
+    u, rate = amplitude * np.sin(2 * np.pi * time), np.cos(2 * np.pi * time)
+    force = k * u + strength * np.sign(rate)
+    found = cycles_of(np.outer(u, direction), np.outer(force, direction), direction)
+    assert len(found) == 3
+    assert found[0].energy_dissipated == pytest.approx(4 * strength * amplitude, rel=1e-2)
+    assert found[0].zero_displacement_force == pytest.approx(strength, rel=1e-6)
+    sideways = np.outer(u, direction) + np.outer(np.cos(time), [0.01, 0.0])
+    assert cycles_of(sideways, np.outer(force, direction), direction) == ()
+
+
+def test_effects_of_each_bearing_are_selected_and_explained():
+    from msfp_gen.buildings.explain import explain
+
+    given = made()
+    assert given.modelled == 4 * (Effects(),)
+    lifted = replace(given, motion=replace(MOTION, coefficients=_vertical(MOTION.coefficients)))
+    assert all(effects.uplift for effects in lifted.modelled)
+    mixed = replace(given, bearings=[replace(given.bearings[0], effects=Effects(rims=False)), *given.bearings[1:]])
+    text = "\n".join(table.text for table in explain(mixed))
+    assert "bearing 1: effects as given" in text and "bearings 2-4: effects selected" in text
+    assert "of the load at rest remains" in text and "4 bearings" in text
+
+
+def _vertical(coefficients: np.ndarray) -> np.ndarray:
+    """A motion along E1 as one along E3, ten times as large."""
+    changed = np.zeros_like(coefficients)
+    changed[:, 2] = 10 * coefficients[:, 0]
+    return changed
+
+
+def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
+    given = made()
+    own = [replace(each, motion=MOTION) if each.name else each for each in given.bearings]
+    found = simulate(replace(given, bearings=own, duration=0.2))
+    read = BuildingResult.from_netcdf(found.save(tmp_path / "frame.nc"))
+    assert [each.motion == MOTION for each in read.scene.bearings] == [True, True, False, False]
+    assert read.scene.bearings[2].motion is None and np.array_equal(read.support, found.support)
+    assert read.summary == found.summary

@@ -1,0 +1,204 @@
+"""Bounds, batches, sweeps and studies of a building: as of one bearing."""
+
+from __future__ import annotations
+
+import csv
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from msfp_gen import BuildingScene, InputError, bound, changed_scene, simulate, simulate_batch, study
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.cli import main
+from msfp_gen.studies.bounding import load_factors
+from msfp_gen.studies.bounding.figure import plot_bounds
+from msfp_gen.studies.bounding.tables import bounding_tables, write_quantities
+from msfp_gen.studies.study.loader import load_study
+
+TEXT = """
+name = "slab"
+duration = 0.24
+output_step = "20 ms"
+
+[building.base]
+mass = "45 t"
+inertia = [1.4e5, 1.4e5, 2.7e5]
+
+[building.interface]
+stiffness = 1e7
+vertical_stiffness = 5e7
+rotational_stiffness = 1e6
+
+[bearings.corner]
+preset = "fenz-tfp"
+contact_damping = 1e-4
+
+[[building.bearing]]
+bearing = "corner"
+position = [3, 2]
+
+[[building.bearing]]
+bearing = "corner"
+position = [-3, 2]
+
+[[building.bearing]]
+bearing = "corner"
+position = [0, -2]
+
+[motion]
+kind = "ramp"
+acceleration = 2.0
+duration = 0.3
+
+"""
+FRICTION = "building.bearing[*].bearing.surfaces[0].friction"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "slab.toml"
+    file.write_text(TEXT, encoding="utf-8")
+    return file
+
+
+@cache
+def alone(folder: Path, friction: float) -> BuildingResult:
+    return simulate(changed_scene(folder / "slab.toml", {FRICTION: friction}))
+
+
+def test_bounds_multiply_the_properties_of_every_bearing(path: Path, tmp_path: Path):
+    scene = changed_scene(path, {})
+    assert isinstance(scene, BuildingScene)
+    found = bound(scene, load_factors("asce7"))
+    assert found.succeeded and [case.name for case in found.cases] == ["lower", "nominal", "upper"]
+    factors = found.lambdas["friction"]
+    for case in found.cases:
+        for one, given in zip(case.scene.bearings, scene.bearings, strict=True):
+            wanted = [s.friction * f for s, f in zip(given.bearing.surfaces, factors[case.name], strict=True)]
+            assert [surface.friction for surface in one.bearing.surfaces] == pytest.approx(wanted)
+    shears = [case.result.summary["peak_base_shear"]["radial"] for case in found.cases]
+    assert shears[0] < shears[1] < shears[2] and found.quantities()["peak_base_shear"]["upper"] == shears[2]
+    assert found.governing()["peak_base_shear"] == "upper"
+    assert json.dumps(found.as_dict(), allow_nan=False) and all(table.text for table in bounding_tables(found))
+    plot_bounds(found, tmp_path / "bounds.png")
+    rows = list(csv.reader(write_quantities(found, tmp_path / "bounds.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row[0] for row in rows if "floor" in row[0]] == ["peak_floor_acceleration [m/s^2]"]
+    assert found.bearing == scene.bearings[0].bearing
+
+
+def test_a_batch_gives_the_results_of_simulate(path: Path):
+    scenes = [changed_scene(path, {FRICTION: value}) for value in (0.02, 0.06)]
+    results = simulate_batch(scenes, workers=2)
+    for scene, result in zip(scenes, results, strict=True):
+        assert isinstance(result, BuildingResult) and result.scene is scene
+    assert np.array_equal(results[1].wrench, alone(path.parent, 0.06).wrench)
+
+
+def test_a_sweep_of_the_command_line(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    table, folder = tmp_path / "sweep.csv", tmp_path / "runs"
+    arguments = ["--vary", f"{FRICTION}=0.02,0.06", "--table", str(table), "-o", str(folder), "--workers", "1"]
+    assert main(["batch", str(path), *arguments]) == 0
+    assert "F [kN]" in capsys.readouterr().out and len(list(folder.iterdir())) == 2
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert [row[FRICTION] for row in rows] == ["0.02", "0.06"]
+    peak = alone(path.parent, 0.06).summary["peak_base_shear"]["radial"]
+    assert float(rows[1]["peak_base_shear [N]"]) == peak > float(rows[0]["peak_base_shear [N]"])
+    assert {"floor_acceleration_1 [m/s^2]", "bearing_displacement_3 [m]"} <= set(rows[0])
+    assert not any(name.startswith("peak_top_force") for name in rows[0])
+    assert main(["batch", str(path), "--vary", "building.bearing[7].name='x'"]) == 2
+    assert "there are 3 of them" in capsys.readouterr().err
+
+
+STUDY = """
+name = "friction of a slab"
+scene = "slab.toml"
+keep = ["peak_base_shear", "bearing_displacement"]
+
+[quantities]
+ratio = "peak_base_shear / 441000"
+
+[axes.mu]
+multiplies = "building.bearing[*].bearing.friction"
+surfaces = [1, 4]
+values = [0.8, 1.2]
+
+[axes.soft]
+sets = "building.interface.vertical_stiffness"
+values = ["50 MN/m"]
+
+[axes.second]
+sets = "building.bearing[1].bearing.surfaces[1].friction"
+values = [0.02]
+"""
+
+
+def test_a_study_takes_a_building(path: Path, tmp_path: Path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY, encoding="utf-8")
+    found = load_study(file)
+    scene = found.scene(2)
+    assert isinstance(scene, BuildingScene) and found.runs == 2
+    assert [s.friction for s in scene.bearings[0].bearing.surfaces] == pytest.approx([0.036, 0.017, 0.017, 0.1284])
+    assert scene.bearings[1].bearing.surfaces[1].friction == 0.02
+    assert scene.bearings[2].interface.vertical_stiffness == 5e7
+    outcome = study(file, tmp_path / "runs", workers=1, threads=True)
+    assert outcome.runs == outcome.done == 2 and outcome.failed == 0
+    rows = parquet.read_table(next((tmp_path / "runs").glob("part-*.parquet"))).to_pydict()
+    wanted = simulate(scene).summary
+    assert rows["peak_base_shear"][1] == wanted["peak_base_shear"]["radial"] > rows["peak_base_shear"][0]
+    assert rows["bearing_displacement_3"][1] == wanted["bearings"][2]["peak_displacement"]["radial"]
+    assert rows["ratio"][1] == pytest.approx(rows["peak_base_shear"][1] / 441000)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("bearing[*]", "bearing[5]", r"axes\.mu.*there are 3 bearings; give an index from 0 to 2"),
+        ("surfaces = [1, 4]", "surfaces = [7]", "this bearing has surfaces 1 to 4"),
+        ('"peak_base_shear",', '"peak_top_force",', "'peak_top_force' is no quantity"),
+        ("peak_base_shear / 441000", "peak(displacement_E1)", "a building has no such history"),
+        ('"building.interface.vertical_stiffness"', '"building.interfaces.stiffness"', "interfaces: unknown key"),
+    ],
+)
+def test_messages_of_studies(path: Path, tmp_path: Path, old, new, message):
+    assert old in STUDY
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        load_study(file)
+
+
+def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    out = tmp_path / "out.nc"
+    assert main(["run", str(path), "-o", str(out), "--plot", str(tmp_path / "plot.png"), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["peak_base_shear"] == BuildingResult.from_netcdf(out).summary["peak_base_shear"]
+    assert main(["explain", str(path)]) == 0 and "all bearings: effects selected" in capsys.readouterr().out
+    assert main(["characterise", str(out)]) == 0 and "isolation system of slab" in capsys.readouterr().out
+    assert main(["plot", str(out), "--figure", "plan", "-o", str(tmp_path / "plan.svg")]) == 0
+    assert main(["export", str(out), "-o", str(tmp_path / "n.csv"), "--columns", "axial_force"]) == 0
+    assert "axial_force_3 [N]" in (tmp_path / "n.csv").read_text(encoding="utf-8")
+    assert main(["run", str(path)]) == 0 and "peaks of bearings" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--error", "1%"], "--error = 0.01: this is a building"),
+        (["animate", "-o", "x.gif"], "this is a building"),
+        (["fit", "test.csv", "--parameters", "bearing.friction"], "this is a building"),
+        (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
+        (["export", "-o", "x.csv", "--sign", "top-base"], "columns of a building have one sign"),
+    ],
+)
+def test_what_a_building_has_not_is_said_in_one_line(path, arguments, words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command, *options = arguments
+    assert main([command, str(path), *options]) == 2
+    err = capsys.readouterr().err
+    assert words in err and err.count("\n") == 1
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["slab.toml"]

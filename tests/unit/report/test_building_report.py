@@ -1,0 +1,79 @@
+"""The HTML report of a building, and its figures."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.buildings import frame, scene
+
+from msfp_gen import Motion, simulate
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.figures import BUILDING_FIGURES
+from msfp_gen.report import TitleBlock, report_html
+from msfp_gen.report.building import building_view, scale_of
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage")
+
+
+@cache
+def result() -> BuildingResult:
+    motion = Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1)
+    return simulate(scene(frame(), motion=motion, duration=0.8, output_step=0.02, name="frame <b>"))
+
+
+@cache
+def page() -> str:
+    return report_html(result(), title=TitleBlock(project="block B"))
+
+
+def test_the_page_needs_no_other_file():
+    text = page()
+    assert not re.search(r"""(src|href)=["']?(https?:|//|file:)""", text) and "block B" in text
+    assert "frame &lt;b&gt;" in text and "triple friction pendulum" in text
+    assert "peaks of bearings" in text and "isolation system" in text and "4 bearings" in text
+    assert text.count("data:image/png") == 4
+
+
+def test_the_view_holds_the_motion_of_the_frame():
+    data = building_view(result(), 1500)
+    assert data["frames"]["time"]["shape"] == [len(result().time)]
+    assert data["frames"]["node"]["shape"] == [len(result().time), 4, 6] and data["plates"]
+    assert json.dumps(data, allow_nan=False)
+    mean = np.mean([np.hypot(*each.displacement[:, :2].T) for each in result().bearings], axis=0)
+    assert data["peak"] == int(mean.argmax()) and data["scale"] == scale_of(result()) >= 1
+    assert data["places"][1] == [-3.0, 2.0, 0.0] and data["loads"] == result().scene.axial_loads.tolist()
+
+
+def test_few_instants_keep_the_peaks():
+    few = building_view(result(), 3)
+    assert 3 <= few["frames"]["time"]["shape"][0] <= len(result().time)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to draw the page")
+def test_a_browser_draws_it(tmp_path: Path):
+    path = tmp_path / "frame.html"
+    path.write_text(page(), encoding="utf-8")
+    command = [CHROMIUM, *FLAGS, "--virtual-time-budget=10000", "--dump-dom", path.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    dom = done.stdout
+    assert 'data-ready="true"' in dom
+    rows = re.findall(r'<tr><th scope="row"><span class="swatch"[^>]*></span>(\d)</th>((?:<td>[^<]*</td>)+)', dom)
+    assert [row[0] for row in rows] == ["1", "2", "3", "4"]
+    peak = building_view(result(), 1500)["peak"]
+    shown = float(re.findall(r"<td>([^<]*)</td>", rows[0][1])[0].replace("−", "-"))
+    assert shown == pytest.approx(1e3 * result().bearings[0].displacement[peak, 0], abs=0.06)
+
+
+@pytest.mark.parametrize("name", BUILDING_FIGURES)
+def test_every_figure_is_drawn(name, tmp_path: Path):
+    path = tmp_path / f"{name}.png"
+    BUILDING_FIGURES[name](result(), path)
+    assert path.stat().st_size > 1e4
