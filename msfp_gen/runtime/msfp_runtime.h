@@ -7,7 +7,6 @@
 #ifndef MSFP_RUNTIME_H
 #define MSFP_RUNTIME_H
 #include <stddef.h>
-#include "msfp_math.h"
 
 #ifdef __cplusplus
 extern "C" {

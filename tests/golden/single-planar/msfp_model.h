@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include "msfp_symbols.h"
 #include "msfp.h"
+#include "msfp_math.h"
 
 #define MSFP_N 2            /* bodies, base included */
 #define MSFP_NB 1           /* moving bodies = sliding surfaces */

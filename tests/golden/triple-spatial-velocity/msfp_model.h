@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include "msfp_symbols.h"
 #include "msfp.h"
+#include "msfp_math.h"
 
 #define MSFP_N 5            /* bodies, base included */
 #define MSFP_NB 4           /* moving bodies = sliding surfaces */
