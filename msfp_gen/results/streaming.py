@@ -14,9 +14,9 @@ from typing import Any
 
 from msfp_gen.common.output import replacing
 from msfp_gen.results.dataset import energy_variables, row_variables, to_dataset
-from msfp_gen.results.netcdf import digest_of_dataset
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import taken
+from msfp_gen.results.netcdf import digest_of_dataset
 from msfp_gen.results.reading import DIGEST
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest
