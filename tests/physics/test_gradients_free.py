@@ -79,7 +79,7 @@ def smooth_double() -> tuple[Scene, dict[str, float]]:
 def smooth_single() -> tuple[Scene, dict[str, float]]:
     """Quasi-static steps."""
     scene = replace(single(), duration=0.4, output_step=0.05)
-    scene = replace(scene, solver=replace(scene.solver, max_step=2e-3))
+    scene = replace(scene, solver=replace(scene.solver, rtol=1e-11, max_step=2e-3))
     return scene, COMMON | {"top.axial_load": 4e-3, "top.stiffness": 0.1, "initial_state.h[0][0]": 4e-2}
 
 
