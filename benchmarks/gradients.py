@@ -1,14 +1,20 @@
-"""Cost of gradients: `python benchmarks/gradients.py`, one minute. The table of docs/gradients.md.
+"""Cost of gradients: `python benchmarks/gradients.py`, two minutes. The tables of docs/gradients.md.
 
 Plain runs and runs with gradients alternate, and the least processor time of each counts, so that the ratios do not
-depend on the load of the machine.
+depend on the load of the machine. With `--instructions` callgrind counts instead, with vectors of AVX2.
 """
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+
+from instructions import AVX2, instructions
 
 from msfp_gen import Scene, load_scene
 from msfp_gen.model.model import build_model
@@ -17,7 +23,9 @@ from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.simulate import RunSequence
 
 REPEATS = 9
-PATHS = [f"bearing.surfaces[*].{name}" for name in ("friction", "radius", "yield_displacement", "capacity")]
+FIELDS = ("friction", "radius", "yield_displacement", "capacity")
+PATHS = [f"bearing.surfaces[{j}].{name}" for name in FIELDS for j in range(4)]
+COUNTS = (1, 4, 8, 16)
 SCENES = {"`fenz-test2`": "fenz-test2", "`fenz-test5`": "fenz-test5", "`becker-circle-88`": "becker-circle-88"}
 
 
@@ -40,18 +48,46 @@ def damped(name: str, rtol: float) -> Scene:
     return replace(scene, bearing=bearing, solver=solver, output_step=scene.end / 200)
 
 
+def shares_of_time(scene: Scene) -> tuple[list[float], int]:
+    """Cost of gradients over that of the run, for each number of parameters; and the steps of the run."""
+    shares, steps = [], 0
+    for count in COUNTS:
+        pairs = [(seconds(scene, ()), seconds(scene, PATHS[:count])) for _ in range(REPEATS)]
+        plain, full = (min(pair[i][0] for pair in pairs) for i in (0, 1))
+        shares.append(full / plain - 1)
+        steps = pairs[0][0][1]
+    return shares, steps
+
+
+def counted(name: str, rtol: float, count: int) -> int:
+    """Instructions of the integration with the first `count` parameters, in millions."""
+    text = f"import gradients; gradients.seconds(gradients.damped({name!r}, {rtol}), gradients.PATHS[:{count}])"
+    command = [sys.executable, "-c", text]
+    subprocess.run(command, check=True)  # builds the model
+    return instructions(command, "msfp_5_2_2_run_advance")
+
+
 def main() -> None:
-    """Print the table: cost of one parameter over that of the run."""
-    print("| run | steps | 4 parameters | 8 parameters | 16 parameters |\n|---|---|---|---|---|")
+    """Print the table: fixed cost, cost of a group, and cost of one parameter over that of the run."""
+    counting = "--instructions" in sys.argv
+    if counting:
+        if not shutil.which("valgrind"):
+            raise SystemExit("valgrind is not installed")
+        os.environ["MSFP_GEN_CFLAGS"] = AVX2
+        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
+    columns = " | ".join(f"{count}" for count in COUNTS)
+    print(f"| run | steps | fixed | a group | {columns} |\n|---|---|---|---|{'---|' * len(COUNTS)}")
     for title, name in SCENES.items():
-        for rtol in (1e-4, 1e-6):
-            scene, shares, steps = damped(name, rtol), [], 0
-            for paths in (PATHS[:1], PATHS[:2], PATHS):
-                pairs = [(seconds(scene, ()), seconds(scene, paths)) for _ in range(REPEATS)]
-                plain, full = (min(pair[i][0] for pair in pairs) for i in (0, 1))
-                shares.append(f"{100 * (full / plain - 1) / len(parameters_of(scene, paths)):.0f} %")
-                steps = pairs[0][0][1]
-            print(f"| {title}, rtol {rtol:g} | {steps} | {' | '.join(shares)} |", flush=True)
+        for rtol in (1e-4,) if counting else (1e-4, 1e-6):
+            if counting:
+                plain, *full = (counted(name, rtol, count) for count in (0, *COUNTS))
+                shares, steps = [each / plain - 1 for each in full], f"{plain / 1e6:.0f} million"
+            else:
+                shares, taken = shares_of_time(damped(name, rtol))
+                steps = str(taken)
+            group = shares[-1] - shares[-2]  # one more group of eight
+            parts = [shares[-2] - group, group, *(s / n for s, n in zip(shares, COUNTS, strict=True))]
+            print(f"| {title}, rtol {rtol:g} | {steps} | {' | '.join(f'{100 * p:.0f} %' for p in parts)} |", flush=True)
 
 
 if __name__ == "__main__":

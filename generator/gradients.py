@@ -7,7 +7,7 @@ the programs of `derive.py`, with other inputs active; nothing is derived again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from .program import Program, Use
@@ -61,18 +61,17 @@ def by_inputs(program: Program) -> Program:
     return replace(program, name="contact_by_inputs", inputs=[used(use) for use in program.inputs], tangents=results)
 
 
-def contact_lists(program: Program) -> dict[str, list[tuple[int, int]] | list[int]]:
+def contact_lists(programs: Iterable[Program]) -> dict[str, object]:
     """Inputs of `by_inputs` in order, as (position of the block, index in the block), and indices of its results."""
-    assert program.output is not None
-    return {
-        "inputs": [
-            (CONTACT_INPUTS.index(use.alias), i)
-            for use in program.inputs
-            for i, f in enumerate(use.block.fields)
-            if f.name in use.active
-        ],
-        "results": [i for i, f in enumerate(program.output.block.fields) if f.name in program.tangents],
-    }
+    for program in programs:
+        if not program.lanes or program.output is None:
+            continue
+        uses = [(CONTACT_INPUTS.index(use.alias), use) for use in program.inputs]
+        return {
+            "inputs": [(i, j) for i, use in uses for j, f in enumerate(use.block.fields) if f.name in use.active],
+            "results": [j for j, f in enumerate(program.output.block.fields) if f.name in program.tangents],
+        }
+    return {}
 
 
 def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from support import scene_of
@@ -61,6 +63,36 @@ def test_the_summary_has_derivatives_by_parameter() -> None:
     for key in ("rims_met", "counters", "energy"):
         with pytest.raises(InputError, match=f"gradient_summary: '{key}' has no derivative: .*; give one of peak_"):
             load[key]
+
+
+def test_a_file_holds_the_gradients(tmp_path: Path) -> None:
+    path = result().to_netcdf(tmp_path / "run.nc")
+    read = Result.from_netcdf(path)
+    assert read.gradient.identical(result().gradient)
+    for parameter, expected in result().gradient_summary.items():
+        found = read.gradient_summary[parameter]
+        assert list(found) == list(expected)
+        for name, value in expected.items():  # of two equal peaks rounding selects one
+            pairs = (list(each.values()) if isinstance(each, dict) else each for each in (found[name], value))
+            assert np.allclose(*pairs, rtol=1e-12, atol=0.0), (parameter, name)
+
+
+@pytest.mark.parametrize("name", ["top_force", "energy_kinetic"])
+def test_a_file_with_changed_gradients_is_refused(name: str, tmp_path: Path) -> None:
+    path = result().to_netcdf(tmp_path / "run.nc")
+    with h5py.File(path, "a") as file:
+        file["gradient"][name][...] *= 1.5
+    with pytest.raises(InputError, match="a value was changed after this file was written"):
+        Result.from_netcdf(path)
+
+
+@pytest.mark.parametrize("parameters", ["[]", "[{}]", "no JSON"])
+def test_a_file_with_damaged_parameters_is_refused(parameters: str, tmp_path: Path) -> None:
+    path = result().to_netcdf(tmp_path / "run.nc")
+    with h5py.File(path, "a") as file:
+        file["gradient"].attrs["parameters"] = parameters
+    with pytest.raises(InputError, match="give a file that `run -o` wrote"):
+        Result.from_netcdf(path)
 
 
 def test_without_gradients_there_is_none() -> None:

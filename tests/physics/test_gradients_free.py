@@ -1,0 +1,135 @@
+"""Gradients of runs against differences of runs that choose their own steps: smooth runs, and through rim contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import scene_of
+from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
+
+from msfp_gen import Effects, Motion, Scene, load_scene, simulate
+from msfp_gen.scene.parameters import changed_parameters, parameters_of
+
+COMMON = {
+    "bearing.surfaces[0].friction": 4e-3,
+    "bearing.surfaces[0].yield_displacement": 1e-2,
+    "bearing.surfaces[0].radius": 2e-3,
+    "bearing.bodies[0].height": 2e-3,
+    "motion.scale": 2e-3,
+}
+"""Parameters of every layout, with the steps of the differences over the parameter."""
+SPATIAL = {
+    "bearing.surfaces[0].contact_damping": 0.2,
+    "bearing.bodies[0].mass": 0.2,
+    "motion.direction": 1e-3,
+    "initial_state.h[0][0]": 4e-2,
+}
+RIG = {"top.axial_load": 4e-3, "top.rotational_stiffness": 2e-2, "top.stiffness": 0.1}
+RIMS = {"capacity": 1e-3, "rim_stiffness": 1e-2}
+LAW = {"bearing.surfaces[1].friction_slow": 1e-2, "bearing.surfaces[1].velocity_rate": 1e-2, "load.scale": 0.1}
+
+
+def fine(scene: Scene, rtol: float, output_step: float, max_step: float | None = None) -> Scene:
+    """The scene with steps of fourth order at a small tolerance.
+
+    max_step: where forces inside longer steps are interpolated less exactly than the differences need.
+    """
+    solver = replace(scene.solver, rtol=rtol, method="esdirk4", max_step=max_step)
+    return replace(scene, solver=solver, output_step=output_step, stop=None, motion_table=None)
+
+
+def check_free(scene: Scene, sizes: Mapping[str, float], limit: float, away: float = 0.0) -> None:
+    """Force and angles agree with differences to `limit` of the largest derivative and the noise of the differences.
+
+    Rows within `away` [s] of an event are left out, which the differences shift; and the first row. Differences must
+    know every derivative to a fiftieth, also that of a mass, on which the run hardly depends.
+    """
+    result = simulate(scene, gradients=list(sizes))
+    time = result.history.time
+    rows = ~np.any([np.abs(time - e.time) < away for e in result.events], axis=0) & (time > 0)
+    for index, parameter in enumerate(parameters_of(scene, list(sizes))):
+        step = step_of(parameter, sizes[parameter.path])
+        runs = [simulate(changed_parameters(scene, {parameter: v})).dataset for v in values_around(parameter, step)]
+        for name in ("top_force", "tilt"):
+            found, noise = derivative([run[name].values[rows] for run in runs], step)
+            largest: float = np.abs(found).max()
+            assert noise.max() <= 2e-2 * largest, (parameter.path, name, noise.max() / largest)
+            error = np.abs(result.gradient[name].values[index][rows] - found).max()
+            assert error <= limit * largest + noise.max(), (
+                parameter.path,
+                name,
+                error / largest,
+                noise.max() / largest,
+            )
+
+
+def smooth_triple() -> tuple[Scene, dict[str, float]]:
+    """The first quarter of a cycle: no slip reverses."""
+    return fine(triple(1.5), 1e-12, 0.1), COMMON | SPATIAL | RIG
+
+
+def smooth_double() -> tuple[Scene, dict[str, float]]:
+    """Below a mass on a vertical spring, with friction that depends on velocity."""
+    return fine(replace(double(), duration=0.3), 1e-12, 0.05, 1e-4), COMMON | SPATIAL | LAW | {"top.mass": 4e-3}
+
+
+def smooth_single() -> tuple[Scene, dict[str, float]]:
+    """Quasi-static steps."""
+    scene = replace(single(), duration=0.4, output_step=0.05)
+    scene = replace(scene, solver=replace(scene.solver, rtol=1e-11, max_step=2e-3))
+    return scene, COMMON | {"top.axial_load": 4e-3, "top.stiffness": 0.1, "initial_state.h[0][0]": 4e-2}
+
+
+def rims_triple() -> tuple[Scene, dict[str, float]]:
+    """Test 5 of PEER 2017/07 with damped contacts, until a slider has met its rim."""
+    scene = scene_of("fenz-test5", duration=26.0)
+    scene = replace(scene, bearing=scene.bearing.replace(**DAMPED))
+    return fine(scene, 1e-12, 0.5), COMMON | SPATIAL | RIG | {
+        f"bearing.surfaces[0].{name}": RIMS[name] for name in RIMS
+    }
+
+
+def rims_double() -> tuple[Scene, dict[str, float]]:
+    """A double pendulum whose upper slider meets its rim and stays there."""
+    scene = double()
+    bearing, top = scene.bearing.replace(capacity=[0.2, 0.1]), load_scene("double-push").top
+    scene = replace(scene, bearing=bearing, top=top, effects=Effects(friction="velocity"), duration=1.2)
+    scene = replace(scene, motion=Motion.harmonic(0.27, 0.2, cycles=1.0))
+    paths = COMMON | SPATIAL | RIG | LAW | {f"bearing.surfaces[1].{name}": RIMS[name] for name in RIMS}
+    return fine(scene, 1e-12, 0.1, 2e-4), paths | {"bearing.surfaces[1].rim_damping": 0.1}
+
+
+def rims_single() -> tuple[Scene, dict[str, float]]:
+    """A single pendulum that meets its rim twice and leaves it."""
+    effects = Effects(dimension="planar", sliders="massless")
+    scene = replace(single(), effects=effects, motion=Motion.harmonic(0.4, 0.5, cycles=2.0), duration=1.8)
+    return fine(scene, 1e-10, 0.05), COMMON | {f"bearing.surfaces[0].{name}": RIMS[name] for name in RIMS}
+
+
+Case = Callable[[], tuple[Scene, dict[str, float]]]
+slow = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "case", [smooth_single, pytest.param(smooth_double, marks=slow), pytest.param(smooth_triple, marks=slow)]
+)
+def test_differences_with_free_steps_in_smooth_runs(case: Case) -> None:
+    check_free(*case(), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("case", "away"),
+    [pytest.param(rims_single, 0.05, marks=slow), pytest.param(rims_double, 0.1, marks=slow),
+     pytest.param(rims_triple, 1.0, marks=slow)],
+)  # fmt: skip
+def test_differences_with_free_steps_through_rim_contacts(case: Case, away: float) -> None:
+    check_free(*case(), 1e-4, away)
+
+
+def test_a_short_check_of_a_triple_pendulum() -> None:
+    """Of every change: two parameters at a larger tolerance, with slip that reverses."""
+    scene = fine(triple(1.5), 1e-10, 0.1)
+    check_free(scene, {"bearing.surfaces[0].radius": 4e-3, "motion.scale": 4e-3}, 1e-5)

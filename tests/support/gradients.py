@@ -1,0 +1,73 @@
+"""Scenes whose runs are differentiated, and differences of runs with other values of a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from msfp_gen import Effects, Load, Motion, Scene, Top, load_scene
+from msfp_gen.scene.effect_selection import quasistatic
+from msfp_gen.scene.parameters import Parameter
+
+from . import Array, scene_of
+
+DAMPED = {"contact_damping": 1e-3}
+
+
+def single(hysteresis: str = "report") -> Scene:
+    """A single pendulum without masses and dampers in the plane, under two cycles: its steps are quasi-static."""
+    scene, motion = load_scene("single-push"), Motion.harmonic(0.1, 0.5, cycles=2.0)
+    effects = Effects(dimension="planar", sliders="massless", rims=False, bouc_wen=hysteresis)
+    bearing = scene.bearing.replace(rim_damping=0.0, mass=1e-3, inertia=1e-3)
+    scene = replace(scene, bearing=bearing, top=replace(scene.top, damping=0.0, stiffness=1e9))
+    scene = replace(
+        scene, motion=motion, duration=None, stop=None, motion_table=None, output_step=None, effects=effects
+    )
+    assert quasistatic(scene, effects)
+    return scene
+
+
+def double() -> Scene:
+    """A double pendulum with friction that depends on velocity below a mass on a vertical spring, under a load."""
+    scene = load_scene("double-push")
+    bearing = scene.bearing.replace(friction_slow=[0.02, 0.03], velocity_rate=20.0, **DAMPED)
+    top = Top.mass(2e4, (3e3, 5e3), 0.7, rotational_stiffness=1e6, vertical_stiffness=5e7, vertical_damping=2e4)
+    motion, load = Motion.harmonic(0.05, 0.5, cycles=2.0), Load.harmonic((500, 0, 300), frequency=0.7, cycles=2.0)
+    effects = Effects(friction="velocity", rims=False)
+    scene = replace(scene, bearing=bearing, top=top, motion=motion, load=load, effects=effects, stop=None)
+    return replace(scene, duration=None, motion_table=None, output_step=None)
+
+
+def triple(duration: float = 6.0, **solver: Any) -> Scene:
+    """The triple pendulum of PEER 2017/07 with damped contacts, at the start of test 2."""
+    scene = scene_of("fenz-test2", duration=duration)
+    scene = replace(scene, bearing=scene.bearing.replace(**DAMPED), output_step=None)
+    return replace(scene, solver=replace(scene.solver, **solver))
+
+
+STEPS = (1, 2, 4)
+SCALE = {"q": 1e-2, "v": 0.1, "h": 0.5}
+"""Sizes of the numbers of an initial state: those of a parameter that is zero."""
+
+
+def step_of(parameter: Parameter, size: float) -> float:
+    """The step of a difference: `size` times the value, or the natural size of a parameter that is zero."""
+    return size * (abs(parameter.value) or SCALE.get(parameter.field, 1.0))
+
+
+def values_around(parameter: Parameter, step: float) -> list[float]:
+    """Values for `derivative`."""
+    return [parameter.value + sign * k * step for k in STEPS for sign in (1, -1)]
+
+
+def derivative(values: Sequence[Array], step: float) -> tuple[Array, Array]:
+    """The derivative of sixth order from values at 1, -1, 2, -2, 4, -4 steps (Richardson), and its uncertainty.
+
+    The uncertainty is the difference of two derivatives of fourth order, from small and from large steps: truncation
+    and noise of the runs.
+    """
+    pairs = zip(STEPS, values[::2], values[1::2], strict=True)
+    one, two, four = ((above - below) / (2 * k * step) for k, above, below in pairs)
+    fine, coarse = one + (one - two) / 3, two + (two - four) / 3
+    return fine + (fine - coarse) / 15, abs(fine - coarse)
