@@ -84,8 +84,8 @@ def path(
 ) -> Any:
     """Horizontal forces, shape (rows, 2), under imposed displacements, of a served or a native triple pendulum.
 
-    parts: steps of the analysis from row to row. Vertically the served one is held, with a soft interface that keeps
-    its load; the native one has the load itself.
+    Vertically the served one is held, with a soft interface that keeps its load; the native one has the load itself.
+    parts: steps of the analysis from row to row.
     """
     ops = opensees()
     pair(ops)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support import ROOT
 from support.ends import LOAD, port, swing
 from support.standard import conforms
 from support.units import Unit, rig
@@ -55,6 +57,14 @@ def test_wrenches_and_derivatives_are_those_of_the_two_port_bit_by_bit(unit: Pat
             assert np.array_equal(found[:12], response.wrench.ravel())
             two_port.commit()
     assert np.abs(found).max() > 0.5 * LOAD
+
+
+def test_the_example_of_the_page_runs(unit: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(unit.parent)
+    page = (ROOT / "docs" / "fmu.md").read_text(encoding="utf-8")
+    names: dict[str, np.ndarray] = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    assert len(names["result"]) == 100 and np.abs(names["result"]["upper.force[1]"]).max() > 0.02 * LOAD
 
 
 def test_inputs_at_the_begin_of_steps_are_extrapolated(unit: Path) -> None:
