@@ -284,20 +284,21 @@ def test_moments_that_lock_the_spin_do_work() -> None:
     assert closure < 1e-3, closure
 
 
-def test_kinetic_energy_is_that_of_the_reference() -> None:
-    """Bodies that spin and swing until friction stops them: translation, swing and spin, each with its inertia."""
+def test_energies_of_bodies_are_those_of_the_reference() -> None:
+    """Bodies that spin and swing off centre until friction stops them: translation, swing, spin, and height."""
     bearing = presets.bearing("fenz-tfp")
     rates = [(0.2, 0.1, 30.0), (-0.1, 0.2, -40.0), (0.1, -0.2, 50.0), (0.0, 0.1, 20.0)]
-    start = InitialState(np.zeros((4, 3)), rates, np.zeros((4, 2)))
-    still = Motion(knots=[0.0, 0.02], coefficients=np.zeros((1, 6, 6)))
+    tilts = [(2e-3, -1e-3, 0.0), (-1e-3, 2e-3, 0.0), (1e-3, -3e-3, 0.0), (-2e-3, 2e-3, 0.0)]
+    start = InitialState(tilts, rates, np.zeros((4, 2)))
+    still = Motion(knots=[0.0, 0.008], coefficients=np.zeros((1, 6, 6)))
     effects = Effects(spin="patch", bouc_wen="report")
     top = Top.prescribed((0.0, 0.0, -LOAD))
     history = simulate(Scene(bearing, still, top, effects, Solver(rtol=1e-6), initial_state=start)).history
     rows = range(0, len(history.time), len(history.time) // 8)
-    states = [
-        kinematics.State(history.tilt_angles[i], history.tilt_rates[i], history.tilt_accelerations[i]) for i in rows
-    ]
-    expected = np.array([energy.kinetic_energy(bearing, state) for state in states])
-    found = history.energy["kinetic"][rows]
-    assert np.ptp(found) > 0.5 * expected[0]
-    assert found == pytest.approx(expected - expected[0], abs=1e-9 * expected[0])
+    moving = zip(history.tilt_angles[rows], history.tilt_rates[rows], history.tilt_accelerations[rows], strict=True)
+    states = [kinematics.State(*state) for state in moving]
+    for name, of in (("kinetic", energy.kinetic_energy), ("potential", energy.potential_energy)):
+        expected = np.array([of(bearing, state) for state in states])
+        found = history.energy[name][rows]
+        assert np.ptp(found) > (0.5 * expected[0] if name == "kinetic" else 1e-4), name
+        assert found == pytest.approx(expected - expected[0], abs=1e-9 * expected[0]), name
