@@ -11,7 +11,7 @@ import pytest
 from support import Array
 from support.gradients import derivative, double, single, step_of, triple, values_around
 
-from msfp_gen import Scene, simulate
+from msfp_gen import Load, Scene, simulate
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.gradient import ENERGIES
 from msfp_gen.results.row_unpacking import unpacked
