@@ -199,7 +199,7 @@ SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_runtime_includes_one_way(path):
-    """api -> port -> run -> steppers -> equations -> generated headers; headers beside the folders include none of ours."""
+    """api -> port -> run -> steppers -> equations -> generated headers; those beside the folders none of ours."""
     included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
     if path.parent == RUNTIME:
         assert not included
