@@ -18,8 +18,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "coupling", "results", "analysis", "buildings", "fmu", "figures", "result", "simulation",
-    "studies", "report", "explorer", "", "cli", "__main__",
+    "scene", "model", "coupling", "buildings", "results", "analysis", "figures", "result", "simulation", "studies",
+    "report", "explorer", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.
@@ -199,7 +199,7 @@ SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
 def test_runtime_includes_one_way(path):
-    """api, port, run, steppers, equations, generated headers: each after those it includes; others include none of ours."""
+    """api -> port -> run -> steppers -> equations -> generated headers; those beside the folders none of ours."""
     included = set(re.findall(r'^#include "(.+)"$', path.read_text(encoding="utf-8"), flags=re.MULTILINE))
     if path.parent == RUNTIME:
         assert not included
