@@ -430,8 +430,8 @@ typedef struct msfp_api {
     /* Derivatives [6][6] of the wrench of the upper end in the stage just solved, with respect to its rates; its
      * displacements change with them by diagonal * step. */
     int (*port_stage_derivative)(msfp_port *port, double *derivative);
-    /* After the last stage: error of the bearing over its tolerance [-], above 1 take a shorter step; share of the step at
-     * which its first event lies (a rim is met, a contact closes), below 1 take a step that ends there. */
+    /* After the last stage: error of the bearing over its tolerance [-]; above 1 the step cannot be accepted, take a shorter
+     * one; share of the step at which its first event lies (a rim is met, a contact closes), below 1 end a step there. */
     int (*port_step_end)(msfp_port *port, double *error, double *share);
     /* Accept the step; time: of its end, as your program counts it [s]. */
     int (*port_step_commit)(msfp_port *port, double time);
