@@ -66,17 +66,19 @@ class FrozenSteps:
         return {name: derivative([run[name] for run in runs], step)[0] for name in CHECKED}
 
 
-def check_frozen(scene: Scene, paths: Sequence[str], size: float = 1e-4) -> None:
+def check_frozen(scene: Scene, paths: Sequence[str], size: float = 1e-4, weak: float = 100.0) -> None:
     """Every derivative agrees to 1e-6 of its largest value, but for the rounding of the differences.
 
     Newton's method stops at 1e-10 of the friction, and mostly far below; a difference divides that by its step.
-    size: of that step, over the parameter; a hundred times that of parameters on which the run depends weakly.
+    size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly.
     """
     frozen = FrozenSteps(scene)
     parameters = parameters_of(scene, paths)
     values, slopes = frozen.run(frozen.scene, parameters)
     for parameter, slope in zip(parameters, slopes, strict=True):
-        step = step_of(parameter, 100 * size if parameter.field in WEAK else size)
+        if parameter.value == 0 and parameter.least is not None:
+            continue  # at its bound, which a difference crosses
+        step = step_of(parameter, weak * size if parameter.field in WEAK else size)
         found = frozen.differences(parameter, step)
         for name in CHECKED:
             together = ENERGIES if name in ENERGIES else (name,)  # a term of the energy may be small beside the others
@@ -86,9 +88,13 @@ def check_frozen(scene: Scene, paths: Sequence[str], size: float = 1e-4) -> None
             assert error <= 1e-6 * largest + rounding, (parameter.path, name, error / largest)
 
 
-@pytest.mark.parametrize("method", ["implicit", "esdirk4"])
-def test_differences_with_the_same_steps_in_a_triple_pendulum(method: str) -> None:
-    check_frozen(triple(3.0, method=method), [*STACK, *RIG, *STATE, "motion.direction"])
+def test_differences_with_the_same_steps_in_a_triple_pendulum() -> None:
+    check_frozen(triple(3.0), [*STACK, *RIG, *STATE, "motion.direction"])
+
+
+def test_differences_with_the_same_steps_of_fourth_order() -> None:
+    """With small changes only: steps that are prescribed do not become shorter where a larger change asks for it."""
+    check_frozen(triple(3.0, method="esdirk4"), [*STACK, *RIG], weak=1.0)
 
 
 def test_the_load_before_a_jump_counts_in_the_step_that_ends_there() -> None:
