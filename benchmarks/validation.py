@@ -71,14 +71,18 @@ def cases(opensees: bool = True) -> list[Case]:
     return [*found, *programs()] if opensees else found
 
 
+FINE = 1e-5  # rtol at which first contacts with rims no longer depend on the steps, in the digits of the table
+
+
 @cache
-def run(name: str) -> Result:
-    return simulate(load_scene(name))
+def run(name: str, rtol: float | None = None) -> Result:
+    scene = load_scene(name)
+    return simulate(scene if rtol is None else replace(scene, solver=replace(scene.solver, rtol=rtol)))
 
 
 def table_42() -> Iterator[Case]:
     """Fenz and Constantinou (2008): the monotonic push of table 4.2."""
-    result = run("fenz-monotonic")
+    result, command = run("fenz-monotonic", FINE), f"msfp-gen run fenz-monotonic --rtol {FINE:g}"
     found, closed = result.summary["transitions"], closed_transitions(result)
     for key, (name, _, experiment, model) in TABLE_42.items():
         scale, digits = (MILLI, 1) if key.startswith("u_") else (1.0, 3)
@@ -89,7 +93,7 @@ def table_42() -> Iterator[Case]:
         ]
         for source, kind, reference in references:
             ours = scale * found[key]
-            yield Case("monotonic push", source, kind, name, reference, ours, digits, "msfp-gen run fenz-monotonic")
+            yield Case("monotonic push", source, kind, name, reference, ours, digits, command)
 
 
 def loops() -> Iterator[Case]:
