@@ -133,3 +133,32 @@ def test_a_short_check_of_a_triple_pendulum() -> None:
     """Of every change: two parameters at a larger tolerance, with slip that reverses."""
     scene = fine(triple(1.5), 1e-10, 0.1)
     check_free(scene, {"bearing.surfaces[0].radius": 4e-3, "motion.scale": 4e-3}, 1e-5)
+
+
+def test_peaks_of_the_summary() -> None:
+    paths = {"bearing.surfaces[0].radius": 4e-3, "motion.scale": 4e-3}
+    scene = replace(triple(4.0, rtol=1e-9), output_step=0.1)
+    slopes = simulate(scene, gradients=list(paths)).gradient_summary
+    for parameter in parameters_of(scene, list(paths)):
+        step = step_of(parameter, paths[parameter.path])
+        runs = [simulate(changed_parameters(scene, {parameter: v})).summary for v in values_around(parameter, step)]
+        for name in ("peak_displacement", "peak_top_force"):
+            found, _ = derivative([np.array(list(run[name].values())) for run in runs], step)
+            given = np.array(list(slopes[parameter.path][name].values()))
+            assert np.abs(given - found).max() <= 1e-5 * np.abs(found).max(), (parameter.path, name)
+
+
+@pytest.mark.parametrize(("duration", "rtol", "events"), [(26.0, 1e-7, 1), pytest.param(60.0, 3e-9, 4, marks=slow)])
+def test_times_of_rim_contacts(duration: float, rtol: float, events: int) -> None:
+    """Two sliders of test 5 of PEER 2017/07 meet their rims and leave them. 2 %: rates at an event ring."""
+    scene = scene_of("fenz-test5", solver={"rtol": rtol}, duration=duration, output_step=0.5)
+    scene = replace(scene, bearing=scene.bearing.replace(**DAMPED))
+    paths = ["bearing.surfaces[0].capacity", "motion.scale"]
+    result = simulate(scene, gradients=paths)
+    assert len(result.events) == events
+    for index, parameter in enumerate(parameters_of(scene, paths)):
+        step = step_of(parameter, 2e-3)
+        runs = [simulate(changed_parameters(scene, {parameter: v})).dataset for v in values_around(parameter, step)]
+        found, _ = derivative([run["event_time"].values for run in runs], step)
+        error = np.abs(result.gradient["event_time"].values[index] - found).max()
+        assert error <= 2e-2 * np.abs(found).max(), parameter.path
