@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from math import pi, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from msfp_gen.buildings.summary import floor_rows, storey_rows
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
-
-if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
+from msfp_gen.results.run_data import RunData
 
 STRAIGHT = 1e-3  # transverse displacement over the largest, up to which a motion is in one direction
 REST_SHARE, REST_MOVEMENT = 0.02, 0.01  # last part of a run, and movement in it over the peak, of a building at rest
@@ -101,6 +99,8 @@ def characterise(result: RunData | BuildingData) -> Characterisation | BuildingC
 
     Raises InputError where nothing moved.
     """
+    if not isinstance(result, RunData | BuildingData):
+        raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
     return characterise_building(result) if isinstance(result, BuildingData) else characterise_bearing(result)
 
 

@@ -180,7 +180,12 @@ def require_type(value: object, kind: type | tuple[type, ...], path: str) -> Non
     """Raise InputError unless `value` is an instance of `kind`."""
     if not isinstance(value, kind):
         names = " or ".join(each.__name__ for each in (kind if isinstance(kind, tuple) else (kind,)))
-        raise InputError(f"{path} = {value!r}: give a {names}")
+        raise InputError(f"{path} = {_one_line(value)}: give a {names}")
+
+
+def _one_line(value: object, most: int = 80) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= most else f"{text[:most]}..."
 
 
 def ruled_fields(kind: type) -> Iterator[tuple[str, Rule, object]]:

@@ -169,6 +169,15 @@ class Bearing:
             raise InputError(f"{path} has {len(items)} entries: layout {self.layout.name} needs {count}, {meaning}")
         object.__setattr__(self, name, items)
 
+    def __repr__(self) -> str:
+        """Layout, and the values of every surface and body, bottom first, in seven lines."""
+        columns = {"R [m]": "radius", "s_c [m]": "capacity", "mu": "friction", "d_y [m]": "yield_displacement"}
+        rows = {label: [getattr(each, name) for each in self.surfaces] for label, name in columns.items()}
+        rows |= {"l [m]": [self.base_height, *(each.height for each in self.bodies)]}
+        rows |= {"m [kg]": [each.mass for each in self.bodies]}
+        lines = (f"  {label:<9}{', '.join(f'{x:.4g}' for x in values)}" for label, values in rows.items())
+        return "\n".join([f"Bearing {self.layout.name}", *lines])
+
     def slider(self, surface: int) -> int:
         """Index 0..n-1, base first, of the slider of a surface (index from 0): the body that meets its rim.
 

@@ -66,3 +66,17 @@ def test_names_that_users_look_for_are_at_the_top() -> None:
     scene = msfp_gen.changed_scene("fenz-test2", {"bearing.friction": [0.05, 0.02, 0.02, 0.1], "duration": 1.0})
     result = simulate(scene)
     assert isinstance(result, Result) and scene.bearing.surfaces[0].friction == 0.05
+
+
+def test_a_bearing_prints_its_values_in_seven_lines() -> None:
+    lines = str(load_scene("fenz-test2").bearing).splitlines()
+    assert len(lines) == 7 and lines[0] == "Bearing 5_2_2" and max(map(len, lines)) < 80
+    assert lines[3] == "  mu       0.03, 0.017, 0.017, 0.107"
+
+
+def test_what_is_no_result_is_named_in_one_line() -> None:
+    scene = load_scene("fenz-test2")
+    with pytest.raises(msfp_gen.InputError, match=r"^result: this is a Scene; give the result of simulate\(scene\)$"):
+        msfp_gen.characterise(scene)  # type: ignore[arg-type]
+    with pytest.raises(msfp_gen.InputError, match="^scene.motion = Scene fenz-test2 bearing .*give a Motion$"):
+        replace(scene, motion=scene)  # type: ignore[arg-type]
