@@ -78,5 +78,5 @@ def test_what_is_no_result_is_named_in_one_line() -> None:
     scene = load_scene("fenz-test2")
     with pytest.raises(msfp_gen.InputError, match=r"^result: this is a Scene; give the result of simulate\(scene\)$"):
         msfp_gen.characterise(scene)  # type: ignore[arg-type]
-    with pytest.raises(msfp_gen.InputError, match="^scene.motion = Scene fenz-test2 bearing .*give a Motion$"):
+    with pytest.raises(msfp_gen.InputError, match=r"^scene.motion = Scene fenz-test2 bearing .*give a Motion$"):
         replace(scene, motion=scene)  # type: ignore[arg-type]
