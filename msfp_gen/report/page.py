@@ -113,7 +113,7 @@ def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[
     data = view(result, frames)
     return {
         "moving": "The bearing in motion",
-        "stage": Markup(asset("bearing.html.jinja")),
+        "stage": Markup(render("bearing.html.jinja")),
         "lead": _introduction(result),
         "device": device_name(result),
         "terms": TERMS,

@@ -18,8 +18,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *s
 # The packages and the modules beside them, lowest first: each imports only itself and what stands before it.
 ORDER = (
     "version", "errors", "common", "specification", "generator", "templates", "runtime", "jit", "embedding", "motions",
-    "scene", "model", "coupling", "buildings", "results", "analysis", "figures", "result", "simulation", "studies",
-    "report", "explorer", "", "cli", "__main__",
+    "scene", "model", "coupling", "results", "analysis", "buildings", "fmu", "figures", "result", "simulation",
+    "studies", "report", "explorer", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
 
 # What `import msfp_gen` must never load.

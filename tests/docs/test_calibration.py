@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from support import ROOT, Array
 
-from msfp_gen import InputError, load_scene, presets, simulate
+from msfp_gen import BuildingScene, InputError, load_scene, presets, simulate
+from msfp_gen.buildings import file as buildings
 from msfp_gen.scene.file import schema
 from msfp_gen.scene.file.loader import scene_from_table
 
@@ -49,14 +50,17 @@ def test_the_reference_of_scene_files_is_what_its_script_writes() -> None:
 
 
 def test_the_reference_has_every_key_of_the_schema_and_no_other() -> None:
-    """Tables of rotations and of scaling within another table are those of a section of their own."""
+    """Tables of rotations, of scaling, of effects and interfaces within another are those of a section of their own."""
     described = {path for _, path, _ in make_scene_reference.SECTIONS} | {"bearing.preset"}
-    nested = {path for path in schema._TABLES if ".rotation." in path or path == "records.scale_to"}
-    assert described == set(schema._TABLES) - nested
+    tables = set(schema._TABLES) | set(buildings.TABLES)
+    nested = {path for path in tables if ".rotation." in path or path == "records.scale_to"}
+    nested |= {"building.effects", "building.bearing.effects", "building.bearing.interface"}
+    assert described == tables - nested
     used = set()
-    for _, path, _ in make_scene_reference.SECTIONS:
-        for key in schema._TABLES[path].model_fields:
-            head = path.split(".")[0] if path else "scene"
+    for _, path, kind in make_scene_reference.SECTIONS:
+        of_building = kind is BuildingScene or path.startswith("building")
+        for key in (buildings.TABLES if of_building else schema._TABLES)[path].model_fields:
+            head = path.split(".")[0] or ("building_scene" if of_building else "scene")
             used |= {name for name in (f"{path}.{key}", f"{head}.{key}", key) if name in make_scene_reference.MEANINGS}
     assert set(make_scene_reference.MEANINGS) - used == {"preset"}
 

@@ -116,7 +116,7 @@ def test_differences_with_the_same_steps_in_a_double_pendulum_below_a_mass() -> 
 def test_differences_with_the_same_steps_in_quasi_static_runs(hysteresis: str) -> None:
     without_effect = ("mass", "centroid", "inertia[0]", "rim_radius", "base_height", "damping", "rotational_damping")
     paths = [path for path in (*STACK, *RIG) if path.rpartition(".")[2] not in without_effect]
-    check_frozen(single(hysteresis), [*paths, "initial_state.h[0][0]"])
+    check_frozen(single(hysteresis), [*paths, "initial_state.h[0][0]"], weak=10.0)
 
 
 def test_a_single_pendulum_in_closed_form() -> None:
