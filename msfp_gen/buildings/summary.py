@@ -116,7 +116,7 @@ def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
     drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
     rows = [
         ("status", result.status + (f": {result.message}" if result.message else "")),
-        ("time", f"{result.time[-1]:.6g} s in {len(result.time) - 1} steps, {result.wall_time:.3g} s"),
+        ("time", f"{result.time[-1]:.6g} s in {result.counts['steps']} steps, {result.wall_time:.3g} s"),
         ("bearings", f"{len(bearings_of(result))}, peak displacement {1e3 * moved['radial']:.4g} mm"),
         ("base shear", f"{1e-6 * shear['radial']:.4g} MN ({s['base_shear_ratio']:.3f} of the weight)"),
         ("floors", f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}"),

@@ -41,6 +41,8 @@ def result() -> BuildingResult:
 def test_few_lines():
     lines = repr(result()).splitlines()
     assert len(lines) <= 10 and lines[0] == "Result of frame" and "status" in lines[1]
+    steps = result().counts["steps"]
+    assert steps != len(result().time) - 1 and f"s in {steps} steps" in lines[2]
     html = result()._repr_html_()
     assert "<polyline" in html and "orbit of bearing" in html and "base shear" in html
     assert repr(result().bearings[1]).startswith("Bearing 2 (B), 5_2_2 at (-3, 2) m")

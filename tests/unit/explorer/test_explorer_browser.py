@@ -269,8 +269,8 @@ def test_a_redraw_takes_less_than_a_tenth_of_a_second(browser, name):
             times.append(browser.execute_script("return state.times.redraw"))
         medians.append(np.median(times))
         if medians[-1] < 100:
-            return
-    raise AssertionError(medians)
+            break
+    assert min(medians) < 100, medians
 
 
 def test_everything_is_drawn(browser):

@@ -54,13 +54,11 @@ def test_emitted_headers_are_the_golden_ones(name: str, update: bool) -> None:
         pytest.skip(f"golden files are of SymPy {known.strip()}, this is {sympy.__version__}")
     for file in FILES:
         golden = (folder / file).read_bytes()
-        if golden != files[file].encode():
-            pytest.fail(
-                f"{folder.relative_to(ROOT) / file} is not what the generator emits now. If this change is intended, "
-                f"run pytest {__file__.removeprefix(f'{ROOT}/')} --update and read the difference in git.\n"
-                f"{difference(golden.decode(), files[file])}",
-                pytrace=False,
-            )
+        assert golden == files[file].encode(), (
+            f"{folder.relative_to(ROOT) / file} is not what the generator emits now. If this change is intended, run "
+            f"pytest {__file__.removeprefix(f'{ROOT}/')} --update and read the difference in git.\n"
+            f"{difference(golden.decode(), files[file])}"
+        )
 
 
 def test_a_change_of_the_public_header_raises_its_version(update: bool) -> None:
