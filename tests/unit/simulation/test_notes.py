@@ -56,15 +56,15 @@ def test_a_tolerance_above_the_force_of_a_stiff_spring_is_noted() -> None:
     force = scene.top.stiffness * 1e-6 * radius  # type: ignore[attr-defined]
     peak = np.hypot(*result.history.top_force[:, :2].T).max()
 
-    def noted(share: float, scene: Scene = scene, effects: Effects = Effects()) -> tuple[float, ...]:
+    def noted(share: float, scene: Scene = scene, sliders: str = "inertial") -> tuple[float, ...]:
         history = replace(result.history, top_force=result.history.top_force * force / (share * peak))
-        return tuple(note.value for note in tolerance_notes(scene, effects, history))
+        return tuple(note.value for note in tolerance_notes(scene, Effects(sliders=sliders), history))
 
     assert noted(0.051) == (pytest.approx(force),) and noted(0.049) == ()
     vertical = Load.constant((0.0, 0.0, 1e3), (1e3, 0.0, 0.0))
     for other in ({"load": None}, {"load": vertical}, {"solver": Solver(method="dopri5")}):
         assert noted(0.5, replace(scene, **other)) == ()
-    assert noted(0.5, effects=Effects(sliders="massless")) == ()
+    assert noted(0.5, sliders="massless") == ()
 
 
 def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
