@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+
 class MsfpError(Exception):
     """Base class of all errors of this package; `exit_code` is that of the command line.
 
