@@ -176,7 +176,8 @@ class Entry:
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
         """Hold the lock of the entry and provide an empty folder to build in, for `publish`.
 
-        After an error the folder with its sources and log is kept until the next build of the entry.
+        After an error of a compiler the folder with its sources and log is kept until the next build of the entry.
+        Where the disk is full nothing is kept. Raises InputError.
 
         Args:
             progress: called with a text and the completed share of the build while another process holds the lock.
@@ -198,7 +199,11 @@ class Entry:
                     # Errors are ignored: the compiler of a killed build may still be writing there.
                     shutil.rmtree(abandoned, ignore_errors=True)
                 part.mkdir()
-            yield part
+                try:
+                    yield part
+                except OSError:  # a full disk: what was written tells nothing
+                    shutil.rmtree(part, ignore_errors=True)
+                    raise
         finally:
             with suppress(OSError):  # only an empty folder goes: another process has built the model meanwhile
                 part.rmdir()

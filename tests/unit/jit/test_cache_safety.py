@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import shutil
@@ -150,6 +151,17 @@ def test_an_altered_translation_of_the_wrapper_is_made_again(entry: cache.Entry)
 
 
 # --- builds that are killed, and builds at the same time
+
+
+def test_a_full_disk_in_the_middle_of_a_build_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(sources: dict[str, str], module: str, folder: Path, *_: object) -> Path:
+        (folder / "half.c").write_text("int x")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder / "half.c"))
+
+    monkeypatch.setattr(build, "compile_extension", full)
+    with pytest.raises(InputError, match=r"MSFP_GEN_CACHE: cannot write .*models \(No space left on device\): name a"):
+        build.prepare(SPEC)
+    assert not list((tmp_path / "models").glob("*.part-*"))
 
 
 def test_builds_killed_at_any_moment(house: Path, tmp_path: Path) -> None:
