@@ -39,7 +39,7 @@ def simulate_building(
 
     progress: called with the time reached and the end [s]. keep: gives the checkpoint of a run. threads: as in
     `start_run`. Raises InputError; RunError that names the bearing: it cannot follow, or a step has no solution; its
-    `result` has the rows until then, as after an interrupt.
+    `result` has the rows until then, as after an interrupt; None before the first row.
     """
     run = start_run(scene, threads)
     keeper = keep(run) if keep is not None else None
@@ -52,7 +52,7 @@ def simulate_building(
     if status == "ok" and interrupted:
         status = "interrupted"
     if status != "ok":
-        raise RunError(failure(run, status), status=status, result=result_of(run))
+        raise RunError(failure(run, status), status=status, result=result_of(run) if len(run.run.rows) else None)
     return result_of(run)
 
 

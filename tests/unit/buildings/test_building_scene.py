@@ -69,11 +69,10 @@ def test_shapes_and_repetition():
 
 def test_a_failed_run_names_the_bearing_and_keeps_its_rows():
     """A support that moves away under one bearing alone tilts the slab until that bearing is in tension."""
-    made = scene(frame())
     drop = Motion.from_acceleration([0.0, 0.05, 0.1, 5.0], np.outer([0.0, 0.0, -5.0, -5.0], [0.0, 0.0, 1.0]))
-    made = replace(
-        made, bearings=[*made.bearings[:2], replace(made.bearings[2], name="corner", motion=drop), made.bearings[3]]
-    )
+    bearings = [replace(each, effects=Effects()) for each in scene(frame()).bearings]
+    bearings[2] = replace(bearings[2], name="corner", motion=drop)
+    made = scene(frame(), bearings=bearings)
     with pytest.raises(RunError, match=r"^bearing 3 \(corner\): stopped at t = 0\.\d+ s of 2 s, surface \d") as caught:
         simulate(made)
     rows = caught.value.result
