@@ -92,7 +92,9 @@ def build_shared(
     log = Log(folder)
     objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
     (folder / EXPORTS).write_text(f"{{ global: {exported}; local: *; }};\n", encoding="utf-8")
-    options = ("-dynamiclib",) if sys.platform == "darwin" else ("-shared", f"-Wl,--version-script={EXPORTS}")
+    # A missing symbol fails the build, and not the program that loads the library.
+    linux = ("-shared", f"-Wl,--version-script={EXPORTS}", "-Wl,-z,defs")
+    options = ("-dynamiclib",) if sys.platform == "darwin" else linux
     log.run(_link_step(compiler, options, objects, name))
     return files
 

@@ -93,11 +93,12 @@ void fmu_release(fmu *f);
 /* Outputs of a row and of the wrenches [12], the ends at `ends`; outputs [FMU_OUTPUT_COUNT]. */
 void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs);
 fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int found, const char *message);
-
-/* ---- fmu_exchange.c: Model Exchange ---- */
-
+#if FMU_MASS
 /* Base motion [order][u_1..3, psi, theta, phi] of the lower end of `ends`. */
 void fmu_base(const double *ends, double base[FMU_ORDERS][6]);
+#endif
+
+/* ---- fmu_exchange.c: Model Exchange ---- */
 
 /* States at rest. */
 void fmu_exchange_start(fmu *f);

@@ -117,6 +117,14 @@ def test_it_conforms_to_the_standard(unit: Path) -> None:
     assert objections(unit, 2) == []
 
 
+def test_a_unit_for_co_simulation_alone_steps(unit: Path, tmp_path: Path) -> None:
+    steps = []
+    for path in (write_fmu(mass(), tmp_path / "isolated.fmu").path, unit):
+        with Unit(path, inputs_at_step_end=True) as at_work:
+            steps.append(at_work.start().step(0.0, STEP, base(STEP)))
+    assert np.array_equal(*steps) and steps[0].any()
+
+
 # ---- Model Exchange ----------------------------------------------------------------------------------------------
 
 
