@@ -48,6 +48,7 @@ struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
     msfp_ends from, to; /* motion of the ends in those states */
+    double wrench[MSFP_PORT_FREEDOMS]; /* of the committed state: stages that are given up change committed.work */
     double knots[MSFP_PORT_PIECES + 1]; /* of the trial, and any later one [s] */
     msfp_polynomials motion, load;
 #if MSFP_TOP_ROTATION

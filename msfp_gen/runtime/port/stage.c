@@ -270,6 +270,7 @@ int msfp_port_step_commit(msfp_port *port, double t)
     run->now = run->next;
     run->restart = run->retry_after_newton = 0;
     port->from = port->to;
+    msfp_port_wrench_of(port, run, &port->from, port->wrench);
     port->step.finished = 0;
     msfp_row *row = &run->rows[0];
     msfp_record(&run->parameters, &run->reached, &run->work, &run->now.mechanical, row);
@@ -290,7 +291,10 @@ int msfp_port_jump(msfp_port *port, const double *ends)
 {
     memcpy(&port->from, ends, sizeof port->from);
     hold(port);
-    return msfp_consistent_initial_state(&port->committed);
+    const int status = msfp_consistent_initial_state(&port->committed);
+    if (status == MSFP_OK)
+        msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    return status;
 }
 
 int msfp_port_cause(msfp_port *port, int status)
