@@ -36,6 +36,7 @@ typedef struct {
 typedef struct {
     msfp_stages stages;
     int stage;         /* that is being solved; 0: none yet, -1: no step was begun */
+    int solved;        /* it has a solution, the last one that was asked; also stage 0 */
     double anchor[2];  /* where the horizontal springs of the interface are fixed in this step [m] */
     double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* derivatives of the rates of a stage with respect to those of end B */
     int moved;         /* those are of the latest stage that was differentiated; otherwise there was none */

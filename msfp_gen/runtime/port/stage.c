@@ -43,6 +43,7 @@ void msfp_port_step_begin(msfp_port *port, double h, const double *expected)
     port->step.energy =
         run->now.energy + msfp_port_move_anchor(port, run, run->rows[0].top, port->from.of[1][0], port->step.anchor);
     port->step.stage = port->step.finished = 0;
+    port->step.solved = 1;
     port->tried = port->ready = 0;
     run->status_surface = 0;
     run->status_value = 0.0;
@@ -73,6 +74,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
         msfp_stage_begin(run, s, i);
         port->step.stage = i;
     }
+    port->step.solved = 0;
     set_ends(port, &to, &s->now.at);
     s->now.seed.same_base = again; /* the lower end moves as it does */
     if (again) {
@@ -86,6 +88,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     run->retry_after_newton |= status == MSFP_E_NEWTON;
     if (status)
         return status;
+    port->step.solved = 1;
     msfp_port_wrench_of(port, run, &port->to, wrench);
     return MSFP_OK;
 }

@@ -107,5 +107,19 @@ def test_stages_out_of_order_are_refused():
     assert compiled.stage(1, at * np.nan)[0] == "finite"
     assert compiled.stage(3, at)[0] == "argument"
     assert compiled.stage(2, at)[0] == "ok" and compiled.step_commit(STEP) == "argument"
-    assert compiled.step_end()[0] == "ok" and compiled.step_commit(STEP) == "ok"
-    assert compiled.step_commit(STEP) == "argument"
+    assert compiled.step_end()[0] == "ok"
+    for time in (np.nan, -1.0, 0.0, np.inf):
+        assert compiled.step_commit(time) == "argument"
+    assert compiled.step_commit(STEP) == "ok" and compiled.step_commit(2 * STEP) == "argument"
+
+
+def test_a_stage_that_failed_must_be_solved_before_what_follows():
+    compiled = TwoPort(BEARING, INTERFACE, LOAD).compiled
+    at = ends(np.zeros(6), np.zeros(6))
+    far = ends(np.array([1.0, 0, 0, 0, 0, 0]), np.zeros(6))
+    assert compiled.step_begin(STEP, np.zeros(2)) == "ok"
+    assert compiled.stage(1, far)[0] == "newton"
+    assert compiled.stage(2, at)[0] == compiled.stage_derivative()[0] == "argument"
+    assert compiled.stage(1, at)[0] == compiled.stage_derivative()[0] == "ok"
+    assert compiled.stage(2, far)[0] == "newton" and compiled.step_end()[0] == "argument"
+    assert compiled.stage(2, at)[0] == compiled.step_end()[0] == compiled.step_commit(STEP) == "ok"
