@@ -131,6 +131,20 @@ def test_states_go_back_and_damaged_ones_are_refused(unit: Path) -> None:
         assert np.array_equal(advance(at_work, 5, 8), first)
 
 
+def test_a_state_from_before_the_start_has_no_step(unit: Path) -> None:
+    """At the start the outputs do not depend on the inputs."""
+    with Unit(unit, inputs_at_step_end=True) as at_work:
+        at_work.fmu.enterInitializationMode(startTime=0.0)
+        state = at_work.state()
+        at_work.fmu.exitInitializationMode()
+        first = advance(at_work, 0, 3)
+        assert at_work.derivative(at_work.outputs, 19).any()
+        at_work.restore(state)
+        assert not at_work.derivative(at_work.outputs, 19).any()
+        at_work.fmu.exitInitializationMode()
+        assert np.array_equal(advance(at_work, 0, 3), first)
+
+
 def test_parameters_are_those_of_a_two_port(unit: Path) -> None:
     with Unit(unit, inputs_at_step_end=True, axial_load=90e3, solver__rtol=1e-5) as at_work:
         at_work.start()
