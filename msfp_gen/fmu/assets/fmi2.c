@@ -68,16 +68,15 @@ FMI2_EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[])
 {
     REQUIRE(ANY);
-    (void)count, (void)categories;
-    f->logging = on;
+    (void)on, (void)count, (void)categories;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
                                           const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean on)
 {
-    (void)resources, (void)visible;
-    return fmu_new(name, token, type == fmi2ModelExchange, on, send, functions ? (void (*)(void))functions->logger : NULL,
+    (void)resources, (void)visible, (void)on;
+    return fmu_new(name, token, type == fmi2ModelExchange, send, functions ? (void (*)(void))functions->logger : NULL,
                    functions ? functions->componentEnvironment : NULL);
 }
 

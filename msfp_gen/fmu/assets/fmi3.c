@@ -69,8 +69,7 @@ FMI3_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on
                                            const fmi3String categories[])
 {
     REQUIRE(ANY);
-    (void)count, (void)categories;
-    f->logging = on;
+    (void)on, (void)count, (void)categories;
     return fmi3OK;
 }
 
@@ -78,8 +77,8 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3Strin
                                                       fmi3Boolean visible, fmi3Boolean on,
                                                       fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
-    (void)resources, (void)visible;
-    return fmu_new(name, token, 1, on, send, (void (*)(void))log, environment);
+    (void)resources, (void)visible, (void)on;
+    return fmu_new(name, token, 1, send, (void (*)(void))log, environment);
 }
 
 /* Steps are done as a whole: they need no event mode, no early return and no intermediate variables. */
@@ -89,9 +88,9 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String
                                                      size_t required_count, fmi3InstanceEnvironment environment,
                                                      fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
-    (void)resources, (void)visible, (void)event_mode, (void)early_return, (void)required, (void)required_count;
-    (void)update;
-    return fmu_new(name, token, 0, on, send, (void (*)(void))log, environment);
+    (void)resources, (void)visible, (void)on, (void)event_mode, (void)early_return, (void)required;
+    (void)required_count, (void)update;
+    return fmu_new(name, token, 0, send, (void (*)(void))log, environment);
 }
 
 FMI3_EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,

@@ -16,12 +16,11 @@ fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     if (f->log)
-        f->log(f, status, status == FMU_WARNING ? "logStatusWarning" : status == FMU_DISCARD ? "logStatusDiscard"
-                                                                                             : "logStatusError", text);
+        f->log(f, status, status == FMU_DISCARD ? "logStatusDiscard" : "logStatusError", text);
     return status;
 }
 
-fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu_logger log, void (*callback)(void),
+fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, void (*callback)(void),
              void *environment)
 {
     fmu *f = calloc(1, sizeof *f);
@@ -30,7 +29,6 @@ fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu
     f->log = log;
     f->callback = callback;
     f->environment = environment;
-    f->logging = logging;
     f->exchange = exchange;
     const size_t length = name ? strlen(name) : 0;
     f->name = calloc(length + 1, 1);

@@ -32,7 +32,6 @@ struct fmu {
     void (*callback)(void); /* of the importer; `log` knows its type */
     void *environment;
     char *name;
-    int logging;  /* whether messages that are no errors are sent */
     int exchange; /* Model Exchange: the importer integrates */
     fmu_phase phase;
     double values[FMU_VALUES];
@@ -51,10 +50,11 @@ struct fmu {
     double jacobian[FMU_ORDERS][FMU_OUTPUT_COUNT][FMU_FREEDOMS];
 };
 
-/* ---- fmu.c: what both versions of the standard share; every failure is logged ---- */
+/* ---- fmu.c: what both versions of the standard share ---- */
+/* Every message says why a call failed, so all are sent: there is no debug logging to switch on. */
 
 /* NULL: no memory, or another unit's token. */
-fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu_logger log, void (*callback)(void),
+fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, void (*callback)(void),
              void *environment);
 void fmu_free(fmu *f);
 /* Whether a call may be made in this phase; phases: bits FMU_AT. */
