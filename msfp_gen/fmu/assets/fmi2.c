@@ -334,8 +334,7 @@ FMI2_EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind
 FMI2_EXPORT fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->phase = FMU_EVENTS;
-    return fmi2OK;
+    return (fmi2Status)fmu_enter(f, __func__, FMU_EVENTS);
 }
 
 FMI2_EXPORT fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
@@ -348,8 +347,7 @@ FMI2_EXPORT fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *inf
 FMI2_EXPORT fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 {
     REQUIRE(EVENTS);
-    f->phase = FMU_RUNNING;
-    return fmi2OK;
+    return (fmi2Status)fmu_enter(f, __func__, FMU_RUNNING);
 }
 
 FMI2_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_state_before, fmi2Boolean *enter,
@@ -364,8 +362,7 @@ FMI2_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
 FMI2_EXPORT fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->values[FMU_TIME] = time; /* the equations do not contain it */
-    return fmi2OK;
+    return (fmi2Status)fmu_set_time(f, __func__, time);
 }
 
 FMI2_EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)

@@ -131,10 +131,7 @@ FMI3_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 FMI3_EXPORT fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     REQUIRE(RUNNING | EVENTS);
-    if (!f->exchange)
-        return refuse(f, "fmi3EnterEventMode: this unit has no event mode in Co-Simulation");
-    f->phase = FMU_EVENTS;
-    return fmi3OK;
+    return (fmi3Status)fmu_enter(f, __func__, FMU_EVENTS);
 }
 
 FMI3_EXPORT fmi3Status fmi3Terminate(fmi3Instance instance)
@@ -482,8 +479,7 @@ FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3F
 FMI3_EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
     REQUIRE(EVENTS);
-    f->phase = FMU_RUNNING;
-    return fmi3OK;
+    return (fmi3Status)fmu_enter(f, __func__, FMU_RUNNING);
 }
 
 FMI3_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_state_before, fmi3Boolean *enter,
@@ -498,8 +494,7 @@ FMI3_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bo
 FMI3_EXPORT fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->values[FMU_TIME] = time; /* the equations do not contain it */
-    return fmi3OK;
+    return (fmi3Status)fmu_set_time(f, __func__, time);
 }
 
 FMI3_EXPORT fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 states[], size_t count)

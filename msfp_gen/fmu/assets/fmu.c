@@ -154,6 +154,31 @@ fmu_status fmu_set(fmu *f, const unsigned *references, size_t count, int boolean
     return FMU_OK;
 }
 
+static int exchanging(const fmu *f, const char *call)
+{
+    if (!f->exchange)
+        fmu_fail(f, FMU_ERROR, "%s: this instance is for Co-Simulation", call);
+    return f->exchange;
+}
+
+fmu_status fmu_enter(fmu *f, const char *call, fmu_phase phase)
+{
+    if (!exchanging(f, call))
+        return FMU_ERROR;
+    f->phase = phase;
+    return FMU_OK;
+}
+
+fmu_status fmu_set_time(fmu *f, const char *call, double time)
+{
+    if (!exchanging(f, call))
+        return FMU_ERROR;
+    if (!(fabs(time) < INFINITY))
+        return fmu_fail(f, FMU_ERROR, "%s: give a finite number [s]", call);
+    f->values[FMU_TIME] = time; /* the equations do not contain it */
+    return FMU_OK;
+}
+
 fmu_status fmu_set_states(fmu *f, const double *states, size_t count)
 {
     if (!f->exchange || count != FMU_STATES)

@@ -66,6 +66,9 @@ fmu_status fmu_begin(fmu *f, double start, double tolerance);
 fmu_status fmu_ready(fmu *f);
 fmu_status fmu_get(fmu *f, const unsigned *references, size_t count, int boolean, double *values);
 fmu_status fmu_set(fmu *f, const unsigned *references, size_t count, int boolean, const double *values);
+/* Of Model Exchange alone, as `call`: enter a phase; the time of the importer [s]. */
+fmu_status fmu_enter(fmu *f, const char *call, fmu_phase phase);
+fmu_status fmu_set_time(fmu *f, const char *call, double time);
 /* All states; a list of `size` numbers as they are now. */
 fmu_status fmu_set_states(fmu *f, const double *states, size_t count);
 fmu_status fmu_get_list(fmu *f, const double *list, size_t size, double *values, size_t count);
