@@ -286,47 +286,26 @@ FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
     return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetRealOutputDerivatives: this unit has none");
 }
 
-FMI2_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2DoStepStatus || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetStatus: kind %d has no status", (int)kind);
-    *value = fmi2OK; /* steps never end later */
-    return fmi2OK;
-}
-
-FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2LastSuccessfulTime || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetRealStatus: kind %d is no number", (int)kind);
-    *value = f->values[FMU_TIME];
-    return fmi2OK;
-}
+/* Steps never end later: what a pending step would be asked. */
+#define STATUS(Function, type, known, result, is_not)                                                                  \
+    FMI2_EXPORT fmi2Status fmi2Get##Function(fmi2Component c, const fmi2StatusKind kind, type *value)                  \
+    {                                                                                                                  \
+        REQUIRE(ANY);                                                                                                  \
+        if (kind != known || !value)                                                                                   \
+            return (fmi2Status)fmu_fail(f, FMU_ERROR, "%s: kind %d " is_not, __func__, (int)kind);                     \
+        *value = result;                                                                                               \
+        return fmi2OK;                                                                                                 \
+    }
+STATUS(Status, fmi2Status, fmi2DoStepStatus, fmi2OK, "has no status")
+STATUS(RealStatus, fmi2Real, fmi2LastSuccessfulTime, f->values[FMU_TIME], "is no number")
+STATUS(BooleanStatus, fmi2Boolean, fmi2Terminated, 0, "is no Boolean")
+STATUS(StringStatus, fmi2String, fmi2PendingStatus, "", "is no text")
 
 FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
     REQUIRE(ANY);
     (void)value;
     return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetIntegerStatus: kind %d is no integer", (int)kind);
-}
-
-FMI2_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2Terminated || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetBooleanStatus: kind %d is no Boolean", (int)kind);
-    *value = 0;
-    return fmi2OK;
-}
-
-FMI2_EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2PendingStatus || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetStringStatus: kind %d is no text", (int)kind);
-    *value = "";
-    return fmi2OK;
 }
 
 /* ---- Model Exchange ---- */
