@@ -3,9 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
-#if FMU_MASS
 #include "port.h"
-#endif
 
 enum { NB = FMU_SURFACES, NQ = FMU_COORDINATES };
 

@@ -40,7 +40,7 @@ typedef struct {
     double anchor[2];  /* where the horizontal springs of the interface are fixed in this step [m] */
     double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* derivatives of the rates of a stage with respect to those of end B */
     int moved;         /* those are of the latest stage that was differentiated; otherwise there was none */
-    double before[MSFP_EVENTS], after[MSFP_EVENTS]; /* event functions at its ends */
+    double after[MSFP_EVENTS]; /* event functions at its end */
     double energy;     /* at its end, with springs as in `committed.now` [J] */
     int finished;      /* it may be committed */
 } msfp_port_step;
