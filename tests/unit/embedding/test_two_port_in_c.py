@@ -67,8 +67,9 @@ def test_what_it_refuses_is_named(program: Path) -> None:
         assert status == "argument" and re.search("give |leave ", message), (what, message)
         fields = re.split(":", message)[0].split(", ") if "mass" not in what else ["mass"]
         assert any(field in what for field in fields), (what, message)
+    others = "no handle, no place for the cause, nothing to commit, no trial, no duration, no direction, reverted"
     assert {what: status for what, status, _ in lines if "=" not in what} == dict.fromkeys(
-        ("no handle", "no place for the cause", "nothing to commit", "no trial", "no duration", "no direction", "reverted"), "argument"
+        others.split(", "), "argument"
     )
 
 
