@@ -68,8 +68,10 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     attach_all(port, &port->run);
     port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
     port->committed.options.duration = INFINITY;
-    if (status == MSFP_OK)
+    if (status == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
+        msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    }
     return port;
 }
 
@@ -219,7 +221,10 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
 
 void msfp_port_wrench(const msfp_port *port, double *wrench)
 {
-    msfp_port_wrench_of(port, current(port), port->tried ? &port->to : &port->from, wrench);
+    if (port->tried)
+        msfp_port_wrench_of(port, &port->run, &port->to, wrench);
+    else
+        memcpy(wrench, port->wrench, sizeof port->wrench);
 }
 
 int msfp_port_commit(msfp_port *port)
@@ -227,6 +232,7 @@ int msfp_port_commit(msfp_port *port)
     if (!port->ready)
         return MSFP_E_ARGUMENT;
     if (port->tried) {
+        msfp_port_wrench(port, port->wrench);
         port->committed.rows[0] = *msfp_port_row(port);
         copy_state(&port->committed, &port->run);
         port->from = port->to;
@@ -261,6 +267,7 @@ int msfp_valid_ends(const double *ends, int loaded)
 /* All numbers: no bytes between them. */
 typedef struct {
     msfp_ends from;
+    double wrench[MSFP_PORT_FREEDOMS];
     double moves[MSFP_DOF][MSFP_END_FREEDOMS], moved; /* as in msfp_port_step */
 } head;
 
@@ -272,6 +279,7 @@ void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
 {
     head h;
     h.from = port->from;
+    memcpy(h.wrench, port->wrench, sizeof h.wrench);
     memcpy(h.moves, port->step.moves, sizeof h.moves);
     h.moved = port->step.moved;
     const uint64_t sum = msfp_checksum(&h, sizeof h);
@@ -289,6 +297,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     memcpy(&h, snapshot, sizeof h);
     memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
     if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
+        !msfp_all_finite(h.wrench, MSFP_PORT_FREEDOMS) ||
         !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;
@@ -304,6 +313,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     msfp_run_free(&port->committed);
     port->committed = found;
     port->from = h.from;
+    memcpy(port->wrench, h.wrench, sizeof h.wrench);
     memcpy(port->step.moves, h.moves, sizeof h.moves);
     port->step.moved = h.moved != 0.0;
     msfp_port_revert(port);
