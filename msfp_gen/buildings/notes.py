@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
+GATHERED = ("heat", "law_speed", "law_load", "law_temperature")  # kinds
 ENERGY = (
     "the energy balance of the building has an error of {value:.1%} of the largest energy: give a smaller "
     "solver.max_step"
@@ -26,8 +27,25 @@ def notes_of(result: BuildingData) -> tuple[Note, ...]:
     """The notes of a run in order of time. The text of each begins with the bearing that it is about."""
     scene = result.scene
     found = [(i, note) for i, each in enumerate(scene.bearings) for note in value_notes(each.bearing)]
-    named = [replace(note, text=f"{scene.label(i)}: {note.text}") for i, note in [*found, *result.monitored]]
+    named = [replace(note, text=f"{scene.label(i)}: {note.text}") for i, note in [*found, *_gathered(result.monitored)]]
     return tuple(sorted([*named, *_energy(result)], key=lambda note: note.time))
+
+
+def _gathered(notes: Sequence[tuple[int, Note]]) -> list[tuple[int, Note]]:
+    """The notes; of those about friction, which many bearings get, the first of each kind stands for all."""
+    found = [pair for pair in notes if pair[1].kind not in GATHERED]
+    for kind in GATHERED:
+        alike = sorted((pair for pair in notes if pair[1].kind == kind and not pair[1].action), key=_time)
+        for index, note in alike[:1]:
+            others = len({i for i, _ in alike}) - 1
+            words = f"; so {'do' if others > 1 else 'does'} {others} other bearing{'s' * (others > 1)}"
+            found.append((index, replace(note, text=note.text + (words if others else ""))))
+        found += [pair for pair in notes if pair[1].kind == kind and pair[1].action]
+    return found
+
+
+def _time(pair: tuple[int, Note]) -> float:
+    return pair[1].time
 
 
 def value_notes(bearing: Bearing) -> tuple[Note, ...]:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from support.buildings import MOTION, PLACES, frame, scene
 
-from msfp_gen import Auto, BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
+from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
 from msfp_gen.buildings.characterise import cycles_of
-from msfp_gen.buildings.notes import TEXTS
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.summary import summary_tables
+from msfp_gen.results.note import Note
 
 
 @cache
@@ -161,20 +161,17 @@ def test_a_failed_run_states_how_it_ended():
     assert "steps" in repr(found)
 
 
-def test_monitors_name_the_bearing():
-    given = made()
-    bearings = [*given.bearings[:2], replace(given.bearings[2], effects=Auto(rims=False)), given.bearings[3]]
-    found = replace(result(), scene=replace(given, bearings=bearings))
-    found.sliding[2][5:, 1] += 1.0
-    found.normal_force[0][7, 2] = 0.0
-    try:
-        notes = found.notes
-        assert [(note.kind, note.surface, note.time) for note in notes] == [("rims", 2, 0.1), ("uplift", 3, 0.14)]
-        assert notes[0].text.startswith("bearing 3: a slider is ") and notes[1].text.startswith("bearing 1 (A): ")
-        assert {note.kind for note in notes} < set(TEXTS) and "notes" in repr(found)
-    finally:
-        found.sliding[2][5:, 1] -= 1.0
-        found.normal_force[0][7, 2] = result().normal_force[0][6, 2]
+def test_notes_of_monitors_name_the_bearing():
+    uplift = Note(0.14, "uplift", 3, 5.0, "it is unloaded", "uplift = True")
+    heat = [(index, Note(0.2 + index, "heat", 1, 10.0 + index, "it is hot")) for index in range(3)]
+    found = replace(result(), monitored=(*heat[::-1], (0, uplift), (2, replace(uplift, time=0.3, action=""))))
+    assert [note.line for note in found.notes] == [
+        "t = 0.14 s: bearing 1 (A): it is unloaded; continued with uplift = True",
+        "t = 0.2 s: bearing 1 (A): it is hot; so do 2 other bearings",
+        "t = 0.3 s: bearing 3: it is unloaded",
+    ]
+    assert found.bearings[0].transitions == (uplift,) and found.bearings[2].transitions == ()
+    assert "notes" in repr(found)
 
 
 def test_characterisation_of_the_isolation_system():
