@@ -106,6 +106,11 @@ class TwoPort:
         """Time of the committed state [s]."""
         return self._port.time
 
+    @property
+    def compiled(self) -> Port:
+        """The compiled two-port, for other compiled code, which then takes its steps."""
+        return self._port
+
     def trial(self, time: float, lower: ArrayLike, upper: ArrayLike) -> Response:
         """Integrate from the committed state to `time`, and state the wrenches there.
 

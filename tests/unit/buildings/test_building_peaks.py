@@ -23,8 +23,10 @@ def test_peaks_do_not_depend_on_the_rows():
         expected = getattr(fine.peaks, one.name)
         assert getattr(coarse.peaks, one.name) == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max()), one.name
     short = Peaks.of_rows(coarse)
-    assert short.node_acceleration[-1, 0] < 0.9 * coarse.summary["floors"][-1]["peak_acceleration"]["E1"]
-    assert coarse.summary["peak_base_shear"]["radial"] == coarse.peaks.base_reaction[3] > short.base_reaction[3]
+    assert np.all(short.node_acceleration <= coarse.peaks.node_acceleration)
+    assert np.any(short.node_acceleration < 0.8 * coarse.peaks.node_acceleration)
+    assert coarse.summary["floors"][-1]["peak_acceleration"]["E1"] == coarse.peaks.node_acceleration[-1, 0]
+    assert coarse.summary["peak_base_shear"]["radial"] == coarse.peaks.base_reaction[3] >= short.base_reaction[3]
     found = coarse.characterise()
     assert found.peak_force == coarse.peaks.base_reaction[3] and found.peak_drift_ratio > 0
     assert found.bearings[1].minimum_load_ratio == coarse.peaks.axial_force[1, 0] / coarse.scene.axial_loads[1]

