@@ -16,8 +16,8 @@ from msfp_gen.buildings.opening import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
+from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.effect_switching import check
 from msfp_gen.simulation.either import simulate
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling

@@ -379,8 +379,8 @@ typedef struct msfp_api {
      * the bearing, about the present position of that end. The model is in space, with locked spin and top rotation. */
     /* A bearing that is centred and at rest at start_time, under the compression axial_load [N]. Of the scene: bearing,
      * whose top is the interface, start_time, q (separations alone), method, rtol, atol_angle, max_step, first_step, and
-     * max_steps, the limit of one trial; end_time is not read, the rest is as of scene_default. The bearing need not outlive
-     * this call. Status, *port and message: as of run_new. */
+     * max_steps, the limit of one trial, and the monitors; end_time is not read, the rest is as of scene_default. The
+     * bearing need not outlive this call. Status, *port and message: as of run_new. */
     int (*port_new)(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
     void (*port_free)(msfp_port *port);
     /* Integrate from the committed state to `time` [s], with steps of its own, the ends following the polynomials of degree
@@ -453,6 +453,14 @@ typedef struct msfp_api {
      * all that follows from them. step receives the size; rows and wrenches may be NULL. Returns as port_derivative. */
     int (*port_beside)(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
                        double *wrenches);
+    /* Monitors, those of the scene of port_new, check the steps by stages. Whether one stops the step of the last
+     * port_step_end, which you would accept now: do not commit it, and continue with a model that has the effect. */
+    int (*port_tripped)(msfp_port *port);
+    void (*port_trips)(const msfp_port *port, msfp_trip *trips);         /* [MSFP_MONITORS] */
+    void (*port_state)(const msfp_port *port, msfp_run_state *state);    /* the committed one, as of run_state */
+    /* Continue in a two-port at rest from the state of one of another model: of `state` start_time, q, v, f, and foot,
+     * origin, heat, monitor_heat, those NULL as of scene_default; ends: their motion. Status as of port_new. */
+    int (*port_enter)(msfp_port *port, const msfp_scene *state, const double *ends);
 } msfp_api;
 
 #ifdef __cplusplus

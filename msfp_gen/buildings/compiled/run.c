@@ -13,6 +13,14 @@ static double smallest(double t) { return smallest_step * fmax(1.0, t); }
 
 /* ---- begin and end ---- */
 
+static size_t entry_count(const msfp_building *b)
+{
+    size_t count = 0;
+    for (int i = 0; i < b->scene.bearings; ++i)
+        count += b->scene.entry_count[i];
+    return count;
+}
+
 static int allocate(msfp_building *b)
 {
     const size_t n = b->scene.n, r = b->scene.attachments, stages = MSFP_STAGES;
@@ -24,14 +32,15 @@ static int allocate(msfp_building *b)
                    { &b->free, n },        { &b->x, r },        { &b->residual, r }, { &b->change, r },
                    { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n },
                    { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
-                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND } };
+                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, peak_count(b) } };
     int complete = 1;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
         complete &= (*arrays[i].to = calloc(arrays[i].count, sizeof(double))) != NULL;
     b->members = calloc((size_t)b->scene.bearings, sizeof *b->members);
     b->piece = calloc((size_t)b->scene.grounds, sizeof *b->piece);
     b->pivots = calloc(r, sizeof *b->pivots);
-    return complete && b->members && b->piece && b->pivots ? MSFP_OK : MSFP_E_MEMORY;
+    b->entries = calloc(entry_count(b), sizeof *b->entries);
+    return complete && b->members && b->piece && b->pivots && b->entries ? MSFP_OK : MSFP_E_MEMORY;
 }
 
 /* Scale of the forces at the attachments: the weight, with its arms where they are moments. */
@@ -95,8 +104,15 @@ static void begin(msfp_building *b)
         ++b->jump;
     if (!b->status)
         restart(b);
-    if (!b->status)
+    for (int i = 0; i < s->bearings && !b->status; ++i)
+        b->status = read_row(b, i);
+    if (!b->status) {
         b->status = write_row(b);
+        begin_peaks(b);
+        note_peaks(b);
+        for (int i = 0; i < s->bearings; ++i)
+            note_bearing(b, i);
+    }
     b->next_row = 1;
 }
 
@@ -111,6 +127,7 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
         return NULL;
     }
     set_scale(b);
+    memcpy(b->entries, scene->entries, entry_count(b) * sizeof *b->entries);
     b->status = scene->parts[0].api->port_method(scene->method, &b->method);
     begin(b);
     return b;
@@ -122,9 +139,12 @@ void msfp_building_free(msfp_building *b)
         return;
     pool_end(b);
     linear_free(b);
+    for (int i = 0; b->members && i < b->scene.bearings; ++i)
+        free(b->members[i].row);
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
                     b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u,
-                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows };
+                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows,
+                    b->entries, b->peaks };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         free(all[i]);
     free(b);
@@ -186,6 +206,9 @@ static void commit_bearing(msfp_building *b, int bearing)
     member *m = &b->members[bearing];
     const msfp_part *part = &b->scene.parts[bearing];
     m->status = part->api->port_step_commit(part->port, b->t);
+    m->status = m->status ? m->status : read_row(b, bearing);
+    if (!m->status)
+        note_bearing(b, bearing);
 }
 
 static void accept(msfp_building *b, double h, double t, double error)
@@ -209,11 +232,12 @@ static void accept(msfp_building *b, double h, double t, double error)
     b->t = t;
     ++b->counts[MSFP_BUILDING_STEPS];
     for_each_bearing(b, commit_bearing);
-    note_energy(b);
+    b->status = first_failure(b);
     b->h = next_length(b, h, error);
     b->previous_error = error;
     ground_at(b, t);
-    if (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t)) {
+    note_peaks(b);
+    if (!b->status && (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t))) {
         b->next_row += t >= next_row_time(b) - smallest(t);
         b->status = write_row(b);
     }
@@ -235,6 +259,16 @@ static int shorten(msfp_building *b, double h, double factor, int status, int be
     return 0;
 }
 
+/* The first bearing, from 1, of which a monitor stops the step; 0: none. */
+static int tripped(msfp_building *b)
+{
+    int first = 0;
+    for (int i = b->scene.bearings - 1; i >= 0; --i)
+        if (b->scene.parts[i].api->port_tripped(b->scene.parts[i].port))
+            first = i + 1;
+    return first;
+}
+
 /* One step, or the rejection of one. Returns 0 where the run ends. */
 static int one_step(msfp_building *b)
 {
@@ -251,8 +285,42 @@ static int one_step(msfp_building *b)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
     }
+    if ((b->bearing = tripped(b))) {
+        b->status = MSFP_E_GUARD;
+        return 0;
+    }
     accept(b, h, fabs(b->t + h - end) <= smallest(end) ? end : b->t + h, error);
     return b->status == MSFP_OK;
+}
+
+/* ---- a bearing continues with another model ---- */
+
+void msfp_building_ends(msfp_building *b, int bearing, double *ends)
+{
+    ground_at(b, b->t);
+    ends_now(b);
+    memcpy(ends, b->members[bearing].ends, sizeof b->members[bearing].ends);
+}
+
+int msfp_building_replaced(msfp_building *b, int bearing, const int *entries)
+{
+    const msfp_part *part = &b->scene.parts[bearing];
+    member *m = &b->members[bearing];
+    int *to = b->entries;
+    for (int i = 0; i < bearing; ++i)
+        to += b->scene.entry_count[i];
+    memcpy(to, entries, (size_t)b->scene.entry_count[bearing] * sizeof *to);
+    free(m->row);
+    m->row = NULL;
+    b->tangent_beta = 0.0;
+    b->h = fmin(b->h, 1e-3);
+    memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
+    b->status = part->api->port_wrench(part->port, m->wrench);
+    b->status = b->status ? b->status : read_row(b, bearing);
+    b->bearing = b->status ? bearing + 1 : 0;
+    b->surface = 0;
+    b->value = 0.0;
+    return b->status;
 }
 
 static int finished(const msfp_building *b) { return b->t >= b->scene.end - smallest(b->scene.end); }

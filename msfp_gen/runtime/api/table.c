@@ -111,6 +111,10 @@ static const msfp_api table = {
     .port_cause = msfp_api_port_cause,
     .port_new_loaded = msfp_api_port_new_loaded,
     .port_beside = msfp_api_port_beside,
+    .port_tripped = msfp_api_port_tripped,
+    .port_trips = msfp_api_port_trips,
+    .port_state = msfp_api_port_state,
+    .port_enter = msfp_api_port_enter,
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

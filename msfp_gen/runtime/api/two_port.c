@@ -190,3 +190,28 @@ int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)
     *cause = (msfp_progress){ status, run->status_surface, run->status_value, run->now.t, run->h, 0 };
     return status;
 }
+
+/* ---- monitors, and the change of models that they ask for ---- */
+
+int msfp_api_port_tripped(msfp_port *port) { return msfp_port_tripped(port); }
+
+void msfp_api_port_trips(const msfp_port *port, msfp_trip *trips) { msfp_api_run_trips(&port->committed, trips); }
+
+void msfp_api_port_state(const msfp_port *port, msfp_run_state *state) { msfp_api_run_state(&port->committed, state); }
+
+int msfp_api_port_enter(msfp_port *port, const msfp_scene *state, const double *ends)
+{
+    const int wrong = msfp_check_entry(port, state, ends);
+    if (wrong)
+        return wrong;
+    msfp_options options = port->committed.options;
+    options.start_time = state->start_time;
+    options.duration = state->start_time + 1.0;
+    options.origin = state->origin;
+    options.foot = state->foot;
+    options.heat = state->heat;
+    const int status = msfp_port_enter(port, &options, state->q, state->v, state->f, state->monitor_heat, ends);
+    port->committed.options.origin = port->committed.options.foot = port->committed.options.heat = NULL;
+    port->run.options.origin = port->run.options.foot = port->run.options.heat = NULL;
+    return status;
+}

@@ -32,9 +32,9 @@ static void copy_state(msfp_run *to, const msfp_run *from)
            MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN);
 }
 
-static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q)
+static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
+                 const double *v, const double *f)
 {
-    static const double v[NB * MSFP_NQ] = { 0.0 }, f[NB * 2] = { 0.0 };
     msfp_history motion, load;
     attach(&motion, port->knots, &port->motion);
     attach(&load, port->knots, &port->load);
@@ -47,9 +47,25 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 #endif
 }
 
+/* Start the committed run; the trial begins as a copy of it. Returns its status. */
+static int begin(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
+                 const double *v, const double *f)
+{
+    const int status = start(port, p, options, q, v, f);
+    port->run = port->committed;
+    port->run.rows = NULL;
+    port->run.events = NULL;
+    port->run.row_count = port->run.row_capacity = port->run.event_count = port->run.event_capacity = 0;
+    attach_all(port, &port->run);
+    port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
+    port->committed.options.duration = INFINITY;
+    return status;
+}
+
 msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
                          int loaded)
 {
+    static const double v[NB * MSFP_NQ] = { 0.0 }, f[NB * 2] = { 0.0 };
     msfp_port *port = calloc(1, sizeof *port);
     if (!port)
         return NULL;
@@ -60,15 +76,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->knots[1] = options->start_time + 1.0;
     port->knots[2] = options->start_time + 2.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
-    const int status = start(port, p, options, q);
-    port->run = port->committed;
-    port->run.rows = NULL;
-    port->run.events = NULL;
-    port->run.row_count = port->run.row_capacity = port->run.event_count = port->run.event_capacity = 0;
-    attach_all(port, &port->run);
-    port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
-    port->committed.options.duration = INFINITY;
-    if (status == MSFP_OK) {
+    if (begin(port, p, options, q, v, f) == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
         msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
     }
@@ -83,6 +91,28 @@ void msfp_port_free(msfp_port *port)
     msfp_run_free(&port->run);
     free(port->times);
     free(port);
+}
+
+int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *q, const double *v, const double *f,
+                    const double *monitor_heat, const double *ends)
+{
+    msfp_run *run = &port->committed;
+    memcpy(&port->from, ends, sizeof port->from);
+    run->now.t = options->start_time;
+    msfp_port_hold(port); /* springs too */
+    const msfp_parameters parameters = run->parameters;
+    msfp_run_free(run);
+    msfp_run_free(&port->run);
+    const int status = begin(port, &parameters, options, q, v, f);
+    if (status == MSFP_OK)
+        msfp_port_wrench_of(port, run, &port->from, port->wrench);
+    if (monitor_heat) {
+        memcpy(run->monitor.energy, monitor_heat, sizeof run->monitor.energy);
+        memcpy(run->monitor.peak, monitor_heat + NB, sizeof run->monitor.peak);
+    }
+    port->tried = port->ready = port->step.finished = port->step.moved = 0;
+    port->step.stage = MSFP_NO_STEP;
+    return status;
 }
 
 double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,

@@ -42,6 +42,8 @@ typedef struct {
     double after[MSFP_EVENTS]; /* event functions at its end */
     double energy;     /* at its end, with springs as in `committed.now` [J] */
     int finished;      /* it may be committed */
+    msfp_monitor_state monitor; /* at its end */
+    int tripped;       /* a monitor stops it */
 } msfp_port_step;
 
 struct msfp_port {
@@ -72,6 +74,10 @@ struct msfp_port {
 msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
                          int loaded);
 void msfp_port_free(msfp_port *port);
+/* Continue in a port at rest from the state of a port of another model. options: start time, origin, foot and heat are
+ * those of that state, as q, v, f are; monitor_heat: as in a scene, NULL: none; ends [end][order][6]: their motion. */
+int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *q, const double *v, const double *f,
+                    const double *monitor_heat, const double *ends);
 /* Go from the committed state to the time `t` [s], not before it, at which the ends are at `to` [end][order][6]. At the
  * committed time `to` is the committed motion. Returns MSFP_OK, or a status: see port->run. */
 int msfp_port_trial(msfp_port *port, double t, const double *to);
@@ -115,10 +121,15 @@ int msfp_port_stage_derivative(msfp_port *port, double *derivative);
 /* After the last stage: error over tolerance [-], and the share of the step at which the first
  * event lies; 1: none. Returns MSFP_OK or a status. */
 int msfp_port_step_end(msfp_port *port, double *error, double *share);
+/* Whether a monitor stops the step that has just ended and that would be accepted now. Its trip is noted then, and the
+ * step must not be committed. */
+int msfp_port_tripped(msfp_port *port);
 /* Accept the step, which ends at the time t [s]. */
 int msfp_port_step_commit(msfp_port *port, double t);
 /* The accelerations of the ends jump to those of `ends`. Returns MSFP_OK or a status. */
 int msfp_port_jump(msfp_port *port, const double *ends);
+/* Histories that hold the ends as they move in the committed state. */
+void msfp_port_hold(msfp_port *port);
 /* The cause of a `status` that a shorter step does not cure. */
 int msfp_port_cause(msfp_port *port, int status);
 

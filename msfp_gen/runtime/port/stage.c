@@ -257,8 +257,20 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
 #endif
     msfp_event_values(run, &run->next, step->after);
     *share = msfp_first_event(run, run->events_now, step->after);
+    const msfp_monitor_state before = run->monitor;
+    step->tripped = msfp_monitor_step(run, step->after);
+    step->monitor = run->monitor;
+    run->monitor = before; /* until the step is accepted */
     step->finished = 1;
     return MSFP_OK;
+}
+
+int msfp_port_tripped(msfp_port *port)
+{
+    if (!port->step.finished || !port->step.tripped)
+        return 0;
+    port->committed.monitor = port->step.monitor;
+    return 1;
 }
 
 int msfp_port_step_commit(msfp_port *port, double t)
@@ -270,6 +282,7 @@ int msfp_port_step_commit(msfp_port *port, double t)
     run->next.energy = port->step.energy;
     ++run->counts[MSFP_COUNT_STEPS];
     memcpy(run->events_now, port->step.after, sizeof run->events_now);
+    run->monitor = port->step.monitor;
     run->now = run->next;
     run->restart = run->retry_after_newton = 0;
     port->from = port->to;
@@ -282,8 +295,7 @@ int msfp_port_step_commit(msfp_port *port, double t)
     return MSFP_OK;
 }
 
-/* Histories that hold the ends as they move in the committed state. */
-static void hold(msfp_port *port)
+void msfp_port_hold(msfp_port *port)
 {
     msfp_run *run = &port->committed;
     set_histories(port, &port->from, 1.0);
@@ -293,7 +305,7 @@ static void hold(msfp_port *port)
 int msfp_port_jump(msfp_port *port, const double *ends)
 {
     memcpy(&port->from, ends, sizeof port->from);
-    hold(port);
+    msfp_port_hold(port);
     const int status = msfp_consistent_initial_state(&port->committed);
     if (status == MSFP_OK)
         msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
@@ -302,6 +314,6 @@ int msfp_port_jump(msfp_port *port, const double *ends)
 
 int msfp_port_cause(msfp_port *port, int status)
 {
-    hold(port);
+    msfp_port_hold(port);
     return msfp_classify_failure(&port->committed, status);
 }
