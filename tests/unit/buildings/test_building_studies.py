@@ -180,6 +180,8 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     assert main(["explain", str(path)]) == 0 and "all bearings: effects selected" in capsys.readouterr().out
     assert main(["characterise", str(out)]) == 0 and "isolation system of slab" in capsys.readouterr().out
     assert main(["plot", str(out), "--figure", "plan", "-o", str(tmp_path / "plan.svg")]) == 0
+    assert main(["animate", str(out), "-o", str(tmp_path / "m.gif"), "--seconds", "0.5", "--rate", "4"]) == 0
+    assert (tmp_path / "m.gif").read_bytes().startswith(b"GIF8")
     assert main(["export", str(out), "-o", str(tmp_path / "n.csv"), "--columns", "axial_force"]) == 0
     assert "axial_force_3 [N]" in (tmp_path / "n.csv").read_text(encoding="utf-8")
     assert main(["run", str(path)]) == 0 and "peaks of bearings" in capsys.readouterr().out
@@ -189,7 +191,7 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     ("arguments", "words"),
     [
         (["run", "--error", "1%"], "--error = 0.01: this is a building"),
-        (["animate", "-o", "x.gif"], "this is a building"),
+        (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
         (["fit", "test.csv", "--parameters", "bearing.friction"], "this is a building"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
         (["export", "-o", "x.csv", "--sign", "top-base"], "columns of a building have one sign"),
