@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from msfp_gen.buildings.columns import column_names
 from msfp_gen.buildings.opening import AnyScene, scene_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -175,7 +176,9 @@ def check_study(study: Study) -> Study:
             raise InputError(f"axes.{axis.name}.{error}") from None
     tried = list(_tried(study, SceneMaker(study.recipe)))
     surfaces = max(len(bearing.surfaces) for scene in tried for bearing in _bearings(scene))
-    found = replace(study, keep=replace(study.keep, surfaces=surfaces, building=_counts(tried[0])))
+    columns = column_names(tried[0]) if isinstance(tried[0], BuildingScene) and study.keep.formulas else ()
+    keep = replace(study.keep, surfaces=surfaces, building=_counts(tried[0]), building_columns=columns)
+    found = replace(study, keep=keep)
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
     if twice := [name for name in names if names.count(name) > 1]:
