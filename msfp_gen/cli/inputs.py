@@ -47,7 +47,7 @@ def of_building(loaded: object) -> bool:
 def one_bearing(loaded: Any, what: str) -> Any:
     """A scene or result of one bearing. Raises InputError that begins with `what` for one of a building."""
     if of_building(loaded):
-        raise InputError(f"{what}: this is a building; give a scene or result of one bearing, or `report` and `plot`")
+        raise InputError(f"{what}: this is a building; give a scene or result of one bearing")
     return loaded
 
 

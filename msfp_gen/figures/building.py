@@ -127,7 +127,7 @@ def draw_plan(axes: Axes, result: BuildingData) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
     scene, bearings = result.scene, bearings_of(result)
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
-    factor = _magnification(scene.places, peak)
+    factor = magnification(scene.places, peak)
     for one, place in zip(bearings, scene.places, strict=True):
         u = shown_sign().factor * factor * one.displacement[:, :2]
         axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
@@ -233,7 +233,7 @@ def _overview_title(result: BuildingData) -> str:
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
 
 
-def _magnification(places: Array, peak: float) -> float:
+def magnification(places: Array, peak: float) -> float:
     """Factor on orbits in the plan: the largest fits between neighbours; a round number."""
     gaps = np.linalg.norm(places[:, None] - places[None], axis=-1)
     apart = float(gaps[gaps > 1e-9].min(initial=np.inf)) if len(places) > 1 else 1.0

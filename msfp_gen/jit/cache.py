@@ -135,8 +135,7 @@ class Entry:
     @classmethod
     def of_files(cls, module: str, files: Mapping[str, str]) -> Entry:
         """The entry of a module of given sources beside the header of the models: file name -> text."""
-        text = json.dumps(dict(sorted(files.items())))
-        return cls._of(module, {"files": _sha256(text), "sources": digest_sources()}, portable=True)
+        return cls._of(module, {"files": digest_files(files), "sources": digest_sources()}, portable=True)
 
     @classmethod
     def _of(cls, module: str, own: dict[str, Any], portable: bool) -> Entry:
@@ -227,6 +226,11 @@ def write_errors(folder: Path, field: str = "MSFP_GEN_CACHE") -> Iterator[None]:
 def digest(path: Path) -> str:
     """The sha256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def digest_files(files: Mapping[str, str]) -> str:
+    """The sha256 of file names and texts."""
+    return _sha256(json.dumps(dict(sorted(files.items()))))
 
 
 def tool_version(tool: str) -> str:

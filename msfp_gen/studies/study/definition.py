@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from msfp_gen.buildings.columns import column_names
 from msfp_gen.buildings.opening import AnyScene, scene_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -176,10 +177,14 @@ def check_study(study: Study) -> Study:
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
     surfaces, building = 0, None
+    columns: tuple[str, ...] = ()
     for scene in _tried(study, SceneMaker(study.recipe)):  # one after the other: their motions are long
         surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in _bearings(scene)))
         building = _larger(building, _counts(scene))
-    found = replace(study, keep=replace(study.keep, surfaces=surfaces, building=building))
+        if isinstance(scene, BuildingScene) and study.keep.formulas and not columns:
+            columns = column_names(scene)
+    keep = replace(study.keep, surfaces=surfaces, building=building, building_columns=columns)
+    found = replace(study, keep=keep)
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
     if twice := [name for name in names if names.count(name) > 1]:
