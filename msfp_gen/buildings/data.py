@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.buildings.peaks import Peaks
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.results.note import Note
 from msfp_gen.results.resample import checked_times, interpolated
 
 B = TypeVar("B", bound="BuildingData")
@@ -27,8 +30,9 @@ class BuildingData:
     of each bearing, a list of arrays of shape (k, n-1) [N], [m]. Energies, shape (k,) or (k, bearings) [J]: dissipated:
     in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
     received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
-    counts: of the run. status: "ok" or the name of a failure; message: one line of text, "" for a run that succeeded.
-    provenance: versions with which the result was computed. wall_time [s].
+    counts: of the run. monitored: notes of the monitors of the bearings, each with its bearing, from 0. recorded_peaks:
+    over all steps; None: not recorded. status: "ok" or the name of a failure; message: one line of text, "" for a run
+    that succeeded. provenance: versions with which the result was computed. wall_time [s].
     """
 
     scene: BuildingScene
@@ -47,10 +51,17 @@ class BuildingData:
     input: Array
     support: Array
     counts: dict[str, int]
+    monitored: tuple[tuple[int, Note], ...] = ()
+    recorded_peaks: Peaks | None = None
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
     wall_time: float = 0.0
+
+    @cached_property
+    def peaks(self) -> Peaks:
+        """Peaks over all steps, or of the rows where the run did not record them."""
+        return self.recorded_peaks or Peaks.of_rows(self)
 
     @property
     def succeeded(self) -> bool:

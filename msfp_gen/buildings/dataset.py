@@ -129,6 +129,7 @@ def attributes(result: BuildingData) -> dict[str, Any]:
         "notes": json.dumps([note.line for note in notes_of(result)]),
         "scene": scene_text(result.scene),
         "counts": json.dumps(result.counts),
+        "monitored": json.dumps([[index, vars(note)] for index, note in result.monitored]),
         "wall_time": result.wall_time,
         "provenance": json.dumps(result.provenance),
         "padding": "NaN: the bearing has no such surface",

@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
     from msfp_gen.buildings.data import BuildingData
 
-DIGESTED = ("scene", "status", "message", "counts", "provenance")  # attributes that the digest of a file covers
+PEAKS = "peaks"  # group
+DIGESTED = (
+    "scene",
+    "status",
+    "message",
+    "counts",
+    "monitored",
+    "provenance",
+)  # attributes that the digest of a file covers
 
 
 def save(result: BuildingData, path: str | Path) -> Path:
@@ -45,6 +53,8 @@ def write_netcdf(result: BuildingData, path: str | Path) -> Path:
     dataset = to_dataset(result)
     groups = {GROUP: to_arrays(result.scene.building)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
+    if result.recorded_peaks is not None:
+        groups[PEAKS] = result.recorded_peaks.to_arrays()
     dataset.attrs[DIGEST] = digest_of(result, groups)
     write_groups(path, dataset, groups)
     return path

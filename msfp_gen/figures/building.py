@@ -267,6 +267,8 @@ class _Floor:
 
 def _spectrum(time: Array, values: Array) -> Array:
     """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
+    if len(time) < 2:  # of a run that ended at its start
+        return np.zeros((len(PERIODS), 3))
     found: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
     psa: Array = found.psa[:, :3]
     return psa

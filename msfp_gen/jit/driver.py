@@ -59,11 +59,17 @@ def sources(folder: Traversable) -> dict[str, str]:
     return {file.name: file.read_text(encoding="utf-8") for file in found if file.name.endswith(SUFFIXES)}
 
 
-def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> None:
+def headers() -> dict[str, str]:
+    """The headers that a driver includes: file name -> text."""
     from msfp_gen.generator.header import public_header
 
+    math = resources.files("msfp_gen") / "runtime" / "msfp_math.h"
+    return {"msfp.h": public_header(), math.name: math.read_text(encoding="utf-8")}
+
+
+def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> None:
     begin = perf_counter()
-    extension = compile_extension({**files, "msfp.h": public_header()}, entry.module, folder, libraries=LIBRARIES)
+    extension = compile_extension({**files, **headers()}, entry.module, folder, libraries=LIBRARIES)
     manifest = cache.Manifest(
         module=entry.module,
         spec=entry.module,

@@ -63,8 +63,8 @@ class Evaluation:
 
     def step_in_errors(self, step: Array) -> float:
         """Length of a step of the unknowns in their standard errors (Bates and Watts 1981); step: shape (k,)."""
-        error = float(np.sqrt(len(step) * self.variance))
-        return float(np.linalg.norm(self.jacobian @ step) / error) if error else np.inf
+        length, error = float(np.linalg.norm(self.jacobian @ step)), float(np.sqrt(len(step) * self.variance))
+        return length / error if error else np.inf if length else 0.0
 
 
 @dataclass(eq=False)
