@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.buildings.peaks import Peaks
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import Note
+from msfp_gen.results.resample import checked_times, interpolated
+
+B = TypeVar("B", bound="BuildingData")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,6 +129,23 @@ class BuildingData:
     @property
     def _size(self) -> int:
         return len(self.scene.building.mass)
+
+
+def at_times(result: B, times: ArrayLike) -> B:
+    """`result` with rows at other times, by linear interpolation between its own rows.
+
+    times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
+    """
+    new_times = checked_times(result.time, times)
+
+    def rows(values: Any) -> Any:
+        if isinstance(values, list):
+            return [rows(each) for each in values]
+        return interpolated(result.time, values, new_times)
+
+    columns = {each.name: getattr(result, each.name) for each in fields(BuildingData)}
+    changed = {name: rows(values) for name, values in columns.items() if isinstance(values, (np.ndarray, list))}
+    return replace(result, **changed)
 
 
 def _squares(rows: Array, matrix: Array) -> Array:

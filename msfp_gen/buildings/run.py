@@ -17,7 +17,7 @@ _FAILURES = {status.name: status for status in STATUSES}
 Progress = Callable[[float, float], None]
 
 
-class Keeper(Protocol):
+class RunCheckpoint(Protocol):
     """A checkpoint of the run (`simulation/checkpoint.py`)."""
 
     def restore(self, run: Any) -> None:
@@ -33,14 +33,14 @@ class Keeper(Protocol):
 def simulate_building(
     scene: BuildingScene,
     progress: Progress | None = None,
-    keep: Callable[[BuildingRun], Keeper] | None = None,
+    keep: Callable[[BuildingRun], RunCheckpoint] | None = None,
     threads: int | None = None,
 ) -> BuildingResult:
     """The motion of a building and its bearings from rest.
 
     progress: called with the time reached and the end [s]. keep: gives the checkpoint of a run. threads: as in
     `start_run`. Raises InputError; RunError that names the bearing: it cannot follow, or a step has no solution; its
-    `result` has the rows until then, as after an interrupt.
+    `result` has the rows until then, as after an interrupt; None before the first row.
     """
     run = start_run(scene, threads)
     keeper = keep(run) if keep is not None else None
@@ -53,11 +53,11 @@ def simulate_building(
     if status == "ok" and interrupted:
         status = "interrupted"
     if status != "ok":
-        raise RunError(failure(run, status), status=status, result=result_of(run))
+        raise RunError(failure(run, status), status=status, result=result_of(run) if len(run.run.rows) else None)
     return result_of(run)
 
 
-def _advance(run: BuildingRun, progress: Progress | None, keeper: Keeper | None) -> bool:
+def _advance(run: BuildingRun, progress: Progress | None, keeper: RunCheckpoint | None) -> bool:
     """Take all steps; True after Ctrl-C."""
     try:
         while run.run.advance(STEPS_PER_CALL) or switch(run):

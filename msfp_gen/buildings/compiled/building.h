@@ -4,6 +4,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
 #include "msfp_building.h"
+#include "msfp_math.h"
 
 enum { FACTORS = 3 }; /* step sizes whose factors are kept */
 enum { ENERGIES = 3, DAMPED = 0, RECEIVED, GROUND }; /* integrals over the run */

@@ -82,10 +82,8 @@ static void restart(msfp_building *b)
     ends_now(b);
     for_each_bearing(b, restart_bearing);
     for (int i = 0; i < b->scene.bearings && !b->status; ++i)
-        if (b->members[i].status) {
-            b->status = b->members[i].status;
-            b->bearing = i + 1;
-        }
+        if (b->members[i].status)
+            end_run(b, b->members[i].status, i + 1);
     memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
 }
 
@@ -94,8 +92,9 @@ static void begin(msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     for (int i = 0; i < s->bearings && !b->status; ++i) {
         member *m = &b->members[i];
-        if ((b->status = s->parts[i].api->port_wrench(s->parts[i].port, m->wrench)))
-            b->bearing = i + 1;
+        const int status = s->parts[i].api->port_wrench(s->parts[i].port, m->wrench);
+        if (status)
+            end_run(b, status, i + 1);
         memcpy(m->rest, m->wrench + MSFP_WRENCH, sizeof m->rest);
     }
     b->energy = 1e-5 * s->weight; /* that of its weight lifted by 0.01 mm: smaller ones do not matter */
@@ -161,12 +160,13 @@ static double latest_end(msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     while (b->stop < s->stop_count && s->stops[b->stop] <= b->t + smallest(b->t))
         ++b->stop;
-    double end = fmin(s->end, next_row_time(b)), stop = end;
+    const double end = fmin(s->end, next_row_time(b));
+    double stop = INFINITY;
     if (b->stop < s->stop_count)
-        stop = fmin(stop, s->stops[b->stop]);
+        stop = s->stops[b->stop];
     if (b->jump < s->jump_count)
         stop = fmin(stop, s->jumps[b->jump]);
-    return stop < end - smallest(end) ? stop : end;
+    return stop <= end + smallest(end) ? stop : end; /* the given time, also where a row lies before it by rounding */
 }
 
 /* The step h, no longer than permitted at the present time; see allowed_step of run.c of the models. */
@@ -186,7 +186,7 @@ static double allowed(msfp_building *b, double h)
 static double divided(double h, double left)
 {
     const double count = ceil(left / h * (1.0 - 1e-9));
-    return count <= 8.0 ? left / fmax(count, 1.0) : pow(growth, floor(log(h) / log(growth)));
+    return count <= 8.0 ? left / fmax(count, 1.0) : fmin(h, msfp_pow(growth, floor(msfp_log(h) / msfp_log(growth) + 1e-9)));
 }
 
 /* The next length after a step of length h. A step that was cut to end at a given time leaves the proposal as it is,
@@ -195,8 +195,8 @@ static double next_length(const msfp_building *b, double h, double error)
 {
     const double e = fmax(error, 1e-6), last = fmax(b->previous_error, 1e-6), order = b->method.order;
     if (h < 0.9 * b->h && error < 0.5)
-        return fmax(b->h, h * fmin(5.0, 0.9 * pow(e, -1.0 / order)));
-    return h * fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+        return fmax(b->h, h * fmin(5.0, 0.9 * msfp_pow(e, -1.0 / order)));
+    return h * fmin(5.0, fmax(0.2, 0.9 * msfp_pow(e, -0.7 / order) * msfp_pow(last, 0.4 / order)));
 }
 
 /* ---- steps ---- */
@@ -280,7 +280,7 @@ static int one_step(msfp_building *b)
         if (status)
             return shorten(b, h, 0.25, status, b->bearing);
         if (error > 1.0)
-            return shorten(b, h, fmax(0.1, 0.9 * pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
+            return shorten(b, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
         if (share >= 1.0 || relocations >= RELOCATIONS)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));

@@ -87,6 +87,7 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench);
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative);
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share);
+int msfp_api_port_step_commit(msfp_port *port, double time);
 int msfp_api_port_jump(msfp_port *port, const double *ends);
 int msfp_api_port_tripped(msfp_port *port);
 void msfp_api_port_trips(const msfp_port *port, msfp_trip *trips);

@@ -146,7 +146,7 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench)
 {
     const int now = port->step.stage;
-    if (now < 0 || stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages ||
+    if (now < 0 || stage < 1 || (stage != now && (stage != now + 1 || !port->step.solved)) || stage >= port->step.stages.method->stages ||
         !wrench)
         return MSFP_E_ARGUMENT;
     if (!ends || !msfp_valid_ends(ends, 0))
@@ -156,25 +156,37 @@ int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *
 
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative)
 {
-    return port->step.stage > 0 && derivative ? msfp_port_stage_derivative(port, derivative) : MSFP_E_ARGUMENT;
+    if (port->step.stage < 1 || !port->step.solved || !derivative)
+        return MSFP_E_ARGUMENT;
+    return msfp_port_stage_derivative(port, derivative);
 }
 
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
 {
-    if (port->step.stage < 1 || port->step.stage != port->step.stages.method->stages - 1 || !error || !share)
+    const msfp_port_step *step = &port->step;
+    if (step->stage < 1 || step->stage != step->stages.method->stages - 1 || !step->solved || !error || !share)
         return MSFP_E_ARGUMENT;
     return msfp_port_step_end(port, error, share);
 }
 
+int msfp_api_port_step_commit(msfp_port *port, double time)
+{
+    return time > port->committed.now.t && time < INFINITY ? msfp_port_step_commit(port, time) : MSFP_E_ARGUMENT;
+}
+
 int msfp_api_port_jump(msfp_port *port, const double *ends)
 {
+    if (port->committed.status)
+        return port->committed.status;
     return !port->loaded && ends && msfp_valid_ends(ends, 0) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)
 {
     msfp_run *run = &port->committed;
-    status = msfp_port_cause(port, status);
+    if (port->loaded || !cause)
+        return MSFP_E_ARGUMENT;
+    status = run->status ? run->status : msfp_port_cause(port, status);
     *cause = (msfp_progress){ status, run->status_surface, run->status_value, run->now.t, run->h, 0 };
     return status;
 }

@@ -76,8 +76,10 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->knots[1] = options->start_time + 1.0;
     port->knots[2] = options->start_time + 2.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
-    if (begin(port, p, options, q, v, f) == MSFP_OK)
+    if (begin(port, p, options, q, v, f) == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
+        msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    }
     return port;
 }
 
@@ -102,6 +104,8 @@ int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *
     msfp_run_free(run);
     msfp_run_free(&port->run);
     const int status = begin(port, &parameters, options, q, v, f);
+    if (status == MSFP_OK)
+        msfp_port_wrench_of(port, run, &port->from, port->wrench);
     if (monitor_heat) {
         memcpy(run->monitor.energy, monitor_heat, sizeof run->monitor.energy);
         memcpy(run->monitor.peak, monitor_heat + NB, sizeof run->monitor.peak);
@@ -247,7 +251,10 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
 
 void msfp_port_wrench(const msfp_port *port, double *wrench)
 {
-    msfp_port_wrench_of(port, current(port), port->tried ? &port->to : &port->from, wrench);
+    if (port->tried)
+        msfp_port_wrench_of(port, &port->run, &port->to, wrench);
+    else
+        memcpy(wrench, port->wrench, sizeof port->wrench);
 }
 
 int msfp_port_commit(msfp_port *port)
@@ -255,6 +262,7 @@ int msfp_port_commit(msfp_port *port)
     if (!port->ready)
         return MSFP_E_ARGUMENT;
     if (port->tried) {
+        msfp_port_wrench(port, port->wrench);
         port->committed.rows[0] = *msfp_port_row(port);
         copy_state(&port->committed, &port->run);
         port->from = port->to;
@@ -289,6 +297,7 @@ int msfp_valid_ends(const double *ends, int loaded)
 /* All numbers: no bytes between them. */
 typedef struct {
     msfp_ends from;
+    double wrench[MSFP_PORT_FREEDOMS];
     double moves[MSFP_DOF][MSFP_END_FREEDOMS], moved; /* as in msfp_port_step */
 } head;
 
@@ -300,6 +309,7 @@ void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
 {
     head h;
     h.from = port->from;
+    memcpy(h.wrench, port->wrench, sizeof h.wrench);
     memcpy(h.moves, port->step.moves, sizeof h.moves);
     h.moved = port->step.moved;
     const uint64_t sum = msfp_checksum(&h, sizeof h);
@@ -317,6 +327,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     memcpy(&h, snapshot, sizeof h);
     memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
     if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
+        !msfp_all_finite(h.wrench, MSFP_PORT_FREEDOMS) ||
         !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;
@@ -332,6 +343,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     msfp_run_free(&port->committed);
     port->committed = found;
     port->from = h.from;
+    memcpy(port->wrench, h.wrench, sizeof h.wrench);
     memcpy(port->step.moves, h.moves, sizeof h.moves);
     port->step.moved = h.moved != 0.0;
     msfp_port_revert(port);

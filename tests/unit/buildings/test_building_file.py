@@ -27,7 +27,7 @@ from msfp_gen import (
     presets,
 )
 from msfp_gen.buildings.file import building_from_table
-from msfp_gen.buildings.opening import load_bearing_scene
+from msfp_gen.buildings.opening import files_of, load_bearing_scene, with_absolute_paths
 
 TEXT = """
 name = "one storey"
@@ -250,3 +250,15 @@ def test_examples_of_the_page(tmp_path: Path):
 
 
 OTHERS = ([6, -4], [-6, 4], [6, 4])  # [m]
+
+
+def test_files_of_a_table_are_found_wherever_they_are_named(tmp_path: Path):
+    """A study names them all, and resolves them before its workers start elsewhere."""
+    for name in ("ground.csv", "corner.csv", "M.mtx", "K.mtx"):
+        (tmp_path / name).write_text("", encoding="utf-8")
+    rows = [{"motion": {"kind": "file", "file": "corner.csv"}}, {}]
+    given = {"motion": {"file": "ground.csv"}, "building": {"mass": "M.mtx", "stiffness": "K.mtx", "bearing": rows}}
+    assert files_of(given) == ["ground.csv", "M.mtx", "K.mtx", "corner.csv"]
+    found = with_absolute_paths(given, tmp_path)
+    assert files_of(found) == [str(tmp_path / name) for name in ("ground.csv", "M.mtx", "K.mtx", "corner.csv")]
+    assert files_of(given)[-1] == "corner.csv"  # the table given is as before

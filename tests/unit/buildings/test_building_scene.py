@@ -70,10 +70,10 @@ def test_shapes_and_repetition():
 @pytest.mark.parametrize(("effects", "status"), [(Effects(), "uplift"), (None, "parted")])
 def test_a_failed_run_names_the_bearing_and_keeps_its_rows(effects, status):
     """A support that moves away under one bearing alone: in tension, or with uplift until its parts fall off."""
-    made = scene(frame())
     drop = Motion.from_acceleration([0.0, 0.05, 0.1, 5.0], np.outer([0.0, 0.0, -5.0, -5.0], [0.0, 0.0, 1.0]))
-    corner = replace(made.bearings[2], name="corner", motion=drop, effects=effects)
-    made = replace(made, bearings=[*made.bearings[:2], corner, made.bearings[3]])
+    bearings = [replace(each, effects=effects) for each in scene(frame()).bearings]
+    bearings[2] = replace(bearings[2], name="corner", motion=drop)
+    made = scene(frame(), bearings=bearings)
     with pytest.raises(RunError, match=r"^bearing 3 \(corner\): stopped at t = 0\.\d+ s of 2 s, surface \d") as caught:
         simulate(made)
     rows = caught.value.result
