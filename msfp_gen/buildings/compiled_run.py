@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -16,6 +15,7 @@ from msfp_gen.buildings.member import Member
 from msfp_gen.buildings.peaks import Peaks, vectors
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError
 from msfp_gen.jit.driver import load_driver
 from msfp_gen.model.compiled import Port
@@ -185,8 +185,7 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
 
 def _threads(given: int | None, bearings: int) -> int:
     if given is None:
-        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return max(1, min(processors, bearings // BEARINGS_OF_A_THREAD))
+        return max(1, min(usable_cores(), bearings // BEARINGS_OF_A_THREAD))
     if isinstance(given, bool) or not isinstance(given, int) or given < 1:
         raise InputError(f"threads = {given!r}: give a whole number of at least 1")
     return given

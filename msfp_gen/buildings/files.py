@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msfp_gen.buildings.columns import table
-from msfp_gen.buildings.dataset import stored, to_dataset
+from msfp_gen.buildings.dataset import attributes, stored, to_dataset
 from msfp_gen.buildings.text import GROUP, ground_name, to_arrays
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.results import export
@@ -62,7 +62,7 @@ def write_netcdf(result: BuildingData, path: str | Path) -> Path:
 
 def digest_of(result: BuildingData, groups: dict[str, xr.Dataset]) -> str:
     """The digest of the values from which a result is read."""
-    about = {name: value for name, value in to_dataset(result).attrs.items() if name in DIGESTED}
+    about = {name: value for name, value in attributes(result).items() if name in DIGESTED}
     arrays = {name: ArrayDigest.of(variable.values) for name, variable in stored(result).items()}
     arrays["time"] = ArrayDigest.of(result.time)
     for group, values in groups.items():

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.dataset import ENERGY, GROUND
+from msfp_gen.buildings.dataset import ENERGY, GROUND, SOURCE
 from msfp_gen.buildings.files import DIGESTED, PEAKS
 from msfp_gen.buildings.peaks import Peaks
 from msfp_gen.buildings.peaks import shapes as shapes_of_peaks
@@ -24,7 +24,6 @@ from msfp_gen.scene.file.loader import toml_table
 
 Arrays = dict[str, Any]
 B = TypeVar("B", bound=BuildingData)
-SOURCE = "msfp-gen building"
 
 
 def is_building(path: str | Path) -> bool:

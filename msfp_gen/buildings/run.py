@@ -17,7 +17,7 @@ _FAILURES = {status.name: status for status in STATUSES}
 Progress = Callable[[float, float], None]
 
 
-class Keeper(Protocol):
+class RunCheckpoint(Protocol):
     """A checkpoint of the run (`simulation/checkpoint.py`)."""
 
     def restore(self, run: Any) -> None:
@@ -33,7 +33,7 @@ class Keeper(Protocol):
 def simulate_building(
     scene: BuildingScene,
     progress: Progress | None = None,
-    keep: Callable[[BuildingRun], Keeper] | None = None,
+    keep: Callable[[BuildingRun], RunCheckpoint] | None = None,
     threads: int | None = None,
 ) -> BuildingResult:
     """The motion of a building and its bearings from rest.
@@ -57,7 +57,7 @@ def simulate_building(
     return result_of(run)
 
 
-def _advance(run: BuildingRun, progress: Progress | None, keeper: Keeper | None) -> bool:
+def _advance(run: BuildingRun, progress: Progress | None, keeper: RunCheckpoint | None) -> bool:
     """Take all steps; True after Ctrl-C."""
     try:
         while run.run.advance(STEPS_PER_CALL) or switch(run):

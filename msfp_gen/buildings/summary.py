@@ -113,9 +113,8 @@ def _largest(given: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: max(each[key] for each in given) for key in given[0]}
 
 
-def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
-    """Label and value of the main results, nine rows at most."""
-    s = summarise(result)
+def brief_rows(result: BuildingData, s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of the main results, nine rows at most. s: of `summarise`."""
     moved, shear, acceleration = s["peak_displacement"], s["peak_base_shear"], s["peak_floor_acceleration"]
     drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
     rows = [
@@ -134,23 +133,27 @@ def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
 
 def brief_text(result: BuildingData) -> str:
     """The main results, ten lines at most."""
-    return text_of(f"Result of {result.scene.name or 'an unnamed building'}", brief_rows(result))
+    return text_of(f"Result of {result.scene.name or 'an unnamed building'}", brief_rows(result, summarise(result)))
 
 
 def brief_html(result: BuildingData) -> str:
     """The main results as a table, beside the orbit of the bearing that moves most."""
     most = max(bearings_of(result), key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
     x, y = most.displacement[:, :2].T
-    return html_of(result.scene.name, brief_rows(result), x, y, f"orbit of {most.label}")
+    return html_of(result.scene.name, brief_rows(result, summarise(result)), x, y, f"orbit of {most.label}")
 
 
 def summary_tables(result: BuildingData) -> list[Table]:
     """Tables of the run, its floors, storeys and bearings."""
     summary = summarise(result)
-    rows = [*brief_rows(result), ("energy", _energy(summary["energy"])), ("twist", f"{summary['peak_twist']:.3g} rad")]
+    rows = [
+        *brief_rows(result, summary),
+        ("energy", _energy(summary["energy"])),
+        ("twist", f"{summary['peak_twist']:.3g} rad"),
+    ]
     rows = [row for row in rows if row[0] != "notes"]
     tables = [Table(summary["name"] or "unnamed building", (), rows), _floors(summary["floors"])]
-    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), bearing_table(result)]
+    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), _bearings(summary["bearings"])]
 
 
 def _energy(energy: Mapping[str, float]) -> str:
@@ -189,7 +192,7 @@ def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
     return Table("peaks of storeys", columns, rows)
 
 
-def bearing_table(result: BuildingData) -> Table:
+def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
     """Peaks of every bearing."""
     rows = [
         (
@@ -202,7 +205,7 @@ def bearing_table(result: BuildingData) -> Table:
             f"{1e3 * min(each['capacity_left']):.1f}",
             yes(each["rims_met"]),
         )
-        for each in summarise(result)["bearings"]
+        for each in bearings
     ]
     columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rim")
     return Table("peaks of bearings; left: capacity less sliding", columns, rows)

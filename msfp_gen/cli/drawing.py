@@ -151,7 +151,9 @@ def _check_figure_output(figure: str, output: Path) -> None:
     from msfp_gen.figures import BUILDING_FIGURES, FIGURES
 
     if figure not in (*FIGURES, *BUILDING_FIGURES, EVERY):
-        raise InputError(f"--figure = {figure!r}: give one of {', '.join((*FIGURES, EVERY))}")
+        raise InputError(
+            f"--figure = {figure!r}: give one of {', '.join(dict.fromkeys((*FIGURES, *BUILDING_FIGURES, EVERY)))}"
+        )
     if figure != EVERY and output.suffix:
         check_output(output, FIGURE_SUFFIXES, "--output")
     elif output.suffix.lower() in FIGURE_SUFFIXES:

@@ -171,6 +171,22 @@ class Entry:
                 os.utime(self.folder / MANIFEST_NAME)
         return manifest if intact else None
 
+    def find_or_build(
+        self, build: Callable[[Path], Manifest], progress: Callable[[str, float], None] | None = None
+    ) -> tuple[Manifest, bool]:
+        """The manifest of the entry, and whether it was built now.
+
+        build: writes a complete entry into an empty folder. progress: as of `building`.
+        """
+        if (found := self.find()) is not None:
+            return found, False
+        with self.building(progress or no_progress) as part:
+            if (found := self.find()) is not None:  # another process has built it while this one waited for the lock
+                return found, False
+            made = build(part)
+            self.publish(part)
+        return made, True
+
     @contextmanager
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
         """Hold the lock of the entry and provide an empty folder to build in, for `publish`.
@@ -209,6 +225,10 @@ class Entry:
             if self.folder.is_dir():
                 shutil.rmtree(self.folder)
             part.rename(self.folder)
+
+
+def no_progress(_: str, __: float) -> None:
+    """Progress callback that does nothing."""
 
 
 @contextmanager

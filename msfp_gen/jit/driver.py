@@ -39,11 +39,7 @@ def build_driver(package: str) -> cache.Entry:
     """The module of a package in the cache, built unless it is there; errors as of `load_driver`."""
     module, files = _named(package)
     entry = cache.Entry.of_files(module, files)
-    if entry.find() is None:
-        with entry.building(_silent) as part:
-            if entry.find() is None:
-                _build(entry, files, part)
-                entry.publish(part)
+    entry.find_or_build(lambda part: _build(entry, files, part))
     return entry
 
 
@@ -67,7 +63,7 @@ def headers() -> dict[str, str]:
     return {"msfp.h": public_header(), math.name: math.read_text(encoding="utf-8")}
 
 
-def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> None:
+def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
     begin = perf_counter()
     extension = compile_extension({**files, **headers()}, entry.module, folder, libraries=LIBRARIES)
     manifest = cache.Manifest(
@@ -82,7 +78,4 @@ def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> None:
         stages={"compile": perf_counter() - begin},
     )
     manifest.write(folder)
-
-
-def _silent(_: str, __: float) -> None:
-    """Progress callback that does nothing."""
+    return manifest

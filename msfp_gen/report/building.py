@@ -27,7 +27,7 @@ FIGURES = {
     "spectra": "Floor spectra",
     "axial": "Axial force of every bearing",
 }
-SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
+SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
 TERMS = (
     ("friction pendulum bearing", "steel sliders in spherical dishes, between a structure and its foundation. It "
      "slides when the ground moves, friction dissipates energy, and the weight on the curved dishes brings it back."),
@@ -79,7 +79,6 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "peak": int(np.hypot(*mean[:, :2].T).argmax()),
         "azimuth": 0.0,
         "surfaces": [],
-        "events": [],
         "nodes": [{"name": node.name, "position": node.position.tolist()} for node in scene.building.nodes],
         "plates": bool(scene.building.columns),
         "storeys": [column.name for column in scene.building.columns],

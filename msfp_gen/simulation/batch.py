@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from msfp_gen.buildings.opening import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
@@ -114,11 +115,6 @@ def check_method(scene: AnyScene) -> None:
 def specs_of(scene: AnyScene) -> tuple[ModelSpec, ...]:
     """The models with which a run starts: one, or those of the bearings of a building."""
     return (scene.spec,) if isinstance(scene, Scene) else scene.specs
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def worker_count(requested: int | None) -> int:
