@@ -1,21 +1,22 @@
-/* derivatives.c: derivatives of the wrenches of a trial by forward sensitivities: its steps held, every stage linearised
- * where it was solved.
+/* derivatives.c: derivatives of the wrenches of a trial, its steps held, by sensitivities of its stages.
  *
- * The equations of a stage depend on its rates and on its known parts: the state before, the earlier stages, the motion
- * of the ends. Their tangent with respect to the rates is formed and factored once for each stage; one back substitution
- * then gives the rates that follow a change of the known parts. That change is a small finite one, for which the equations
- * are evaluated: no iteration is made beside the trial, so that no tolerance of Newton's method is left in the derivative.
+ * The equations of a stage depend on its rates and on what is known there: the state before, the earlier stages, the
+ * motion of the ends. Their tangent with respect to the rates is formed and factored once for each stage of the trial;
+ * back substitution gives the rates that follow a small finite change of the rest, minus and plus. A trial beside the
+ * given one is solved relative to it, so that no tolerance of Newton's method is left in the difference.
  */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "port.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, FREEDOMS = MSFP_PORT_FREEDOMS };
+enum { NB = MSFP_NB, DOF = MSFP_DOF, FREEDOMS = MSFP_PORT_FREEDOMS, MOST_STEPS = 4 };
 /* A perturbation accelerates a supported mass by no more than its share of this [m/s^2]. */
-static const double mild_acceleration = 0.1;
+static const double mild_acceleration = 10.0;
 /* The slip that a perturbation causes, over the smallest yield displacement: Y and Z are known to 1e-12. */
 static const double share = 2e-5;
+/* What a step of Newton's method beside the trial may leave of a residual, over its change by the perturbation. */
+static const double second_order = 1e-7;
 
 /* Perturbation of a freedom of an end [m] or [rad] that causes no larger slip than `share` of a yield displacement; of a
  * load [N] or [N m] the force that accelerates the mass mildly, at an arm of a radius. */
@@ -47,19 +48,34 @@ static int linearise(msfp_run *run, msfp_stages *s, int i, msfp_solved *solved)
     return status;
 }
 
-/* The solution of the linearised equations of a stage whose known parts are beside those of the trial. */
+/* Change of a residual; returns its largest entry. */
+static double change_of(const double *residual, const double *before, double *change)
+{
+    double most = 0.0;
+    for (int i = 0; i < DOF; ++i) {
+        change[i] = residual[i] - before[i];
+        most = fmax(most, fabs(change[i]));
+    }
+    return most;
+}
+
+/* Solve a stage whose known parts are beside those of the trial, by the tangent of the trial. Its first step leaves what
+ * is of second order, which matters under a mass that light sliders carry. */
 static int follow(msfp_run *run, msfp_stage *s, const msfp_solved *solved)
 {
-    double step[DOF];
+    double residual[DOF], step[DOF], first = 0.0;
     memcpy(s->at.v, solved->v, sizeof solved->v);
     memcpy(s->g, solved->g, sizeof solved->g);
-    if (!(msfp_stage_residual(run, s, &run->work, step) < INFINITY))
-        return MSFP_E_FINITE;
-    for (int i = 0; i < DOF; ++i)
-        step[i] -= solved->residual[i];
-    msfp_lu_solve(solved->factors, DOF, solved->pivots, step);
-    msfp_stage_move(s, step, 1.0);
-    return msfp_stage_residual(run, s, &run->work, step) < INFINITY ? MSFP_OK : MSFP_E_FINITE;
+    for (int i = 0;; ++i) {
+        if (!(msfp_stage_residual(run, s, &run->work, residual) < INFINITY))
+            return MSFP_E_FINITE;
+        const double left = change_of(residual, solved->residual, step);
+        if (i == MOST_STEPS || left <= second_order * first)
+            return MSFP_OK;
+        first = fmax(first, left);
+        msfp_lu_solve(solved->factors, DOF, solved->pivots, step);
+        msfp_stage_move(s, step, 1.0);
+    }
 }
 
 /* The steps of the trial with the ends at `to`, and the wrenches at their end. to NULL: those of the trial itself, which
