@@ -29,3 +29,13 @@ def test_nested_surfaces_slide_as_a_stack_of_bodies(amplitude: float, accuracy: 
     assert np.abs(found - expected).max() < accuracy * largest
     series = links.series(path, links.beginning(links.FRICTIONS), 1e-4, parts=5)
     assert np.abs(found - series)[1:].max() > 0.02 * largest
+
+
+def test_stack_and_series_differ_by_the_friction_of_the_inner_surfaces() -> None:
+    path, found = links.eight(0.2, 100), []
+    for inner in (0.004, 0.002, 0.0002):
+        frictions = [inner, *links.FRICTIONS[1:]]
+        stack = links.stack(path, frictions, 1e-4)
+        series = links.series(path, links.beginning(frictions), 3e-3 * inner, parts=5)
+        found.append(np.abs(stack - series).max() / np.abs(stack).max())
+    assert found == pytest.approx([0.049, 0.024, 0.002], rel=0.2)
