@@ -19,7 +19,7 @@ from msfp_gen.jit.compiler import find_compiler
 
 pytest.importorskip("fmpy")
 
-STEP, OPEN = 0.02, 1e-3  # [s]; normal force of a contact that is open, at most [N]
+STEP, OPEN = 0.02, 1.0  # [s]; normal force of a contact that hardly touches, at most [N]
 UPLIFT = Effects(uplift=True)
 
 
