@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
+#include "port.h"
 
 enum { NB = FMU_SURFACES, NQ = FMU_COORDINATES };
 
@@ -41,11 +42,17 @@ fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int fo
 static void at_rest(const double *values, double *q)
 {
     const double *bodies = values + FMU_BODIES, *surfaces = values + FMU_SURFACE_VALUES;
-    double carried = FMU_MASS ? values[FMU_GRAVITY] * values[FMU_TOP_MASS] : values[FMU_AXIAL_LOAD];
+#if FMU_MASS
+    double mass = values[FMU_TOP_MASS];
+    const double load = 0.0;
+#else
+    double mass = 0.0;
+    const double load = values[FMU_AXIAL_LOAD];
+#endif
     memset(q, 0, NB * NQ * sizeof *q);
     for (int k = NB - 1; k >= 0; --k) {
-        carried += values[FMU_GRAVITY] * bodies[(k + 1) * FMU_BODY_SIZE + FMU_BODY_MASS];
-        q[k * NQ + NQ - 1] = -carried / surfaces[k * FMU_SURFACE_SIZE + FMU_SEAT_STIFFNESS];
+        mass += bodies[(k + 1) * FMU_BODY_SIZE + FMU_BODY_MASS];
+        q[k * NQ + NQ - 1] = -(load + values[FMU_GRAVITY] * mass) / surfaces[k * FMU_SURFACE_SIZE + FMU_SEAT_STIFFNESS];
     }
 }
 #endif
@@ -112,6 +119,18 @@ fmu_status fmu_build(fmu *f)
 }
 
 #if FMU_MASS
+void fmu_base(const double *ends, double base[FMU_ORDERS][6])
+{
+    double rotation[FMU_ORDERS][3], angles[FMU_ORDERS][3];
+    for (int order = 0; order < FMU_ORDERS; ++order)
+        memcpy(rotation[order], ends + 6 * order + 3, sizeof rotation[order]);
+    msfp_end_angles((const double(*)[3])rotation, angles);
+    for (int order = 0; order < FMU_ORDERS; ++order) {
+        memcpy(base[order], ends + 6 * order, 3 * sizeof *ends);
+        memcpy(base[order] + 3, angles[order], sizeof angles[order]);
+    }
+}
+
 /* Displacement, velocity and acceleration of r_nn since the start, and psi, theta, phi of the top plate with rates. */
 static void motion_of_top(const fmu *f, const double *row, const double *ends, double *motion)
 {

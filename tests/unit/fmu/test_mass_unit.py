@@ -117,6 +117,16 @@ def test_it_conforms_to_the_standard(unit: Path) -> None:
     assert objections(unit, 2) == []
 
 
+def test_a_unit_for_co_simulation_alone_steps(unit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is built without an archiver."""
+    monkeypatch.setenv("AR", "no-such-ar")
+    steps = []
+    for path in (write_fmu(mass(), tmp_path / "isolated.fmu").path, unit):
+        with Unit(path, inputs_at_step_end=True) as at_work:
+            steps.append(at_work.start().step(0.0, STEP, base(STEP)))
+    assert np.array_equal(*steps) and steps[0].any()
+
+
 # ---- Model Exchange ----------------------------------------------------------------------------------------------
 
 
@@ -161,14 +171,11 @@ def test_casadi_confirms_the_derivatives_of_model_exchange(unit: Path, tmp_path:
 
     builder = casadi.DaeBuilder("bearing", str(extract(str(unit), str(tmp_path / "unit"))))
     assert (builder.nx(), builder.nu(), builder.ny()) == (len(STATES), 36, 32)
-    file = tmp_path / "disagreements.csv"  # of its own validation
-    checked = {"validate_forward": True, "validate_ad_file": str(file)}
-    function = builder.create("f", ["x", "u"], ["ode", "y"], checked)
+    function = builder.create("f", ["x", "u"], ["ode", "y"])
     sizes = [len(STATES), 36]
     empty = casadi.DM(builder.nx(), 1), casadi.DM(builder.ny(), 1)
     blocks = [np.array(block) for block in function.jacobian()(STATES, np.zeros(36), *empty)]
     jacobian = np.block([blocks[:2], blocks[2:]])
-    assert file.read_text().splitlines()[1:] == []
     at, differences = np.concatenate([STATES, np.zeros(36)]), np.empty_like(jacobian)
     scales = np.concatenate([np.full(12, 1e-2), np.full(12, 0.1), np.ones(8), np.ones(18), np.full(18, 1e4)])
     for column, scale in enumerate(scales):
@@ -190,6 +197,30 @@ def test_casadi_confirms_the_derivatives_of_model_exchange(unit: Path, tmp_path:
         assert np.allclose(given, jacobian[32:, 0], rtol=1e-6, atol=1e-6)
 
 
+def test_casadi_validates_the_derivatives_by_itself(unit: Path, tmp_path: Path) -> None:
+    """Its list of disagreements, at tolerances below rounding, holds every derivative with a difference of its own.
+
+    It validates where it evaluates blocks of the Jacobian, not where it differentiates a function.
+    """
+    casadi = pytest.importorskip("casadi")
+    from fmpy import extract
+
+    builder = casadi.DaeBuilder("bearing", str(extract(str(unit), str(tmp_path / "unit"))))
+    file = tmp_path / "disagreements"
+    options = {"validate_forward": True, "validate_ad_file": str(file), "abstol": 1e-14, "reltol": 1e-14}
+    builder.create("f", ["x", "u"], ["jac_ode_x", "jac_ode_u", "jac_y_x", "jac_y_u"], options)(STATES, np.zeros(36))
+    heads, *lines = (line.split() for line in file.read_text().splitlines())
+    found = [dict(zip(heads, line, strict=False)) for line in lines]
+    largest: dict[str, float] = {}
+    for each in found:
+        size = abs(float(each["FD"])) * float(each["Nominal"])
+        largest[each["Output"]] = max(largest.get(each["Output"], 0.0), size)
+    assert len(found) > 1000 and len(largest) > 50
+    for each in found:
+        error = abs(float(each["AD"]) - float(each["FD"])) * float(each["Nominal"])
+        assert error < 1e-4 * largest[each["Output"]], each
+
+
 def test_what_model_exchange_refuses(unit: Path) -> None:
     from fmpy.fmi1 import FMICallException
 
@@ -204,3 +235,13 @@ def test_what_model_exchange_refuses(unit: Path) -> None:
         with pytest.raises(FMICallException):
             at_work.read(at_work.outputs)
         assert "uplift" in at_work.messages[-1]
+
+
+def test_functions_of_model_exchange_are_refused_in_co_simulation(unit: Path) -> None:
+    with Unit(unit, inputs_at_step_end=True) as at_work:
+        at_work.start()
+        for function, given in (("EnterEventMode", ()), ("SetTime", (ctypes.c_double(0.5),))):
+            assert at_work.call(function, *given) == 3  # an error
+            assert f"{function}: this instance is for Co-Simulation" in at_work.messages[-1]
+        assert at_work.get("time") == 0.0
+        assert at_work.step(0.0, STEP).any()

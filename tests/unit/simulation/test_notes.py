@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from support import preset_run
 from msfp_gen import Effects, Load, Solver
 from msfp_gen.results.history import History
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.notes import energy_notes, notes_of, tolerance_notes
+from msfp_gen.simulation.notes import energy_notes, tolerance_notes
 
 SLID, NORMAL, WORK = 0.05, 2e5, 700.0
 
@@ -65,30 +63,3 @@ def test_a_tolerance_above_the_force_of_a_stiff_spring_is_noted() -> None:
     for other in ({"load": None}, {"load": vertical}, {"solver": Solver(method="dopri5")}):
         assert noted(0.5, replace(scene, **other)) == ()
     assert noted(0.5, sliders="massless") == ()
-
-
-def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
-    """What the monitors of a friction law noted before, another effect does not change."""
-    trips = {"law_load": (0.5, 1, 9e6), "law_speed": (0.6, 2, 2.1), "heat": (1.0, 3, 12.0), "uplift": (1.0, 1, 0.0)}
-    run: Any = SimpleNamespace(trips=trips, time=1.0, status=("guard", 1, 0.0))
-    before = Effects(dimension="planar", friction="pv", sliders="massless")
-    segment: Any = SimpleNamespace(run=run, status="guard", model=SimpleNamespace(effects=before))
-    after = replace(before, friction="pvt", uplift=True, sliders="inertial")
-    actions = {note.kind: note.action for note in notes_of(segment, after)}
-    assert actions == {
-        "law_load": "",
-        "law_speed": "",
-        "heat": "friction = pvt",
-        "uplift": "uplift = True, sliders = inertial",
-    }
-
-
-@pytest.mark.parametrize("status", ["newton", "irregular"])
-def test_a_jam_names_the_effects_that_follow(status: str) -> None:
-    run: Any = SimpleNamespace(trips={}, time=1.0, status=(status, 2, 5.0))
-    segment: Any = SimpleNamespace(run=run, status=status, model=SimpleNamespace(effects=Effects(sliders="massless")))
-    (note,) = notes_of(segment, Effects())
-    assert (note.kind, note.action, note.surface) == ("jammed", "sliders = inertial", 2)
-    segment.model.effects = Effects()
-    (note,) = notes_of(segment, Effects(uplift=True))
-    assert note.action == "uplift = True" and f"({status})" in note.text
