@@ -191,8 +191,7 @@ class Entry:
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
         """Hold the lock of the entry and provide an empty folder to build in, for `publish`.
 
-        After an error of a compiler the folder with its sources and log is kept until the next build of the entry.
-        Where the disk is full nothing is kept. Raises InputError.
+        After an error of a compiler the folder with its log is kept until the next build; after a full disk nothing is.
 
         Args:
             progress: called with a text and the completed share of the build while another process holds the lock.
