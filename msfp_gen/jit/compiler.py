@@ -22,6 +22,8 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import NamedTuple
 
+from msfp_gen.common.cores import usable_cores
+from msfp_gen.common.output import write_text
 from msfp_gen.errors import CompileError
 from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
@@ -169,7 +171,7 @@ def compile_extension(
     compiler, include = find_compiler(), check_headers()
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in sources.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
     log = Log(folder)
     wrapper = next(Path(name).stem for name in sources if name.endswith(".pyx"))
     # The longest first, so that no processor waits for another in the end: the wrapper, then the files with kernels.
@@ -200,7 +202,7 @@ class Log:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / LOG_NAME
-        self.path.write_text("", encoding="utf-8")
+        write_text(self.path, "")
 
     def run(self, step: Step) -> None:
         """Run one step. Raises CompileError if its exit status is not 0."""
@@ -240,7 +242,7 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
         for step in chain:
             run(step)
 
-    with ThreadPoolExecutor(_processors()) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         tasks = [pool.submit(run_chain, chain) for chain in chains]
         try:
             yield 0
@@ -250,11 +252,6 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-
-
-def _processors() -> int:
-    """Number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msfp_gen.common.output import write_text
 from msfp_gen.generator.interface import model_name
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import (
@@ -19,10 +20,11 @@ from msfp_gen.jit.compiler import (
     Log,
     Step,
     compile_step,
+    find_compiler,
     object_file,
     run_parallel,
 )
-from msfp_gen.jit.platforms import EXPORTS, Platform, find_platform, find_tools
+from msfp_gen.jit.platforms import EXPORTS, Platform, find_tools
 from msfp_gen.specification.layout import ModelSpec
 
 GENERATION_SHARE = 0.3  # of the build time, for the progress display; compilation takes the rest
@@ -60,7 +62,7 @@ def build_library(
     objects = _compile(units, ", ".join(sources), compiler, log, progress)
     log.run(Step(STATIC, (*archiver, "rcs", STATIC, *objects)))
     # Versions of a function for several processors stay visible in spite of -fvisibility=hidden.
-    (folder / EXPORTS).write_text(f"{{ global: {'; '.join(sources)}; local: *; }};\n", encoding="utf-8")
+    write_text(folder / EXPORTS, f"{{ global: {'; '.join(sources)}; local: *; }};\n")
     shared = Path(platform.shared).name
     log.run(_link_step(compiler, platform.options, objects, shared))
     public = {name: files[name] for model, files in sources.items() for name in ("msfp.h", f"{model}.h")}
@@ -83,16 +85,18 @@ def build_shared(
     """
     from msfp_gen.generator import generate
 
-    compiler, _ = find_tools(find_platform(None))
+    compiler = find_compiler()
     progress(f"deriving and emitting {spec.key}", 0.0)
     files = {**runtime_sources(), **generate(spec).files, **others}
     files = {each: text for each, text in sorted(files.items()) if each.endswith((".c", ".h"))}
     for each, text in files.items():
-        (folder / each).write_text(text, encoding="utf-8", newline="\n")
+        write_text(folder / each, text)
     log = Log(folder)
     objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
-    (folder / EXPORTS).write_text(f"{{ global: {exported}; local: *; }};\n", encoding="utf-8")
-    options = ("-dynamiclib",) if sys.platform == "darwin" else ("-shared", f"-Wl,--version-script={EXPORTS}")
+    write_text(folder / EXPORTS, f"{{ global: {exported}; local: *; }};\n")
+    # A missing symbol fails the build, and not the program that loads the library.
+    linux = ("-shared", f"-Wl,--version-script={EXPORTS}", "-Wl,-z,defs")
+    options = ("-dynamiclib",) if sys.platform == "darwin" else linux
     log.run(_link_step(compiler, options, objects, name))
     return files
 
@@ -122,7 +126,7 @@ def _write_sources(
     for model, files in found.items():
         (folder / model).mkdir()
         for name, text in files.items():
-            (folder / model / name).write_text(text, encoding="utf-8", newline="\n")
+            write_text(folder / model / name, text)
     return found
 
 

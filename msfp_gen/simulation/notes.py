@@ -1,4 +1,4 @@
-"""The notes of a run: monitors that tripped, with time, size and the effects that were added."""
+"""The notes that follow from the rows and events of a whole run; those of monitors: `results/monitor_notes.py`."""
 
 from __future__ import annotations
 
@@ -10,38 +10,28 @@ from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.effect_selection import rigid_mass_limit
-from msfp_gen.scene.friction_parameters import RANGES
 from msfp_gen.scene.plausibility import doubtful_values
-from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
     from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
 
-_MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
 FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
 LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
+TOLERANCE_LIMIT = 0.05  # force of the top's spring at the tolerance of angles, over the peak force, likewise
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
-    "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
-    "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
     "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
     "not converge; give vertical_stiffness",
-    "inertia": "the inertial force of body {body} is {value:.2g} of N on surface {surface}; the model has none",
-    "heat": "friction may heat surface {surface} by {value:.3g} K; its friction law does not depend on temperature",
-    "law_speed": "the slip velocity of surface {surface} is {value:.3g} m/s; its friction law was checked up to "
-    f"{_MAX_VELOCITY:g} m/s",
-    "law_load": "the normal force of surface {surface} is {value:.4g} N; its friction law was not checked there",
-    "law_temperature": "surface {surface} is at {value:.4g} degC; its friction law was not checked there",
-    "plane": "motion or loads leave the vertical plane of the model",
     "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
     "give a smaller solver.rtol",
+    "tolerance": "the tolerance of angles is {value:.3g} N in the spring of the top, {share:.2g} of the peak force: "
+    "vibrations after a change of the load may be filtered; give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
     "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
@@ -50,35 +40,7 @@ TEXTS = {
     "face: a real slider would tip; give effects.uplift = true",
     "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
     "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
-    "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
-
-
-def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
-    """The notes of a segment, in order of time.
-
-    after: the effects with which the run continues; None where it does not.
-    """
-    run = segment.run
-    trips = dict(run.trips)
-    if after is not None and segment.status == "ok":
-        trips["plane"] = (run.time, 0, 0.0)
-    if after is not None and segment.status == "uplift":
-        trips["uplift"] = (run.time, *run.status[1:])
-    if after is not None and segment.status in JAM_STATUSES:
-        trips["jammed"] = (run.time, *run.status[1:])
-    before = segment.model.effects
-    return [
-        Note(
-            time,
-            kind,
-            surface,
-            value,
-            TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=segment.status),
-            ", ".join(_changes(kind, before, after)),
-        )
-        for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
-    ]
 
 
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -86,7 +48,8 @@ def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Not
     doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
     physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
-    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + physics
+    numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
+    return doubts + numerics + damping_notes(scene, history) + physics
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
@@ -101,6 +64,24 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
         return ()
     share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where a lateral load excites vibrations through a spring so stiff that the tolerance hides their force.
+
+    An L-stable method filters vibrations that are smaller than its tolerance. Massless sliders do not vibrate.
+    """
+    filtered = scene.solver.method != "dopri5" and effects.sliders == "inertial"
+    if scene.load is None or not filtered or not scene.load.coefficients[:, :2].any():
+        return ()
+    radius = max(surface.radius for surface in scene.bearing.surfaces)
+    force = getattr(scene.top, "stiffness", 0.0) * scene.solver.angle_tolerance * radius
+    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    row = int(across.argmax())
+    if not force > TOLERANCE_LIMIT * across[row] > 0:
+        return ()
+    text = TEXTS["tolerance"].format(value=force, share=force / across[row])
+    return (Note(float(history.time[row]), "tolerance", 0, force, text),)
 
 
 def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -178,16 +159,3 @@ def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
     if not error > ENERGY_LIMIT:
         return ()
     return (Note(float(history.time[row]), "energy", 0, error, TEXTS["energy"].format(value=error)),)
-
-
-def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
-    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift.
-
-    The monitors of a friction law change none, whatever another monitor changes at the same time.
-    """
-    names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
-    return [
-        f"{name} = {getattr(after, name)}"
-        for name in names
-        if after is not None and getattr(before, name) != getattr(after, name)
-    ]
