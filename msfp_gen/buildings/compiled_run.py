@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from msfp_gen.buildings import switching
+from msfp_gen.buildings.change import Change, earlier_work
 from msfp_gen.buildings.member import Member
 from msfp_gen.buildings.peaks import Peaks, vectors
 from msfp_gen.buildings.scene import BuildingScene
@@ -83,7 +83,7 @@ class BuildingRun:
     members: list[Member]
     grounds: list[Motion]
     build: str
-    changes: list[switching.Change] = field(default_factory=list)
+    changes: list[Change] = field(default_factory=list)
     dropped_rows = 0  # it keeps all rows
 
     @property
@@ -104,8 +104,24 @@ class BuildingRun:
         """Continue, before the first step, from a snapshot of a run of the same scene. Raises ValueError."""
         text, _, state = snapshot.partition(b"\n")
         for table in json.loads(text):
-            switching.restored(self, switching.Change.of_table(table))
+            self._repeat(Change.of_table(table))
         self.run.restore(state)
+
+    def replace(self, member: Member, change: Change) -> None:
+        """Put a member in place of the one of an earlier model."""
+        self.members[change.bearing] = member
+        self.changes.append(change)
+        self.run.replace(change.bearing, member.port, member.entries)
+
+    def _repeat(self, change: Change) -> None:
+        """Make a change of an earlier process again, before its state is restored. Raises ValueError."""
+        if not 0 <= change.bearing < len(self.members):
+            raise ValueError("a change of models of no bearing")
+        effects = replace(self.members[change.bearing].effects, **change.effects)
+        member = Member.of(self.scene, change.bearing, effects)
+        if member.model.info.key != change.build:
+            raise ValueError("made by another build of a model")
+        self.replace(member, change)
 
 
 def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
@@ -177,9 +193,7 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
         found[name] = rows[:, begin : begin + count].reshape(len(rows), *shape)
         begin += count
     for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
-        found[f"work {index}"] = found[f"work {index}"] + switching.earlier_work(
-            run.changes, index, found[f"work {index}"].shape
-        )
+        found[f"work {index}"] = found[f"work {index}"] + earlier_work(run.changes, index, found[f"work {index}"].shape)
     return found
 
 

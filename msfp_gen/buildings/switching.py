@@ -2,51 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields
+from typing import Any
 
-import numpy as np
-
+from msfp_gen.buildings.change import BearingNotes, Change, earlier_work
+from msfp_gen.buildings.compiled_run import BuildingRun
 from msfp_gen.buildings.member import Member
-from msfp_gen.common.arrays import Array
 from msfp_gen.results.monitor_notes import monitor_notes
 from msfp_gen.results.note import Note
 from msfp_gen.scene.effect_switching import next_effects
 from msfp_gen.specification.layout import Effects
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from msfp_gen.buildings.compiled_run import BuildingRun
-
-BearingNotes = tuple[tuple[int, Note], ...]
-"""Notes of monitors, each with the bearing that it is about, from 0."""
-
-
-@dataclass(frozen=True, eq=False)
-class Change:
-    """A bearing that continues with another model.
-
-    bearing: from 0. effects: those that changed. rows: how many the run had. work: integrals of the powers of the
-    bearing until then [J]. build: of the new model. notes: of the monitors of the earlier one.
-    """
-
-    bearing: int
-    effects: dict[str, Any]
-    rows: int
-    work: list[float]
-    build: str
-    notes: tuple[Note, ...]
-
-    @property
-    def table(self) -> dict[str, Any]:
-        """As plain data."""
-        return {**vars(self), "notes": [vars(note) for note in self.notes]}
-
-    @classmethod
-    def of_table(cls, table: dict[str, Any]) -> Change:
-        """The inverse of `table`."""
-        return cls(**{**table, "notes": tuple(Note(**each) for each in table["notes"])})
 
 
 def switch(run: BuildingRun) -> bool:
@@ -69,36 +34,9 @@ def switch(run: BuildingRun) -> bool:
         work = work + earlier_work(run.changes, index, (rows + 1, len(work)))[-1]
         new = Member.of(run.scene, index, after)
         new.continue_from(member, run.run.ends(index))
-        install(run, new, Change(index, before, rows, work.tolist(), new.model.info.key, kept))
+        run.replace(new, Change(index, before, rows, work.tolist(), new.model.info.key, kept))
         changed = True
     return changed
-
-
-def install(run: BuildingRun, member: Member, change: Change) -> None:
-    """Put a member into a run in place of the one of an earlier model."""
-    run.members[change.bearing] = member
-    run.changes.append(change)
-    run.run.replace(change.bearing, member.port, member.entries)
-
-
-def restored(run: BuildingRun, change: Change) -> None:
-    """Make a change of an earlier process again, in a run whose state is restored then. Raises ValueError."""
-    if not 0 <= change.bearing < len(run.members):
-        raise ValueError("a change of models of no bearing")
-    effects = replace(run.members[change.bearing].effects, **change.effects)
-    member = Member.of(run.scene, change.bearing, effects)
-    if member.model.info.key != change.build:
-        raise ValueError("made by another build of a model")
-    install(run, member, change)
-
-
-def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]) -> Array:
-    """Integrals of the powers of a bearing before its model of a row began, shape (rows, integrals) [J]."""
-    found = np.zeros(shape)
-    for change in changes:
-        if change.bearing == bearing:
-            found[change.rows :] = change.work
-    return found
 
 
 def notes_until_now(run: BuildingRun) -> BearingNotes:
