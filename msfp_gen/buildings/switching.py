@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from msfp_gen.specification.layout import Effects
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from msfp_gen.buildings.compiled_run import BuildingRun
+    from msfp_gen.buildings.scene import BuildingScene
 
 BearingNotes = tuple[tuple[int, Note], ...]
 """Notes of monitors, each with the bearing that it is about, from 0."""
@@ -49,7 +49,16 @@ class Change:
         return cls(**{**table, "notes": tuple(Note(**each) for each in table["notes"])})
 
 
-def switch(run: BuildingRun) -> bool:
+class Running(Protocol):
+    """A run of a building: `BuildingRun`."""
+
+    run: Any
+    scene: BuildingScene
+    members: list[Member]
+    changes: list[Change]
+
+
+def switch(run: Running) -> bool:
     """Continue with other models of bearings, where a run has ended and their effects permit it; False: it has not."""
     status, failed, surface, value = run.run.status
     if status == "ok" or not run.run.row_count:
@@ -74,14 +83,14 @@ def switch(run: BuildingRun) -> bool:
     return changed
 
 
-def install(run: BuildingRun, member: Member, change: Change) -> None:
+def install(run: Running, member: Member, change: Change) -> None:
     """Put a member into a run in place of the one of an earlier model."""
     run.members[change.bearing] = member
     run.changes.append(change)
     run.run.replace(change.bearing, member.port, member.entries)
 
 
-def restored(run: BuildingRun, change: Change) -> None:
+def restored(run: Running, change: Change) -> None:
     """Make a change of an earlier process again, in a run whose state is restored then. Raises ValueError."""
     if not 0 <= change.bearing < len(run.members):
         raise ValueError("a change of models of no bearing")
@@ -101,7 +110,7 @@ def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]
     return found
 
 
-def notes_until_now(run: BuildingRun) -> BearingNotes:
+def notes_until_now(run: Running) -> BearingNotes:
     """The notes of the monitors of all bearings."""
     found = [(change.bearing, note) for change in run.changes for note in change.notes]
     for index, member in enumerate(run.members):
@@ -110,7 +119,7 @@ def notes_until_now(run: BuildingRun) -> BearingNotes:
     return tuple(found)
 
 
-def _earlier(run: BuildingRun, bearing: int) -> list[Note]:
+def _earlier(run: Running, bearing: int) -> list[Note]:
     """Notes of earlier models of a bearing that changed nothing."""
     return [n for change in run.changes if change.bearing == bearing for n in change.notes if not n.action]
 
