@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.peaks import Peaks
+from msfp_gen.buildings.peaks import Peaks, along_time, padded
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import Note
@@ -61,7 +61,7 @@ class BuildingData:
     @cached_property
     def peaks(self) -> Peaks:
         """Peaks over all steps, or of the rows where the run did not record them."""
-        return self.recorded_peaks or Peaks.of_rows(self)
+        return self.recorded_peaks or peaks_of_rows(self)
 
     @property
     def succeeded(self) -> bool:
@@ -146,6 +146,36 @@ def at_times(result: B, times: ArrayLike) -> B:
     columns = {each.name: getattr(result, each.name) for each in fields(BuildingData)}
     changed = {name: rows(values) for name, values in columns.items() if isinstance(values, (np.ndarray, list))}
     return replace(result, **changed)
+
+
+def peaks_of_rows(result: BuildingData) -> Peaks:
+    """Peaks of the rows alone."""
+    scene = result.scene
+    names = [node.name for node in scene.building.nodes]
+    nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
+    lower = np.einsum("bin,kn->bki", scene.attachments[:, :3], result.displacement)
+    across = np.moveaxis(result.support[:, :, 0], 1, 0) - lower
+    slid, normal = (padded([each.max(axis=0) for each in of]) for of in (result.sliding, result.normal_force))
+    least = padded([each.min(axis=0) for each in result.normal_force])
+    force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
+    base = scene.bearings[0].node
+    return Peaks(
+        node_acceleration=along_time(nodes[:, :, 2, :3]),
+        node_displacement=along_time(nodes[:, :, 0, :3] - result.ground[:, 0]),
+        drift=along_time(np.moveaxis(result.drift[..., :3], 1, 0)),
+        storey_shear=along_time(np.moveaxis(result.storey_force[..., :3], 1, 0)),
+        storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
+        base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
+        mean_displacement=along_time(across.mean(axis=0)),
+        base_reaction=along_time(result.base_reaction),
+        base_torsion=np.abs(result.base_torsion).max(keepdims=True),
+        energy=np.array([result.kinetic.max(), result.strain.max()]),
+        bearing_displacement=along_time(across),
+        top_force=along_time(force),
+        axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
+        sliding=slid,
+        normal_force=np.stack([least, normal], axis=1),
+    )
 
 
 def _squares(rows: Array, matrix: Array) -> Array:

@@ -79,7 +79,7 @@ def effect_tables(scene: BuildingScene) -> Iterator[Table]:
     for members in groups.values():
         decisive = min(members, key=lambda index: float(remaining[index]))  # keeps the least of its load
         selection = scene.effect_selections[decisive]
-        table = one.effect_table(selection, "monitors note where they do not suffice")
+        table = one.effect_table(selection)
         yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
         yield from one.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
 

@@ -13,7 +13,6 @@ from msfp_gen.common.arrays import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-    from msfp_gen.buildings.data import BuildingData
     from msfp_gen.buildings.scene import BuildingScene
 
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
@@ -49,36 +48,6 @@ class Peaks:
     normal_force: Array
 
     @classmethod
-    def of_rows(cls, result: BuildingData) -> Peaks:
-        """Peaks of the rows alone."""
-        scene = result.scene
-        names = [node.name for node in scene.building.nodes]
-        nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
-        lower = np.einsum("bin,kn->bki", scene.attachments[:, :3], result.displacement)
-        across = np.moveaxis(result.support[:, :, 0], 1, 0) - lower
-        slid, normal = (_padded([each.max(axis=0) for each in of]) for of in (result.sliding, result.normal_force))
-        least = _padded([each.min(axis=0) for each in result.normal_force])
-        force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
-        base = scene.bearings[0].node
-        return cls(
-            node_acceleration=_vectors(nodes[:, :, 2, :3]),
-            node_displacement=_vectors(nodes[:, :, 0, :3] - result.ground[:, 0]),
-            drift=_vectors(np.moveaxis(result.drift[..., :3], 1, 0)),
-            storey_shear=_vectors(np.moveaxis(result.storey_force[..., :3], 1, 0)),
-            storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
-            base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
-            mean_displacement=_vectors(across.mean(axis=0)),
-            base_reaction=_vectors(result.base_reaction),
-            base_torsion=np.abs(result.base_torsion).max(keepdims=True),
-            energy=np.array([result.kinetic.max(), result.strain.max()]),
-            bearing_displacement=_vectors(across),
-            top_force=_vectors(force),
-            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
-            sliding=slid,
-            normal_force=np.stack([least, normal], axis=1),
-        )
-
-    @classmethod
     def of_run(cls, scene: BuildingScene, recorded: Array, entries: Sequence[dict[str, slice]]) -> Peaks:
         """Peaks that the compiled run recorded (`msfp_building.h`).
 
@@ -99,7 +68,7 @@ class Peaks:
             begin += 2 * VECTOR + 2 + 2 * kept
         most = [each[2 * VECTOR + 2 + where["all"].stop :] for each, where in zip(bearings, entries, strict=True)]
         least = [each[2 * VECTOR + 2 :] for each in bearings]
-        normal = [_padded([x[w["normal"]] for x, w in zip(of, entries, strict=True)]) for of in (least, most)]
+        normal = [padded([x[w["normal"]] for x, w in zip(of, entries, strict=True)]) for of in (least, most)]
         return cls(
             node_acceleration=acceleration,
             node_displacement=displacement,
@@ -114,7 +83,7 @@ class Peaks:
             bearing_displacement=np.array([each[:VECTOR] for each in bearings]),
             top_force=np.array([each[VECTOR : 2 * VECTOR] for each in bearings]),
             axial_force=np.array([each[2 * VECTOR : 2 * VECTOR + 2] for each in bearings]),
-            sliding=_padded([x[w["sliding"]] for x, w in zip(most, entries, strict=True)]),
+            sliding=padded([x[w["sliding"]] for x, w in zip(most, entries, strict=True)]),
             normal_force=np.stack(normal, axis=1),
         )
 
@@ -176,14 +145,15 @@ def named(vector: Array) -> dict[str, float]:
     return dict(zip(("E1", "E2", "E3", "radial"), vector.tolist(), strict=True))
 
 
-def _vectors(values: Array) -> Array:
-    """Peaks of vectors along time, shape (..., k, 3)."""
+def along_time(values: Array) -> Array:
+    """Peaks of vectors along time, shape (..., k, 3): shape (..., 4)."""
     radial = np.hypot(values[..., 0], values[..., 1]).max(axis=-1)
     found: Array = np.concatenate([np.abs(values).max(axis=-2), radial[..., None]], axis=-1)
     return found
 
 
-def _padded(columns: Sequence[Array]) -> Array:
+def padded(columns: Sequence[Array]) -> Array:
+    """Values of the surfaces of all bearings, shape (bearings, most surfaces); zero where a bearing has none."""
     found = np.zeros((len(columns), max(len(each) for each in columns)))
     for row, each in zip(found, columns, strict=True):
         row[: len(each)] = each

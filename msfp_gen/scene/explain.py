@@ -138,7 +138,7 @@ def _top(top: Top) -> Table:
     return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
 
 
-def effect_table(selection: EffectSelection, monitors: str = "monitors add others when needed") -> Table:
+def effect_table(selection: EffectSelection) -> Table:
     """The effects and their meaning; of each selected effect also the reason and what the selection saves."""
     effects = selection.effects
     reasons = {reason.effect: reason for reason in selection.reasons}
@@ -156,7 +156,7 @@ def effect_table(selection: EffectSelection, monitors: str = "monitors add other
     if not reasons:
         return Table("effects as given; monitors note where an effect left out becomes significant", (), rows)
     error = f"{selection.error:.3g} of the friction force"
-    title = f"effects selected for an error of {error}; {monitors}"
+    title = f"effects selected for an error of {error}; monitors add others when needed"
     return Table(title, (), rows)
 
 

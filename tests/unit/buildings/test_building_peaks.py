@@ -9,6 +9,7 @@ import pytest
 from support.buildings import BEARING, frame, scene
 
 from msfp_gen import Motion, Solver, simulate
+from msfp_gen.buildings.data import peaks_of_rows
 from msfp_gen.buildings.peaks import Peaks
 
 EVENTFUL = scene(frame(), duration=0.8)
@@ -22,7 +23,7 @@ def test_peaks_do_not_depend_on_the_rows():
     for one in fields(Peaks):
         expected = getattr(fine.peaks, one.name)
         assert getattr(coarse.peaks, one.name) == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max()), one.name
-    short = Peaks.of_rows(coarse)
+    short = peaks_of_rows(coarse)
     assert np.all(short.node_acceleration <= coarse.peaks.node_acceleration)
     assert np.any(short.node_acceleration < 0.8 * coarse.peaks.node_acceleration)
     assert coarse.summary["floors"][-1]["peak_acceleration"]["E1"] == coarse.peaks.node_acceleration[-1, 0]
@@ -40,7 +41,7 @@ def test_peaks_are_those_of_rows_at_every_step():
     bearings = [*EVENTFUL.bearings[:3], replace(EVENTFUL.bearings[3], motion=Motion.from_arrays(times, path))]
     made = replace(EVENTFUL, bearings=bearings, duration=0.5, output_step=1e-3, solver=Solver(max_step=1e-3))
     found = simulate(made)
-    rows, surfaces = Peaks.of_rows(found), BEARING.layout.surfaces
+    rows, surfaces = peaks_of_rows(found), BEARING.layout.surfaces
     assert found.peaks.normal_force.shape == (4, 2, surfaces)
     for one in fields(Peaks):
         recorded, of_rows = getattr(found.peaks, one.name), getattr(rows, one.name)
