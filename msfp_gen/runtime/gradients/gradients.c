@@ -185,6 +185,14 @@ static int ends_at_fixed_time(const msfp_run *run)
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
 }
 
+/* The last stage, where a rim that the step only just meets is in contact in it. Its damping force begins at the end of
+ * the step: it must not count as an acceleration of a longer step. */
+static int stage_in_new_contact(const msfp_run *run, int rim, const double *before)
+{
+    const int last = msfp_tableau_of(run->options.method)->stages - 1;
+    return rim >= 0 && before[rim] > 0.0 && run->gradients->trail.work[last].rim_active[rim] ? last : 0;
+}
+
 void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt)
 {
     static const msfp_parameter_columns constant;
@@ -214,6 +222,7 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
     const int prescribed = g->step_count > 0 || msfp_is_quasistatic(run);
     const int fixed = prescribed || ends_at_fixed_time(run);
     const int rim = prescribed ? -1 : rim_at_end(run, before, after);
+    g->trail.meets_rim = stage_in_new_contact(run, rim, before);
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
         for (int c = 0; c < C; ++c)
