@@ -185,12 +185,15 @@ static int ends_at_fixed_time(const msfp_run *run)
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
 }
 
-/* The last stage, where a rim that the step only just meets is in contact in it. Its damping force begins at the end of
- * the step: it must not count as an acceleration of a longer step. */
+/* The first stage with the damping force of a rim that the step only just meets; 0: none. This force begins at the end
+ * of the step and must not count as an acceleration of a longer step. */
 static int stage_in_new_contact(const msfp_run *run, int rim, const double *before)
 {
-    const int last = msfp_tableau_of(run->options.method)->stages - 1;
-    return rim >= 0 && before[rim] > 0.0 && run->gradients->trail.work[last].rim_active[rim] ? last : 0;
+    const int stages = rim >= 0 && before[rim] > 0.0 ? msfp_tableau_of(run->options.method)->stages : 0;
+    for (int i = 1; i < stages; ++i)
+        if (run->gradients->trail.work[i].rim_active[rim])
+            return i;
+    return 0;
 }
 
 void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt)

@@ -57,8 +57,11 @@ static const double *rates_v(const msfp_run *run, int j)
     return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
 }
 
+/* Its accelerations, by which the rates grow with the length of the step: those before a contact at its end. */
 static const double *rates_a(const msfp_run *run, int j)
 {
+    const int met = run->gradients->trail.meets_rim;
+    j = met && j >= met ? met - 1 : j;
     return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
 }
 
@@ -96,9 +99,8 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
     }
 }
 
-/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. longer: accelerations by
- * which v grows with the length of the step. */
-MSFP_INLINE void stage_point(const msfp_stage *stage, const double longer[NB][NQ], msfp_columns Q[NB][NQ],
+/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. longer: of rates_a. */
+MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp_columns Q[NB][NQ],
                              msfp_columns V[NB][NQ], msfp_point_columns *dat)
 {
     const double beta = stage->beta, inverse = 1.0 / beta;
@@ -109,7 +111,7 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, const double longer[NB][NQ
         for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
             for (int c = 0; c < C; ++c) {
                 const int d = unknown[i];
-                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * longer[k][d]) * inverse;
+                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * longer[k * NQ + d]) * inverse;
             }
     }
 }
@@ -120,7 +122,7 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
     msfp_point_columns *dat = &group->point;
-    const double(*longer)[NQ] = trail->stage[trail->meets_rim == i ? i - 1 : i].at.a;
+    const double *longer = rates_a(run, i);
     msfp_columns *x = group->work.residual;
     memcpy(dat->v, group->now.v, sizeof dat->v); /* of a locked spin */
     for (int k = 0; k < NB; ++k)
