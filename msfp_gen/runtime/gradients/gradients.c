@@ -164,12 +164,14 @@ static int factorise(msfp_run *run)
     return MSFP_OK;
 }
 
-/* Surface whose rim the slider meets or leaves at the end of the step, to which the step was shortened; -1: none. */
+/* Surface whose rim the slider meets or leaves at the end of the step, to which the step was shortened; -1: none. A
+ * fast slider may end beyond the tolerance, because no step to an event is shorter than a microsecond. */
 static int rim_at_end(const msfp_run *run, const double *before, const double *after)
 {
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
         const double tolerance = 1e-6 * run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_SC];
-        if (fabs(before[j]) > tolerance && fabs(after[j]) <= fmax(tolerance, 1e-3 * fabs(before[j])))
+        const int crosses = (before[j] > 0.0) != (after[j] > 0.0);
+        if (fabs(before[j]) > tolerance && (crosses || fabs(after[j]) <= fmax(tolerance, 1e-3 * fabs(before[j]))))
             return j;
     }
     return -1;
