@@ -294,7 +294,7 @@ def _result(sequence: RunSequence, history: History) -> Result:
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
         + landing_notes(events)
-        + gradient_notes(sequence),
+        + gradient_notes(sequence, events),
         recorded_extremes=extremes_of(segments),
         gradients=run_gradients(sequence, len(history.time)),
     )
