@@ -16,7 +16,7 @@ import numpy as np
 
 from msfp_gen import Scene, simulate, simulate_batch
 from msfp_gen.buildings.opening import changed_scene
-from msfp_gen.simulation.batch import usable_cores
+from msfp_gen.common.cores import usable_cores
 
 STUDIES = {
     "ridgecrest-clc": ("motion.scale", np.linspace(0.3, 1.1, 16)),

@@ -150,15 +150,17 @@ def client(**arguments: Any) -> dict[str, Any]:
     return answer
 
 
-def floors_given(parts: list[BaseSlab | Storey]) -> list[dict[str, Any]]:
-    """The floors as the client takes them."""
+def floors_given(
+    parts: list[BaseSlab | Storey], damping_time: float | list[float] = DAMPING_TIME
+) -> list[dict[str, Any]]:
+    """The floors as the client takes them; damping_time: damping over stiffness of all springs, or of each [s]."""
     found, level = [], 0.0
     for part in parts:
         each: dict[str, Any] = {"mass": part.mass, "inertia": part.inertia, "mass_centre": part.mass_centre}
         if isinstance(part, Storey):
             level += part.height
             springs = {"springs": list(part.springs), "stiffness_centre": part.stiffness_centre}
-            each |= {**springs, "damping_time": DAMPING_TIME}
+            each |= {**springs, "damping_time": damping_time}
         found.append({**each, "level": level})
     return found
 

@@ -25,8 +25,8 @@ import pandas as pd
 
 import msfp_gen
 from msfp_gen import simulate
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.scene.file.toml_text import dumps
-from msfp_gen.simulation.batch import usable_cores
 from msfp_gen.studies import fragility, load_study, read_study
 
 KILLS = 5

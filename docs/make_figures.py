@@ -53,6 +53,10 @@ def draw_runs(folder: Path) -> None:
     figures.plot_section(test, folder / "gallery-circles.png", time=65.0, friction_circles=True)
     figures.plot_force_path(test, folder / "gallery-force-path.png", time=65.0)
     figures.animate(test, folder / "gallery-movie.gif", seconds=3.0, frames_per_second=6, start=173.6, end=243.0)
+    hospital = simulate(load_scene("hospital-clc"))
+    figures.animate(
+        hospital, folder / "gallery-movie-building.gif", seconds=4.0, frames_per_second=6, start=7.5, end=11.5
+    )
 
 
 def draw_layouts(folder: Path) -> None:

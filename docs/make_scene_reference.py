@@ -11,6 +11,7 @@ from typing import Any
 
 from msfp_gen.buildings import file as buildings
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.soil import Soil
 from msfp_gen.buildings.storey import BaseSlab, Storey
 from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
 from msfp_gen.motions.records import ScaleTo
@@ -198,6 +199,7 @@ MEANINGS = {
     "node": "One table for each node of matrices: `[[building.node]]`.",
     "building.bearing": "One table for each bearing: `[[building.bearing]]`.",
     "interface": "Between top plate and building: `[building.interface]`, for all bearings without one of their own.",
+    "soil": "Springs of the ground below the bearings: `[building.soil]`, for all without one of their own.",
     "building.effects": "`[effects]` of all bearings that have none of their own.",
     "building.base.mass": "Mass of the slab.",
     "building.base.inertia": "Moments of inertia about E1, E2, E3 through the centre of mass.",
@@ -217,6 +219,7 @@ MEANINGS = {
     "building.bearing.position": "Position in plan; without it that of the node.",
     "building.bearing.node": "Node to which a rigid link attaches the bearing.",
     "building.bearing.interface": "As `[building.interface]`, for this bearing.",
+    "building.bearing.soil": "As `[building.soil]`, for this bearing.",
     "building.bearing.effects": "As `[effects]`, for this bearing.",
     "building.bearing.motion": "Motion of the ground below it, as `[motion]`; without it that of the scene.",
     "building.interface.stiffness": "Along E1 and E2.",
@@ -225,6 +228,12 @@ MEANINGS = {
     "building.interface.rotational_stiffness": "Against tilt of the top plate relative to the building.",
     "building.interface.rotational_damping": "Against the rate of that tilt.",
     "building.interface.damping": "Along E1 and E2.",
+    "building.soil.stiffness": "Along E1 and E2, below each bearing.",
+    "building.soil.vertical_stiffness": "Along E3.",
+    "building.soil.damping": "Along E1 and E2.",
+    "building.soil.vertical_damping": "Along E3.",
+    "building.soil.rotational_stiffness": "Not modelled: giving it is an error.",
+    "building.soil.mass": "Not modelled: giving it is an error.",
     "displacement": "Horizontal displacement across the bearing.",
     "all_rims": "Whether contact at every rim ends the run.",
 }
@@ -252,6 +261,7 @@ SECTIONS: list[tuple[str, str, type]] = [
     ("`[[building.node]]`", "building.node", buildings.NodeTable),
     ("`[[building.bearing]]`", "building.bearing", BuildingBearing),
     ("`[building.interface]`", "building.interface", NodeTop),
+    ("`[building.soil]`", "building.soil", Soil),
     ("Suites: `[[records]]`", "records", motion_tables.RecordMotion),
     ("Suites: `[scale_to]`", "scale_to", ScaleTo),
 ]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.characterise import characterise
     from msfp_gen.buildings.opening import changed_scene, load_scene
     from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+    from msfp_gen.buildings.soil import Soil
     from msfp_gen.buildings.storey import BaseSlab, Storey
     from msfp_gen.coupling.two_port import TwoPort
     from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
@@ -57,6 +58,7 @@ _MODULES = {
     "Rotation": "motions.prescribed",
     "RunError": "errors",
     "Scene": "scene.scene",
+    "Soil": "buildings.soil",
     "Solver": "scene.solver",
     "Stop": "scene.parts",
     "Storey": "buildings.storey",
@@ -96,6 +98,7 @@ __all__ = [
     "Rotation",
     "RunError",
     "Scene",
+    "Soil",
     "Solver",
     "Stop",
     "Storey",

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The wheel with compiled models: built, checked, and installed in an empty environment of each Python that there is. A
-# preset runs there without a compiler, without a cache and without SymPy.
+# The wheel with compiled models: built, checked, and installed in an empty environment of each Python that there is.
+# Presets of a bearing and of a building run there without a compiler, without a cache and without SymPy.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$PWD/.venv/bin
@@ -19,13 +19,15 @@ for version in 3.11 3.12 3.13 3.14; do
     "$bin/uv" venv -q --no-python-downloads --python "$version" "$place" 2>/dev/null || continue
     "$bin/uv" pip install -q --python "$place" dist/prebuilt/*.whl
     env -i HOME="$folder" PATH="$place/bin" MSFP_GEN_CACHE="$place/models" msfp-gen run fenz-test1 --json >"$place/summary.json"
+    env -i HOME="$folder" PATH="$place/bin" MSFP_GEN_CACHE="$place/models" msfp-gen run hospital-clc --json >"$place/hospital.json"
     "$place/bin/python" - "$place" <<'PYTHON'
 import json, pathlib, sys
 place = pathlib.Path(sys.argv[1])
 assert not (place / "models").exists(), "a model was built"
-assert json.loads((place / "summary.json").read_text())["status"] == "ok"
+for run in ("summary", "hospital"):
+    assert json.loads((place / f"{run}.json").read_text())["status"] == "ok"
 PYTHON
-    echo "Python $version: a preset runs without a compiler"
+    echo "Python $version: a bearing and a building run without a compiler"
     tested=$((tested + 1))
 done
 [ "$tested" -gt 0 ] || { echo "no Python to test the wheel with" >&2; exit 1; }

@@ -17,12 +17,14 @@ from tempfile import TemporaryDirectory
 from msfp_gen.jit.build import prepare
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.jit.compiler import zig_program
+from msfp_gen.jit.driver import build_driver
 from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
 
 TAGS = ("cp311-abi3-manylinux_2_17_x86_64", "cp311-abi3-manylinux2014_x86_64")
 OPTIONS = (
     "cc", "-target", "x86_64-linux-gnu.2.17", "-fno-sanitize=undefined", "-s", "-DPy_LIMITED_API=0x030B0000",
 )  # fmt: skip
+DRIVERS = ("msfp_gen.buildings",)  # packages with compiled code beside the models
 PROCESSORS = {1: "x86_64", 3: "x86_64_v3"}
 
 
@@ -57,14 +59,16 @@ def check_sources(unpacked: Path) -> None:
 
 
 def add_models(root: Path, zig: Path, cache: Path) -> None:
-    """Build every model for every level of the processor and copy it to `root`."""
+    """Build every model for every level of the processor, and the drivers for all, and copy them to `root`."""
     os.environ.pop("MSFP_GEN_CFLAGS", None)
     for level in LEVELS:
         os.environ["CC"] = shlex.join([str(zig), *OPTIONS, f"-mcpu={PROCESSORS[level]}"])
         os.environ["MSFP_GEN_CACHE"] = str(cache / str(level))
         for spec in prebuilt_specs():
-            folder = add_prebuilt(spec, level, prepare(spec, portable=True).folder, root)
+            folder = add_prebuilt(level, prepare(spec, portable=True).folder, root)
             print(folder.name, spec.key, flush=True)
+    for package in DRIVERS:  # compiled for the last level, which every processor reaches
+        print(add_prebuilt(LEVELS[-1], build_driver(package).folder, root).name, package, flush=True)
 
 
 def change_tags(unpacked: Path) -> None:

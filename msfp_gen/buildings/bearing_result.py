@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.buildings.peaks import named
 from msfp_gen.common.arrays import Array
+from msfp_gen.results.note import Note
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.data import BuildingData
@@ -61,6 +63,11 @@ class BearingResult:
         return across
 
     @property
+    def transitions(self) -> tuple[Note, ...]:
+        """The notes of its monitors after which it continued with another model; `action` says with which effects."""
+        return tuple(note for index, note in self.building.monitored if index == self.index and note.action)
+
+    @property
     def top_force(self) -> Array:
         """Force of the bearing on the building, shape (k, 3) [N]."""
         force: Array = -self.building.wrench[:, self.index, 1, :3]
@@ -104,30 +111,32 @@ class BearingResult:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Main results as plain data, SI units; lists have one value for each surface, bottom first.
+        """Main results as plain data, SI units; peaks are over all steps, lists for the surfaces, bottom first.
 
         Keys: number (from 1), name, layout, position; peak_displacement and peak_top_force along E1, E2, E3 and radial
         [m], [N]; axial_load at rest [N], minimum_load_ratio and maximum_load_ratio (of it) [-]; peak_sliding and
         capacity_left [m]; rims_met (surfaces); minimum_normal_force and maximum_normal_force [N]; dissipated at the end
         [J].
         """
-        scene, left = self.building.scene, self.capacity - self.sliding.max(axis=0)
-        ratio = self.axial_force / self.axial_load
+        scene, peaks, index = self.building.scene, self.building.peaks, self.index
+        surfaces = self.bearing.layout.surfaces
+        sliding, normal = peaks.sliding[index, :surfaces], peaks.normal_force[index, :, :surfaces]
+        left, ratio = self.capacity - sliding, peaks.axial_force[index] / self.axial_load
         return {
             "number": self.index + 1,
             "name": scene.bearings[self.index].name,
             "layout": self.bearing.layout.name,
             "position": scene.places[self.index].tolist(),
-            "peak_displacement": peaks(self.displacement),
-            "peak_top_force": peaks(self.top_force),
+            "peak_displacement": named(peaks.bearing_displacement[index]),
+            "peak_top_force": named(peaks.top_force[index]),
             "axial_load": self.axial_load,
-            "minimum_load_ratio": float(ratio.min()),
-            "maximum_load_ratio": float(ratio.max()),
-            "peak_sliding": self.sliding.max(axis=0).tolist(),
+            "minimum_load_ratio": float(ratio[0]),
+            "maximum_load_ratio": float(ratio[1]),
+            "peak_sliding": sliding.tolist(),
             "capacity_left": left.tolist(),
             "rims_met": (np.flatnonzero(left <= 0) + 1).tolist(),
-            "minimum_normal_force": self.normal_force.min(axis=0).tolist(),
-            "maximum_normal_force": self.normal_force.max(axis=0).tolist(),
+            "minimum_normal_force": normal[0].tolist(),
+            "maximum_normal_force": normal[1].tolist(),
             "dissipated": float(self.dissipated[-1]),
         }
 
@@ -135,10 +144,3 @@ class BearingResult:
 def bearings_of(building: BuildingData) -> tuple[BearingResult, ...]:
     """The result of every bearing of a building."""
     return tuple(BearingResult(building, index) for index in range(len(building.scene.bearings)))
-
-
-def peaks(vector: Array) -> dict[str, float]:
-    """Largest magnitudes along E1, E2, E3 and in the horizontal plane; vector: shape (k, 3)."""
-    along = np.abs(vector).max(axis=0).tolist()
-    radial = float(np.hypot(vector[:, 0], vector[:, 1]).max())
-    return {**dict(zip(("E1", "E2", "E3"), along, strict=True)), "radial": radial}

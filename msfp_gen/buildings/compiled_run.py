@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-import os
+import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
+from msfp_gen.buildings import switching
+from msfp_gen.buildings.member import Member
+from msfp_gen.buildings.peaks import Peaks, vectors
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
-from msfp_gen.coupling.two_port import TwoPort
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError
 from msfp_gen.jit.driver import load_driver
+from msfp_gen.model.compiled import Port
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
 
-KEPT = ("normal", "sliding", "kinetic", "potential", "rim_stored", "seat_stored", "work")  # of the row of a bearing
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 ENERGIES = ("damped", "received", "input")
 
@@ -39,8 +42,22 @@ class Run(Protocol):
         """Rows until now, shape (T, size)."""
 
     @property
+    def row_count(self) -> int:
+        """How many they are."""
+
+    @property
+    def peaks(self) -> Array:
+        """Peaks over all steps, one number after the other."""
+
+    @property
     def counts(self) -> dict[str, int]:
         """Counters."""
+
+    def ends(self, bearing: int) -> Array:
+        """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6)."""
+
+    def replace(self, bearing: int, port: Port, entries: Array) -> None:
+        """Continue with another two-port of a bearing in that state."""
 
     def advance(self, steps: int) -> bool:
         """Take at most `steps` steps; False where the run has ended."""
@@ -52,19 +69,43 @@ class Run(Protocol):
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BuildingRun:
     """A compiled run and its parts.
 
-    run: compiled. ports: the two-ports of the bearings, which only the run steps. grounds: the different motions of the
-    ground, that of the scene first. build: hash of all that determines the numbers beside the scene.
+    run: compiled. members: the bearings, which only the run steps. grounds: the different motions of the ground, that
+    of the scene first. build: hash of all that determines the numbers beside the scene. changes: of the models of
+    bearings, in order.
     """
 
     run: Run
     scene: BuildingScene
-    ports: list[TwoPort]
+    members: list[Member]
     grounds: list[Motion]
     build: str
+    changes: list[switching.Change] = field(default_factory=list)
+    dropped_rows = 0  # it keeps all rows
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return self.run.time
+
+    @property
+    def peaks(self) -> Peaks:
+        """Peaks over all steps."""
+        return Peaks.of_run(self.scene, self.run.peaks, [member.slices for member in self.members])
+
+    def snapshot(self) -> bytes:
+        """State with all rows and all changes of models."""
+        return json.dumps([change.table for change in self.changes]).encode() + b"\n" + self.run.snapshot()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue, before the first step, from a snapshot of a run of the same scene. Raises ValueError."""
+        text, _, state = snapshot.partition(b"\n")
+        for table in json.loads(text):
+            switching.restored(self, switching.Change.of_table(table))
+        self.run.restore(state)
 
 
 def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
@@ -73,7 +114,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     threads: for the bearings; None: as many as there are processors, with eight bearings each. Results do not depend on
     it. Raises InputError, RunError.
     """
-    ports = [_port(scene, index) for index in range(len(scene.bearings))]
+    members = [Member.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
     grounds, ground_of = scene.grounds
     grid, building, solver = time_grid(scene, grounds), scene.building, scene.solver
     attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
@@ -82,27 +123,29 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     run: Run = module.Run(
         (building.mass, building.damping, building.stiffness),
         attached,
-        [port.compiled for port in ports],
+        [member.port for member in members],
         scene.attachments[:, :, attached],
         pieces,
         ground_of,
-        [_entries(port) for port in ports],
+        [member.entries for member in members],
+        vectors(scene),
+        scene.places - scene.mass_centre,
         weight=float(scene.axial_loads.sum()),
         stops=grid.stops,
         jumps=grid.jumps,
         span_ends=grid.ends,
         span_steps=grid.steps,
-        method=ports[0].model.extension.METHODS[solver.method],
+        method=members[0].model.extension.METHODS[solver.method],
         rtol=solver.rtol,
         max_step=solver.max_step or 0.0,
         first_step=solver.first_step or 0.0,
         max_steps=float(solver.max_steps),
         end=scene.end,
         output_step=scene.row_step,
-        threads=_threads(threads, len(ports)),
+        threads=_threads(threads, len(members)),
     )
-    keys = [key, *(port.model.info.key for port in ports)]
-    return BuildingRun(run, scene, ports, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
+    keys = [key, *(member.model.info.key for member in members)]
+    return BuildingRun(run, scene, members, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
 
 
 def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:
@@ -115,15 +158,15 @@ def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:
 
 def columns(run: BuildingRun) -> Iterator[tuple[str, int, Any]]:
     """Parts of a row in order: what it is, how many numbers, and their shape."""
-    n, bearings = len(run.scene.building.mass), run.ports
+    n = len(run.scene.building.mass)
     yield "time", 1, ()
     for name in ("displacement", "velocity", "acceleration"):
         yield name, n, (n,)
     yield "ground", 9 * len(run.grounds), (len(run.grounds), 3, 3)
     yield from ((name, 1, ()) for name in ENERGIES)
-    for index, port in enumerate(bearings):
+    for index, member in enumerate(run.members):
         yield f"wrench {index}", 12, (2, 6)
-        for name, shape in _shapes(port):
+        for name, shape in member.shapes:
             yield f"{name} {index}", int(np.prod(shape)), shape
 
 
@@ -133,36 +176,16 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
     for name, count, shape in columns(run):
         found[name] = rows[:, begin : begin + count].reshape(len(rows), *shape)
         begin += count
+    for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
+        found[f"work {index}"] = found[f"work {index}"] + switching.earlier_work(
+            run.changes, index, found[f"work {index}"].shape
+        )
     return found
-
-
-def _shapes(port: TwoPort) -> list[tuple[str, tuple[int, ...]]]:
-    return [(name, tuple(shape)) for name, shape in port.model.extension.ROW if name in KEPT]
-
-
-def _entries(port: TwoPort) -> Array:
-    """Indices into the row of a model of the numbers that are kept."""
-    found, begin = [], 0
-    for name, shape in port.model.extension.ROW:
-        count = int(np.prod(shape))
-        if name in KEPT:
-            found.append(np.arange(begin, begin + count))
-        begin += count
-    return np.concatenate(found)
-
-
-def _port(scene: BuildingScene, index: int) -> TwoPort:
-    given, load = scene.bearings[index], float(scene.axial_loads[index])
-    try:
-        return TwoPort(given.bearing, given.interface, load, scene.modelled[index], scene.solver)
-    except InputError as error:
-        raise InputError(f"scene.bearings[{index}]: {error}") from None
 
 
 def _threads(given: int | None, bearings: int) -> int:
     if given is None:
-        processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return max(1, min(processors, bearings // BEARINGS_OF_A_THREAD))
+        return max(1, min(usable_cores(), bearings // BEARINGS_OF_A_THREAD))
     if isinstance(given, bool) or not isinstance(given, int) or given < 1:
         raise InputError(f"threads = {given!r}: give a whole number of at least 1")
     return given

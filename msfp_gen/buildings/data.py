@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from msfp_gen.buildings.peaks import Peaks
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.results.note import Note
+from msfp_gen.results.resample import checked_times, interpolated
+
+B = TypeVar("B", bound="BuildingData")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,8 +30,9 @@ class BuildingData:
     of each bearing, a list of arrays of shape (k, n-1) [N], [m]. Energies, shape (k,) or (k, bearings) [J]: dissipated:
     in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
     received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
-    counts: of the run. status: "ok" or the name of a failure; message: one line of text, "" for a run that succeeded.
-    provenance: versions with which the result was computed. wall_time [s].
+    counts: of the run. monitored: notes of the monitors of the bearings, each with its bearing, from 0. recorded_peaks:
+    over all steps; None: not recorded. status: "ok" or the name of a failure; message: one line of text, "" for a run
+    that succeeded. provenance: versions with which the result was computed. wall_time [s].
     """
 
     scene: BuildingScene
@@ -42,10 +51,17 @@ class BuildingData:
     input: Array
     support: Array
     counts: dict[str, int]
+    monitored: tuple[tuple[int, Note], ...] = ()
+    recorded_peaks: Peaks | None = None
     status: str = "ok"
     message: str = ""
     provenance: dict[str, str] = field(default_factory=dict)
     wall_time: float = 0.0
+
+    @cached_property
+    def peaks(self) -> Peaks:
+        """Peaks over all steps, or of the rows where the run did not record them."""
+        return self.recorded_peaks or Peaks.of_rows(self)
 
     @property
     def succeeded(self) -> bool:
@@ -113,6 +129,23 @@ class BuildingData:
     @property
     def _size(self) -> int:
         return len(self.scene.building.mass)
+
+
+def at_times(result: B, times: ArrayLike) -> B:
+    """`result` with rows at other times, by linear interpolation between its own rows.
+
+    times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
+    """
+    new_times = checked_times(result.time, times)
+
+    def rows(values: Any) -> Any:
+        if isinstance(values, list):
+            return [rows(each) for each in values]
+        return interpolated(result.time, values, new_times)
+
+    columns = {each.name: getattr(result, each.name) for each in fields(BuildingData)}
+    changed = {name: rows(values) for name, values in columns.items() if isinstance(values, (np.ndarray, list))}
+    return replace(result, **changed)
 
 
 def _squares(rows: Array, matrix: Array) -> Array:

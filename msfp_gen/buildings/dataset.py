@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from msfp_gen.buildings.data import BuildingData
 
+SOURCE = "msfp-gen building"  # by which a file is known
 AXES = LABELS["axis"]
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
@@ -123,12 +124,13 @@ def attributes(result: BuildingData) -> dict[str, Any]:
 
     return {
         "title": result.scene.name or "unnamed",
-        "source": "msfp-gen building",
+        "source": SOURCE,
         "status": result.status,
         "message": result.message,
         "notes": json.dumps([note.line for note in notes_of(result)]),
         "scene": scene_text(result.scene),
         "counts": json.dumps(result.counts),
+        "monitored": json.dumps([[index, vars(note)] for index, note in result.monitored]),
         "wall_time": result.wall_time,
         "provenance": json.dumps(result.provenance),
         "padding": "NaN: the bearing has no such surface",

@@ -33,6 +33,8 @@ class _Supported(Protocol):
     def interface(self) -> NodeTop: ...
     @property
     def effects(self) -> Effects | Auto | None: ...
+    @property
+    def motion(self) -> Motion | None: ...
 
 
 class _OnBearings(Protocol):
@@ -56,8 +58,13 @@ class _OnBearings(Protocol):
 
 def select_effects(scene: _OnBearings) -> tuple[EffectSelection, ...]:
     """The effects of every bearing: as given, or selected. Raises InputError where they exclude each other."""
-    remaining = remaining_loads(scene)
-    return tuple(_selected(scene, index, float(remaining[index])) for index in range(len(scene.bearings)))
+    if all(isinstance(each.effects, Effects) for each in scene.bearings):
+        remaining: list[float] = [0.0] * len(scene.bearings)  # nothing is selected
+    elif any(_ground(scene, each) != _ground(scene, scene.bearings[0]) for each in scene.bearings):
+        remaining = [-np.inf] * len(scene.bearings)  # the estimate has one motion of the ground
+    else:
+        remaining = remaining_loads(scene).tolist()
+    return tuple(_selected(scene, index, share) for index, share in enumerate(remaining))
 
 
 def _selected(scene: _OnBearings, index: int, remaining: float) -> EffectSelection:
@@ -77,29 +84,37 @@ def _selected(scene: _OnBearings, index: int, remaining: float) -> EffectSelecti
 
 
 def _reasons(bearing: Bearing, requested: Auto, remaining: float) -> tuple[Reason, ...]:
-    """The selection of every effect that `Auto` leaves open. remaining: as of `remaining_loads`."""
+    """The selection of every effect that `Auto` leaves open. remaining: as of `remaining_loads`; -inf: not known."""
     capacity = min(surface.capacity for surface in bearing.surfaces)
     friction = select_friction(bearing, requested.friction_law)
     lifts = remaining <= LEAST_SHARE and requested.sliders != "massless"
+    left = f"about {max(remaining, 0.0):.0%} of the load at rest remains"
+    if remaining == -np.inf:
+        left = "the ground moves differently below some bearings, which may take the load off others"
     saves = "" if lifts else f"{3 * bearing.layout.surfaces} unknown separations"
     return (
         Reason("dimension", "spatial", "the building moves a bearing in space"),
         Reason("sliders", "inertial", "quasi-static steps need motion in one vertical plane"),
         Reason("rims", True, f"nothing limits sliding under a building; the least capacity is {1e3 * capacity:.4g} mm"),
-        Reason("uplift", lifts, f"about {max(remaining, 0.0):.0%} of the load at rest remains", saves),
+        Reason("uplift", lifts, left, saves),
         Reason("friction", friction, "the parameters that its surfaces have"),
     )
+
+
+def _ground(scene: _OnBearings, bearing: _Supported) -> Motion:
+    """The motion of the ground below a bearing."""
+    return scene.motion if bearing.motion is None else bearing.motion
 
 
 def remaining_loads(scene: _OnBearings) -> Array:
     """An estimate of the least axial load of every bearing over that at rest, ndarray, shape (bearings,).
 
-    Vertically the response of the linear building on the springs of its interfaces; beyond that it overturns as a
-    rigid body under the horizontal force of its bearings where all surfaces slide, at the largest distance of the
-    ground from its start.
+    The ground moves as below the first bearing. Vertically the response of the linear building on the springs of its
+    interfaces; beyond that it overturns as a rigid body under the horizontal force of its bearings where all surfaces
+    slide, at the largest distance of the ground from its start.
     """
     times = np.arange(0.0, scene.end, STEP)
-    path = scene.motion.displacement(times)[:, :2]
+    path = _ground(scene, scene.bearings[0]).displacement(times)[:, :2]
     overturning = _overturning(scene, float(np.linalg.norm(path - path[0], axis=1).max()))
     found: Array = 1.0 + (_vertical_response(scene, times).min(axis=0) - overturning) / scene.axial_loads
     return found
@@ -121,7 +136,7 @@ def _vertical_response(scene: _OnBearings, times: Array) -> Array:
     squares, modes = eigh(stiffness, building.mass)
     part = -modes.T @ building.mass @ building.rigid_motions[:, 2]
     rates = np.einsum("im,ij,jm->m", modes, damping, modes)
-    ground = scene.motion.acceleration(times)[:, 2]
+    ground = _ground(scene, scene.bearings[0]).acceleration(times)[:, 2]
     loads = np.zeros((len(times), len(rows)))
     for mode, square, rate, force in zip(modes.T, squares, rates, part, strict=True):
         along = rows @ mode

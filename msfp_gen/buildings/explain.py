@@ -72,20 +72,16 @@ def bearing_table(scene: BuildingScene) -> Table:
 def effect_tables(scene: BuildingScene) -> Iterator[Table]:
     """The effects of each bearing, those with the same ones together; loads that decide are the least of them."""
     groups: dict[object, list[int]] = {}
+    remaining = remaining_loads(scene)
     for index, selection in enumerate(scene.effect_selections):
         asked = tuple((reason.effect, reason.chosen) for reason in selection.reasons)
         groups.setdefault((selection.effects, asked, scene.bearings[index].bearing), []).append(index)
     for members in groups.values():
-        selection = scene.effect_selections[_decisive(scene, members)]
+        decisive = min(members, key=lambda index: float(remaining[index]))  # keeps the least of its load
+        selection = scene.effect_selections[decisive]
         table = one.effect_table(selection, "monitors note where they do not suffice")
         yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
         yield from one.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
-
-
-def _decisive(scene: BuildingScene, members: Sequence[int]) -> int:
-    """The bearing of a group that keeps the least of its load."""
-    remaining = remaining_loads(scene)
-    return min(members, key=lambda index: float(remaining[index]))
 
 
 def grouped(bearings: Sequence[BuildingBearing]) -> list[tuple[BuildingBearing, list[int]]]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.soil import Soil
 from msfp_gen.buildings.storey import BaseSlab, Storey
 from msfp_gen.common.fields import Quantity, errors_at
 from msfp_gen.errors import InputError
@@ -50,9 +51,14 @@ class NodeTable:
     position: Annotated[tuple[float, float, float], Quantity("m", shape=(3,))]
 
 
-_INTERFACE, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, BaseSlab, Storey, NodeTable))
+_INTERFACE, _SOIL, _BASE, _STOREY, _NODE = (model_of(kind) for kind in (NodeTop, Soil, BaseSlab, Storey, NodeTable))
 _BEARING = model_of(
-    BuildingBearing, bearing=(Any, ...), interface=(_INTERFACE, None), effects=(EFFECTS, None), motion=(MOTION, None)
+    BuildingBearing,
+    bearing=(Any, ...),
+    interface=(_INTERFACE, None),
+    soil=(_SOIL, None),
+    effects=(EFFECTS, None),
+    motion=(MOTION, None),
 )
 _BUILDING = model_of(
     FrameTable,
@@ -61,6 +67,7 @@ _BUILDING = model_of(
     node=(rows_of(_NODE), []),
     bearing=(rows_of(_BEARING), ...),
     interface=(_INTERFACE, None),
+    soil=(_SOIL, None),
     effects=(EFFECTS, None),
 )
 _SCENE = model_of(
@@ -78,12 +85,14 @@ TABLES = {
     "building.node": _NODE,
     "building.bearing": _BEARING,
     "building.interface": _INTERFACE,
+    "building.soil": _SOIL,
     "building.effects": PARTS["effects"],
     "building.bearing.interface": _INTERFACE,
+    "building.bearing.soil": _SOIL,
     "building.bearing.effects": PARTS["effects"],
     "solver": PARTS["solver"],
 }
-COMMON = ("interface", "effects")  # tables of [building] for all bearings that have none of their own
+COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 
 
 def building_from_table(
@@ -161,6 +170,9 @@ def _bearing(given: Table, path: str, named: Table, folder: Path | None) -> Buil
             values["motion"] = _motion(values["motion"], folder)
     with errors_at("top", f"{path}.interface"):
         values["interface"] = NodeTop(**values["interface"])
+    with errors_at("soil", f"{path}.soil"):
+        if "soil" in values:
+            values["interface"] = Soil(**values.pop("soil")).below(values["interface"])
     with errors_at("building_bearing", path):
         return BuildingBearing(**values)
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msfp_gen.buildings.dataset import stored, to_dataset
+from msfp_gen.buildings.columns import table
+from msfp_gen.buildings.dataset import attributes, stored, to_dataset
 from msfp_gen.buildings.text import GROUP, ground_name, to_arrays
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.results import export
@@ -20,7 +21,15 @@ if TYPE_CHECKING:
 
     from msfp_gen.buildings.data import BuildingData
 
-DIGESTED = ("scene", "status", "message", "counts", "provenance")  # attributes that the digest of a file covers
+PEAKS = "peaks"  # group
+DIGESTED = (
+    "scene",
+    "status",
+    "message",
+    "counts",
+    "monitored",
+    "provenance",
+)  # attributes that the digest of a file covers
 
 
 def save(result: BuildingData, path: str | Path) -> Path:
@@ -44,6 +53,8 @@ def write_netcdf(result: BuildingData, path: str | Path) -> Path:
     dataset = to_dataset(result)
     groups = {GROUP: to_arrays(result.scene.building)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
+    if result.recorded_peaks is not None:
+        groups[PEAKS] = result.recorded_peaks.to_arrays()
     dataset.attrs[DIGEST] = digest_of(result, groups)
     write_groups(path, dataset, groups)
     return path
@@ -51,7 +62,7 @@ def write_netcdf(result: BuildingData, path: str | Path) -> Path:
 
 def digest_of(result: BuildingData, groups: dict[str, xr.Dataset]) -> str:
     """The digest of the values from which a result is read."""
-    about = {name: value for name, value in to_dataset(result).attrs.items() if name in DIGESTED}
+    about = {name: value for name, value in attributes(result).items() if name in DIGESTED}
     arrays = {name: ArrayDigest.of(variable.values) for name, variable in stored(result).items()}
     arrays["time"] = ArrayDigest.of(result.time)
     for group, values in groups.items():
@@ -64,7 +75,7 @@ def write_csv(result: BuildingData, path: str | Path, names: Sequence[str] | Non
     target = check_output(path, (".csv",))
     dataset = to_dataset(result)
     title = f"{result.scene.name or 'unnamed building'}, status {result.status}; u = base - top"
-    export.write_csv_table(target, _table(dataset, names), title, _origin(dataset))
+    export.write_csv_table(target, table(dataset, names), title, _origin(dataset))
     return target
 
 
@@ -73,7 +84,7 @@ def write_parquet(result: BuildingData, path: str | Path, names: Sequence[str] |
     target = export.check_result_path(check_output(path, (".parquet",)))
     dataset = to_dataset(result)
     about = {str(key): str(value) for key, value in dataset.attrs.items()}
-    export.write_parquet_table(target, _table(dataset, names), about)
+    export.write_parquet_table(target, table(dataset, names), about)
     return target
 
 
@@ -82,15 +93,6 @@ def write_mat(result: BuildingData, path: str | Path) -> Path:
     target = check_output(path, (".mat",))
     export.write_mat_dataset(target, to_dataset(result))
     return target
-
-
-def _table(dataset: xr.Dataset, names: Sequence[str] | None) -> list[export.Column]:
-    named = [each._replace(name=each.name.replace(" ", "_")) for each in export.columns(dataset)]
-    return [
-        each
-        for each in export.selected_columns(named, names)
-        if not each.values.size or each.values[0] == each.values[0]
-    ]
 
 
 def _origin(dataset: xr.Dataset) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -56,16 +57,23 @@ def scene_of(table: Mapping[str, Any], folder: Path | None = None) -> AnyScene:
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     """The table of a scene with absolute paths of its files; `folder`: as in `scene_from_table`. Raises InputError."""
-    found = dict(table)
-    for part, names in FILES.items():
-        inner = found.get(part)
-        if isinstance(inner, Mapping):
-            paths = {name: resolved(inner[name], folder, f"{part}.{name}") for name in names if name in inner}
-            found[part] = {**inner, **paths}
+    found = deepcopy(dict(table))
+    for place, inner, names in _with_files(found):
+        inner.update({name: resolved(inner[name], folder, f"{place}.{name}") for name in names if name in inner})
     return found
 
 
 def files_of(table: Mapping[str, Any]) -> list[str]:
     """The files that the table of a scene names, in its order."""
-    given = [table[part].get(name) for part, names in FILES.items() for name in names if part in table]
-    return [path for each in given if each is not None for path in ([each] if isinstance(each, str) else each)]
+    given = [inner[name] for _, inner, names in _with_files(table) for name in names if name in inner]
+    return [path for each in given for path in ([each] if isinstance(each, str) else each)]
+
+
+def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...]]]:
+    """Place, table and keys of every table that may name files; the motions of single bearings are the last."""
+    yield from ((part, table[part], names) for part, names in FILES.items() if isinstance(table.get(part), dict))
+    frame = table.get("building")
+    rows = frame.get("bearing") if isinstance(frame, dict) else None
+    for i, row in enumerate(rows if isinstance(rows, list) else ()):
+        if isinstance(row, dict) and isinstance(row.get("motion"), dict):
+            yield f"building.bearing[{i}].motion", row["motion"], FILES["motion"]

@@ -9,19 +9,21 @@ from typing import Any, TypeVar
 import numpy as np
 
 from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.dataset import ENERGY, GROUND
-from msfp_gen.buildings.files import DIGESTED
+from msfp_gen.buildings.dataset import ENERGY, GROUND, SOURCE
+from msfp_gen.buildings.files import DIGESTED, PEAKS
+from msfp_gen.buildings.peaks import Peaks
+from msfp_gen.buildings.peaks import shapes as shapes_of_peaks
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.text import GROUP, ground_name, scene_from, shapes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.results.note import Note
 from msfp_gen.results.reading import DAMAGE, DIGEST, REMEDY, motion_in
 from msfp_gen.results.stored_group import ArrayDigest, StoredGroup, digest, stored_groups
 from msfp_gen.scene.file.loader import toml_table
 
 Arrays = dict[str, Any]
 B = TypeVar("B", bound=BuildingData)
-SOURCE = "msfp-gen building"
 
 
 def is_building(path: str | Path) -> bool:
@@ -55,13 +57,23 @@ def _read(root: StoredGroup, kind: type[B]) -> B:
     arrays: Arrays = {}
     scene = _scene(root, about, arrays)
     rows = _rows(root, scene, arrays)
+    peaks = _peaks(root.group(PEAKS), scene, arrays) if PEAKS in root else None
+    monitored = tuple((int(index), Note(**note)) for index, note in json.loads(str(about.get("monitored", "[]"))))
     if written != digest(about, {name: ArrayDigest.of(values) for name, values in arrays.items()}):
         raise InputError("a value was changed after this file was written; run the scene again")
     counts = {str(name): int(count) for name, count in json.loads(str(about["counts"])).items()}
     provenance = {str(name): str(value) for name, value in json.loads(str(about["provenance"])).items()}
     status, message = str(about["status"]), str(about["message"])
     return kind(
-        scene, **rows, counts=counts, status=status, message=message, provenance=provenance, wall_time=wall_time
+        scene,
+        **rows,
+        counts=counts,
+        monitored=monitored,
+        recorded_peaks=peaks,
+        status=status,
+        message=message,
+        provenance=provenance,
+        wall_time=wall_time,
     )
 
 
@@ -80,6 +92,12 @@ def _scene(root: StoredGroup, about: dict[str, Any], arrays: Arrays) -> Building
         arrays |= pieces
         motions.append(motion)
     return scene_from(text, found, motions)
+
+
+def _peaks(group: StoredGroup, scene: BuildingScene, arrays: Arrays) -> Peaks:
+    found = {name: group.array(name, shape) for name, shape in shapes_of_peaks(scene).items()}
+    arrays |= {f"{PEAKS}/{name}": values for name, values in found.items()}
+    return Peaks(**found)
 
 
 def _rows(root: StoredGroup, scene: BuildingScene, arrays: Arrays) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
 from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
 from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.switching import notes_until_now
 from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.response import DISSIPATED
 from msfp_gen.results.note import Note
@@ -97,7 +98,7 @@ class BuildingResult(BuildingData):
 def result_of(run: BuildingRun) -> BuildingResult:
     """The rows of a run until now."""
     rows = unpacked(run)
-    count = len(run.ports)
+    count = len(run.members)
     works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
     return BuildingResult(
         scene=run.scene,
@@ -116,6 +117,8 @@ def result_of(run: BuildingRun) -> BuildingResult:
         input=rows["input"],
         support=rows["ground"][:, run.scene.grounds[1]],
         counts=run.run.counts,
+        monitored=notes_until_now(run),
+        recorded_peaks=run.peaks if len(rows["time"]) else None,
     )
 
 

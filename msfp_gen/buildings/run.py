@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from msfp_gen.buildings.compiled_run import BuildingRun, start_run
 from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.switching import switch
 from msfp_gen.errors import RunError
 from msfp_gen.specification.contract import STATUSES
 
@@ -16,7 +17,7 @@ _FAILURES = {status.name: status for status in STATUSES}
 Progress = Callable[[float, float], None]
 
 
-class Keeper(Protocol):
+class RunCheckpoint(Protocol):
     """A checkpoint of the run (`simulation/checkpoint.py`)."""
 
     def restore(self, run: Any) -> None:
@@ -32,36 +33,36 @@ class Keeper(Protocol):
 def simulate_building(
     scene: BuildingScene,
     progress: Progress | None = None,
-    keep: Callable[[BuildingRun], Keeper] | None = None,
+    keep: Callable[[BuildingRun], RunCheckpoint] | None = None,
     threads: int | None = None,
 ) -> BuildingResult:
     """The motion of a building and its bearings from rest.
 
     progress: called with the time reached and the end [s]. keep: gives the checkpoint of a run. threads: as in
     `start_run`. Raises InputError; RunError that names the bearing: it cannot follow, or a step has no solution; its
-    `result` has the rows until then, as after an interrupt.
+    `result` has the rows until then, as after an interrupt; None before the first row.
     """
     run = start_run(scene, threads)
     keeper = keep(run) if keep is not None else None
     if keeper is not None:
-        keeper.restore(run.run)
+        keeper.restore(run)
     interrupted = _advance(run, progress, keeper)
     status = run.run.status[0]
     if keeper is not None and status == "ok":  # a run that failed fails again from the last checkpoint
-        keeper.save(run.run)
+        keeper.save(run)
     if status == "ok" and interrupted:
         status = "interrupted"
     if status != "ok":
-        raise RunError(failure(run, status), status=status, result=result_of(run))
+        raise RunError(failure(run, status), status=status, result=result_of(run) if len(run.run.rows) else None)
     return result_of(run)
 
 
-def _advance(run: BuildingRun, progress: Progress | None, keeper: Keeper | None) -> bool:
+def _advance(run: BuildingRun, progress: Progress | None, keeper: RunCheckpoint | None) -> bool:
     """Take all steps; True after Ctrl-C."""
     try:
-        while run.run.advance(STEPS_PER_CALL):
+        while run.run.advance(STEPS_PER_CALL) or switch(run):
             if keeper is not None:
-                keeper.save_if_due(run.run)
+                keeper.save_if_due(run)
             if progress is not None:
                 progress(run.run.time, run.scene.end)
     except KeyboardInterrupt:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from msfp_gen.analysis.brief import MAX_NOTES, html_of, text_of
-from msfp_gen.buildings.bearing_result import bearings_of, peaks
+from msfp_gen.buildings.bearing_result import bearings_of
 from msfp_gen.buildings.notes import energy_error, notes_of
+from msfp_gen.buildings.peaks import named
 from msfp_gen.common.tables import Table, yes
 
 if TYPE_CHECKING:
@@ -17,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def summarise(result: BuildingData) -> dict[str, Any]:
-    """Summary of a run as plain data, ready for JSON; SI units. Peaks are along E1, E2, E3 and in the plane (`radial`).
+    """Summary of a run as plain data, ready for JSON; SI units.
+
+    Peaks are over all steps, along E1, E2, E3 and in the plane (`radial`).
 
     Keys:
         name, status, message, notes: of the run. duration: simulated time [s].
@@ -37,7 +38,8 @@ def summarise(result: BuildingData) -> dict[str, Any]:
     scene, duration = result.scene, float(result.time[-1] - result.time[0])
     bearings = [each.summary for each in bearings_of(result)]
     floors, storeys = floor_rows(result), storey_rows(result)
-    shear = peaks(result.base_reaction)
+    peaks = result.peaks
+    shear = named(peaks.base_reaction)
     return {
         "name": scene.name,
         "status": result.status,
@@ -48,8 +50,8 @@ def summarise(result: BuildingData) -> dict[str, Any]:
         "weight": scene.weight,
         "peak_base_shear": shear,
         "base_shear_ratio": shear["radial"] / scene.weight,
-        "peak_base_torsion": float(np.abs(result.base_torsion).max()),
-        "peak_twist": float(np.abs(result.node(scene.bearings[0].node)[:, 0, 5]).max()),
+        "peak_base_torsion": float(peaks.base_torsion[0]),
+        "peak_twist": float(peaks.base_twist[0]),
         "minimum_load_ratio": min(each["minimum_load_ratio"] for each in bearings),
         "maximum_load_ratio": max(each["maximum_load_ratio"] for each in bearings),
         "rims_met": [each["number"] for each in bearings if each["rims_met"]],
@@ -59,8 +61,8 @@ def summarise(result: BuildingData) -> dict[str, Any]:
         "storeys": storeys,
         "bearings": bearings,
         "energy": {
-            "peak_kinetic": float(result.kinetic.max()),
-            "peak_strain": float(result.strain.max()),
+            "peak_kinetic": float(peaks.energy[0]),
+            "peak_strain": float(peaks.energy[1]),
             "damped": float(result.damped[-1]),
             "dissipated": float(result.dissipated[-1].sum()),
             "closure_error": energy_error(result)[0],
@@ -73,33 +75,35 @@ def summarise(result: BuildingData) -> dict[str, Any]:
 
 def floor_rows(result: BuildingData) -> list[dict[str, Any]]:
     """Peaks of every node, as of `summarise`."""
-    rows = []
-    for node in result.scene.building.nodes:
-        motion = result.node(node.name)
-        moved = motion[:, 0, :3] - result.ground[:, 0]
-        acceleration = peaks(motion[:, 2, :3])
-        height = float(node.position[2])
-        rows.append(
-            {"name": node.name, "height": height, "peak_acceleration": acceleration, "peak_displacement": peaks(moved)}
+    peaks = result.peaks
+    return [
+        {
+            "name": node.name,
+            "height": float(node.position[2]),
+            "peak_acceleration": named(acceleration),
+            "peak_displacement": named(moved),
+        }
+        for node, acceleration, moved in zip(
+            result.scene.building.nodes, peaks.node_acceleration, peaks.node_displacement, strict=True
         )
-    return rows
+    ]
 
 
 def storey_rows(result: BuildingData) -> list[dict[str, Any]]:
     """Peaks of every storey, as of `summarise`."""
-    nodes, drift, force = result.scene.building.nodes, result.drift, result.storey_force
+    nodes, peaks = result.scene.building.nodes, result.peaks
     rows = []
     for index, column in enumerate(result.scene.building.columns):
         height = float(nodes[index + 1].position[2] - nodes[index].position[2])
-        drifts = peaks(drift[:, index, :3])
+        drifts = named(peaks.drift[index])
         rows.append(
             {
                 "name": column.name,
                 "height": height,
                 "peak_drift": drifts,
                 "peak_drift_ratio": drifts["radial"] / height,
-                "peak_shear": peaks(force[:, index, :3]),
-                "peak_torsion": float(np.abs(force[:, index, 5]).max()),
+                "peak_shear": named(peaks.storey_shear[index]),
+                "peak_torsion": float(peaks.storey_torsion[index]),
             }
         )
     return rows
@@ -109,9 +113,8 @@ def _largest(given: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: max(each[key] for each in given) for key in given[0]}
 
 
-def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
-    """Label and value of the main results, nine rows at most."""
-    s = summarise(result)
+def brief_rows(result: BuildingData, s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of the main results, nine rows at most. s: of `summarise`."""
     moved, shear, acceleration = s["peak_displacement"], s["peak_base_shear"], s["peak_floor_acceleration"]
     drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
     rows = [
@@ -130,23 +133,27 @@ def brief_rows(result: BuildingData) -> list[tuple[str, str]]:
 
 def brief_text(result: BuildingData) -> str:
     """The main results, ten lines at most."""
-    return text_of(f"Result of {result.scene.name or 'an unnamed building'}", brief_rows(result))
+    return text_of(f"Result of {result.scene.name or 'an unnamed building'}", brief_rows(result, summarise(result)))
 
 
 def brief_html(result: BuildingData) -> str:
     """The main results as a table, beside the orbit of the bearing that moves most."""
-    most = max(bearings_of(result), key=lambda each: peaks(each.displacement)["radial"])
+    most = max(bearings_of(result), key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
     x, y = most.displacement[:, :2].T
-    return html_of(result.scene.name, brief_rows(result), x, y, f"orbit of {most.label}")
+    return html_of(result.scene.name, brief_rows(result, summarise(result)), x, y, f"orbit of {most.label}")
 
 
 def summary_tables(result: BuildingData) -> list[Table]:
     """Tables of the run, its floors, storeys and bearings."""
     summary = summarise(result)
-    rows = [*brief_rows(result), ("energy", _energy(summary["energy"])), ("twist", f"{summary['peak_twist']:.3g} rad")]
+    rows = [
+        *brief_rows(result, summary),
+        ("energy", _energy(summary["energy"])),
+        ("twist", f"{summary['peak_twist']:.3g} rad"),
+    ]
     rows = [row for row in rows if row[0] != "notes"]
     tables = [Table(summary["name"] or "unnamed building", (), rows), _floors(summary["floors"])]
-    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), bearing_table(result)]
+    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), _bearings(summary["bearings"])]
 
 
 def _energy(energy: Mapping[str, float]) -> str:
@@ -185,7 +192,7 @@ def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
     return Table("peaks of storeys", columns, rows)
 
 
-def bearing_table(result: BuildingData) -> Table:
+def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
     """Peaks of every bearing."""
     rows = [
         (
@@ -198,7 +205,7 @@ def bearing_table(result: BuildingData) -> Table:
             f"{1e3 * min(each['capacity_left']):.1f}",
             yes(each["rims_met"]),
         )
-        for each in summarise(result)["bearings"]
+        for each in bearings
     ]
     columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rim")
     return Table("peaks of bearings; left: capacity less sliding", columns, rows)

@@ -17,12 +17,12 @@ from msfp_gen.cli import (
     exploring,
     exporting,
     fitting,
+    fmu_command,
     records,
     reporting,
     running,
     serving,
     studying,
-    units,
 )
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import signals_as_interrupts
@@ -43,7 +43,7 @@ app = typer.Typer(
 # This order is the order of the commands in the help text.
 for group in (
     running, batching, studying, exporting, drawing, assessment_commands, fitting, benching, reporting, exploring,
-    records, building, serving, units, cache_command,
+    records, building, serving, fmu_command, cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)
 

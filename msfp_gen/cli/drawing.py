@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msfp_gen.cli.console import Progress, SignOption, note, number, whole_number
-from msfp_gen.cli.inputs import load_source, of_building, one_bearing, result_of
+from msfp_gen.cli.inputs import load_source, of_building, result_of
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
 from msfp_gen.errors import InputError
 from msfp_gen.results.sign import DEFAULT, sign_of
@@ -30,7 +30,9 @@ Source = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, the 
 Azimuth = Annotated[
     float | None,
     typer.Option(
-        parser=number, metavar="DEGREES", help="Azimuth of the section from E1; default: of the displacement."
+        parser=number,
+        metavar="DEGREES",
+        help="Azimuth of the section from E1; default: of the displacement. Of a building: of the first elevation.",
     ),
 ]
 
@@ -93,7 +95,8 @@ def plot(
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen animate fenz-test5 -o test5.gif\n"
-    "  msfp-gen animate out.nc --start 5 --end 25 --seconds 20 -o slow.mp4"
+    "  msfp-gen animate out.nc --start 5 --end 25 --seconds 20 -o slow.mp4\n"
+    "  msfp-gen animate hospital-clc --start 5 --end 15 -o hospital.gif"
 )
 def animate(
     source: Source,
@@ -109,13 +112,16 @@ def animate(
     azimuth: Azimuth = None,
     sign: SignOption = DEFAULT,
 ) -> None:
-    """Write a movie of the stack in motion, with its loop and the bars of sliding surfaces."""
+    """Write a movie of the stack in motion, with its loop and the bars of sliding surfaces.
+
+    Of a building: the frame on its bearings in two elevations, with plan, loops and axial forces.
+    """
     from msfp_gen.figures import animate as write_movie
     from msfp_gen.figures import check_movie, using_sign
 
     check_movie(output, "--output")
     sign_of(sign, "--sign")
-    result, failure = result_of(one_bearing(_load_for_figures(source), f"SCENE = {source!r}"))
+    result, failure = result_of(_load_for_figures(source))
     angle = None if azimuth is None else math.radians(azimuth)
     with Progress("frames") as progress, using_sign(sign):
         write_movie(
@@ -145,7 +151,9 @@ def _check_figure_output(figure: str, output: Path) -> None:
     from msfp_gen.figures import BUILDING_FIGURES, FIGURES
 
     if figure not in (*FIGURES, *BUILDING_FIGURES, EVERY):
-        raise InputError(f"--figure = {figure!r}: give one of {', '.join((*FIGURES, EVERY))}")
+        raise InputError(
+            f"--figure = {figure!r}: give one of {', '.join(dict.fromkeys((*FIGURES, *BUILDING_FIGURES, EVERY)))}"
+        )
     if figure != EVERY and output.suffix:
         check_output(output, FIGURE_SUFFIXES, "--output")
     elif output.suffix.lower() in FIGURE_SUFFIXES:

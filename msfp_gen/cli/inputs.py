@@ -47,17 +47,17 @@ def of_building(loaded: object) -> bool:
 def one_bearing(loaded: Any, what: str) -> Any:
     """A scene or result of one bearing. Raises InputError that begins with `what` for one of a building."""
     if of_building(loaded):
-        raise InputError(f"{what}: this is a building; give a scene or result of one bearing, or `report` and `plot`")
+        raise InputError(f"{what}: this is a building; leave it out, or give a scene or result of one bearing")
     return loaded
 
 
 def build(scene: AnyScene, gradients: bool = False) -> None:
     """Build the models of a scene, with progress, unless they are in the cache. gradients: ones that have them."""
     from msfp_gen.model.model import build_model
-    from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.batch import specs_of
 
     with building() as progress:
-        for spec in [scene.spec] if isinstance(scene, Scene) else scene.specs:
+        for spec in specs_of(scene):
             build_model(spec.layout, spec.effects, gradients, progress=progress)
 
 

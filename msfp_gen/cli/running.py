@@ -142,7 +142,7 @@ def _run(
     stream: the run writes the output itself.
     """
     found = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
-    options = ({"strict": True} if strict else {}) | checkpoints.arguments | ({"stream": output} if stream else {})
+    options = {"strict": strict} | checkpoints.arguments | ({"stream": output} if stream else {})
     with checkpoints.hint_on_write_error():
         result, failure = run_scene(scene, **options) if found is None else (found.result, None)
     saved: list[Path] = []

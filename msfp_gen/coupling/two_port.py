@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,7 +84,7 @@ class TwoPort:
         scene = scene_at_rest(bearing, interface, axial_load, effects, Solver() if solver is None else solver)
         self.axial_load = 0.0 if axial_load is None else axial_load
         self.model: Model = build_model(bearing.layout, scene.modelled)
-        self._port: Port = _compiled(scene, self.model, self.axial_load)
+        self._port: Port = compiled_port(scene, self.model, self.axial_load)
         self._identity = _identity(scene, self.model, self.axial_load)
         self._ends = np.zeros((2, 3, 6))
         self._trial: tuple[float, Array] | None = None
@@ -255,7 +255,8 @@ def scene_at_rest(
     return Scene(bearing, Motion(*REST), top, effects=effects, solver=solver, top_rotation=rotation)
 
 
-def _compiled(scene: Scene, model: Model, axial_load: float) -> Port:
+def compiled_port(scene: Scene, model: Model, axial_load: float, **monitors: Any) -> Port:
+    """The compiled two-port of such a scene; monitors: as of `monitor_options`, for steps by stages."""
     count = scene.bearing.layout.surfaces
     q = np.zeros((count, 3))
     if model.effects.uplift:
@@ -271,6 +272,7 @@ def _compiled(scene: Scene, model: Model, axial_load: float) -> Port:
         max_step=solver.max_step or 0.0,
         first_step=solver.first_step or 0.0,
         max_steps=float(solver.max_steps),
+        **monitors,
     )
     return port
 

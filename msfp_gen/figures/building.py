@@ -127,7 +127,7 @@ def draw_plan(axes: Axes, result: BuildingData) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
     scene, bearings = result.scene, bearings_of(result)
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
-    factor = _magnification(scene.places, peak)
+    factor = magnification(scene.places, peak)
     for one, place in zip(bearings, scene.places, strict=True):
         u = shown_sign().factor * factor * one.displacement[:, :2]
         axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
@@ -233,7 +233,7 @@ def _overview_title(result: BuildingData) -> str:
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
 
 
-def _magnification(places: Array, peak: float) -> float:
+def magnification(places: Array, peak: float) -> float:
     """Factor on orbits in the plan: the largest fits between neighbours; a round number."""
     gaps = np.linalg.norm(places[:, None] - places[None], axis=-1)
     apart = float(gaps[gaps > 1e-9].min(initial=np.inf)) if len(places) > 1 else 1.0
@@ -267,6 +267,8 @@ class _Floor:
 
 def _spectrum(time: Array, values: Array) -> Array:
     """Pseudo-accelerations along E1, E2, E3, shape (p, 3) [m/s^2]."""
+    if len(time) < 2:  # of a run that ended at its start
+        return np.zeros((len(PERIODS), 3))
     found: Any = response_spectrum(_Floor(time, values), PERIODS, damping=DAMPING)
     psa: Array = found.psa[:, :3]
     return psa

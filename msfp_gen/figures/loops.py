@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from msfp_gen.common.arrays import Array
     from msfp_gen.results.run_data import RunData
 
 SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over the largest
@@ -78,7 +79,12 @@ def plot_orbit(result: RunData, path: str | Path | None = None) -> Figure:
 
 def moving_axes(result: RunData) -> tuple[int, ...]:
     """Horizontal axes (0: E1, 1: E2) along which the bearing moves; E1 if it does not move."""
-    peaks = np.abs(result.history.displacement[:, :2]).max(axis=0)
+    return axes_along(result.history.displacement)
+
+
+def axes_along(displacement: Array) -> tuple[int, ...]:
+    """Horizontal axes (0: E1, 1: E2) along which a path moves, shape (time, 2 or 3); E1 if it does not move."""
+    peaks = np.abs(displacement[:, :2]).max(axis=0)
     return tuple(np.flatnonzero(peaks > SIDE * peaks.max()).tolist()) or (0,)
 
 

@@ -1,22 +1,19 @@
-"""Movie of the stack in motion, with its loop and the bars of sliding surfaces: .gif by Pillow, .mp4 by ffmpeg.
-
-What stands still is drawn once; each frame moves the other artists over a copy of it.
-"""
+"""Movies of runs: a stack with its loop and the bars of sliding surfaces, or a building on its bearings."""
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from itertools import chain
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.buildings.data import BuildingData
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
+from msfp_gen.figures.building_movie import building_film
+from msfp_gen.figures.film import WIDE, WRITERS, Film, Layout, even, pictures
 from msfp_gen.figures.loops import draw_orbit, moving_axes
 from msfp_gen.figures.section import draw_section, limits
 from msfp_gen.figures.sliding import draw_bars
@@ -36,7 +33,7 @@ from msfp_gen.figures.style import (
 )
 from msfp_gen.motions.checks import positive
 from msfp_gen.results.geometry.section import Section, sections
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.resample import at_times, checked_times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,15 +41,13 @@ if TYPE_CHECKING:
 
     from msfp_gen.results.run_data import RunData
 
-MOVIE_SUFFIXES = (".gif", ".mp4")
-DOTS = 80  # per inch: 800 pixels wide
-WIDE, BELOW = 10.0, 2.7  # width of the movie, height of loop and bars [inch]
+MOVIE_SUFFIXES = tuple(WRITERS)
+BELOW = 2.7  # height of loop and bars [inch]
 AROUND, TALLEST = 1.55, 4.5  # height of title, legend and labels of the section, and of the section itself [inch]
-PALETTE = 256  # colours of a GIF
 
 
 def animate(
-    result: RunData,
+    result: RunData | BuildingData,
     path: str | Path,
     *,
     seconds: float = 8.0,
@@ -62,7 +57,11 @@ def animate(
     azimuth: float | None = None,
     progress: Callable[[float, float], None] | None = None,
 ) -> Path:
-    """Write a movie of a run: the section, the loop (or the orbit where both axes move), and the sliding surfaces.
+    """Write a movie of a run.
+
+    Of one bearing: the section, the loop (or the orbit where both axes move), and the sliding surfaces. Of a building:
+    the frame on its bearings in two elevations, the plan with the paths of the bearings, the loops of the isolation
+    system, and the axial forces; displacements are magnified by the factor that the title states.
 
     Args:
         result: the run.
@@ -71,7 +70,8 @@ def animate(
         frames_per_second: frame rate [1/s].
         start: first instant of the run that is shown [s]; None: its start.
         end: last instant of the run that is shown [s]; None: its end.
-        azimuth: plane of the section [rad]; None: that of the largest displacement.
+        azimuth: of the plane of the section [rad]; None: that of the largest displacement. Of a building: of the first
+            elevation, the other one is perpendicular to it; None: along E1.
         progress: called with the number of finished frames and of all frames.
 
     Returns:
@@ -84,16 +84,18 @@ def animate(
     if frames_per_second < 1:
         raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
     positive("seconds", seconds)
-    rows = result.history.time
+    rows = result.time if isinstance(result, BuildingData) else result.history.time
     first, last = (float(rows[0]) if start is None else start), (float(rows[-1]) if end is None else end)
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
-    at_times(result, (first, last))  # raises InputError for a time outside the run
-    frames = at_times(result, np.linspace(first, last, max(2, round(seconds * frames_per_second))))
-    found = sections(frames, azimuth)
-    with page(WIDE, _height(found)) as figure, replacing(target) as temporary:
-        pictures = _pictures(figure, result, frames, found, progress)
-        _WRITERS[target.suffix.lower()](pictures, temporary, frames_per_second)
+    checked_times(rows, (first, last))
+    times = np.linspace(first, last, max(2, round(seconds * frames_per_second)))
+    if isinstance(result, BuildingData):
+        film = building_film(result, times, azimuth)
+    else:
+        film = stack_film(result, times, azimuth)
+    with page(WIDE, film.height) as figure, replacing(target) as temporary:
+        WRITERS[target.suffix.lower()](pictures(figure, film, progress), temporary, frames_per_second)
     return target
 
 
@@ -109,75 +111,20 @@ def check_movie(path: str | Path, name: str = "movie") -> Path:
     return target
 
 
+def stack_film(result: RunData, times: Array, azimuth: float | None) -> Film:
+    """The movie of one bearing at these times [s], its section at `azimuth` [rad]."""
+    frames = at_times(result, times)
+    found = sections(frames, azimuth)
+    return Film(_height(found), len(times), lambda figure: _layout(figure, result, frames, found))
+
+
 def _height(found: list[Section]) -> float:
     """Height of the movie [inch]: the section over its full width to scale, the loop and the bars below it."""
     (left, right), (low, high) = limits(found)
-    panel = min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left))
-    return 2 * round((panel + AROUND + BELOW) * DOTS / 2) / DOTS  # video needs even numbers of pixels
+    return even(min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left)) + AROUND + BELOW)
 
 
-def _pictures(
-    figure: Figure,
-    result: RunData,
-    frames: RunData,
-    found: list[Section],
-    progress: Callable[[float, float], None] | None,
-) -> Iterator[Array]:
-    """The frames as pixels, shape (height, width, 4): what stands still is drawn once, the rest over a copy of it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    figure.set_dpi(DOTS)
-    canvas: Any = FigureCanvasAgg(figure)
-    update, moving = _layout(figure, result, frames, found)
-    for artist in moving:
-        artist.set_animated(True)
-    canvas.draw()
-    still, count = canvas.copy_from_bbox(figure.bbox), len(frames.history.time)
-    for row in range(count):
-        canvas.restore_region(still)
-        update(row)
-        for artist in moving:
-            artist.draw(canvas.get_renderer())
-        yield np.array(canvas.buffer_rgba())
-        if progress is not None:
-            progress(row + 1, count)
-
-
-def _write_gif(pictures: Iterator[Array], path: Path, frames_per_second: int) -> None:
-    """Write a GIF; all frames have the colours of the first one, which holds every colour of the movie."""
-    from PIL import Image
-
-    images = (Image.fromarray(picture[..., :3]) for picture in pictures)
-    first = next(images).quantize(PALETTE)
-    rest = (image.quantize(palette=first, dither=Image.Dither.NONE) for image in images)
-    first.save(path, save_all=True, append_images=rest, duration=1000 / frames_per_second, loop=0)
-
-
-def _write_mp4(pictures: Iterator[Array], path: Path, frames_per_second: int) -> None:
-    """Write an MP4 by ffmpeg, which reads the pixels from a pipe. Raises OSError with its message."""
-    from matplotlib.animation import FFMpegWriter
-
-    first = next(pictures)
-    size = f"{first.shape[1]}x{first.shape[0]}"
-    raw = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", size, "-framerate", str(frames_per_second), "-i", "pipe:"]
-    command = [FFMpegWriter.bin_path(), "-loglevel", "error", *raw, "-vcodec", "h264", "-pix_fmt", "yuv420p", "-y"]
-    with subprocess.Popen([*command, str(path)], stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdin is not None and process.stderr is not None
-        with suppress(BrokenPipeError):
-            for picture in chain((first,), pictures):
-                process.stdin.write(picture.tobytes())
-            process.stdin.close()
-        message = process.stderr.read().decode(errors="replace")
-    if process.returncode:
-        raise OSError(f"ffmpeg failed: {' '.join(message.split())[-200:]}")
-
-
-_WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
-
-
-def _layout(
-    figure: Figure, result: RunData, frames: RunData, found: list[Section]
-) -> tuple[Callable[[int], None], list[Any]]:
+def _layout(figure: Figure, result: RunData, frames: RunData, found: list[Section]) -> Layout:
     """Draw all parts; returns a function that moves them to one row of `frames`, and the artists that it changes."""
     headline(figure, label_of(result))
     height = figure.get_size_inches()[1]

@@ -118,7 +118,7 @@ class SectionDrawing:
         self.line.set_label("line of force")
         self.contacts = [self._contact(axes, index) for index in range(history.surfaces)]
         axes.set(
-            xlabel=f"{_direction(section.azimuth)}, from the centre of the base [mm]",
+            xlabel=f"{direction_of(section.azimuth)}, from the centre of the base [mm]",
             ylabel="height above the base [mm]",
         )
         self.title = axes.set_title(" ")
@@ -225,7 +225,7 @@ def _aspect(section: Section) -> float:
     return (high - low) / (right - left)
 
 
-def _direction(azimuth: float) -> str:
+def direction_of(azimuth: float) -> str:
     """Name of the horizontal direction at `azimuth` [rad]."""
     named = {0.0: "along E₁", 90.0: "along E₂"}
     degrees = round(float(np.degrees(azimuth)), 1)

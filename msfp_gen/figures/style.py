@@ -17,7 +17,7 @@ from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from msfp_gen.results.run_data import RunData
 
@@ -96,8 +96,8 @@ def plain(text: str) -> str:
     return "".join(letter if font.get_char_index(ord(letter)) else "?" for letter in text).replace("$", r"\$")
 
 
-def headline(figure: Figure, text: str) -> None:
-    """Set the title of a whole figure."""
+def headline(figure: Figure | SubFigure, text: str) -> None:
+    """Set the title of a figure, or of a part of it."""
     figure.suptitle(plain(text), fontsize=12, fontweight="bold", color=INK, x=0.01, ha="left")
 
 

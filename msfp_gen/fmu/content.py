@@ -18,7 +18,6 @@ def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
     effects, count = scene.spec.effects, scene.bearing.layout.surfaces
     loaded, surface = isinstance(scene.top, MassTop), contract.surface_values(effects)
     top, body = contract.names(contract.TOP), contract.names(contract.BODY)
-    outputs = [("TOP_FORCE", 18), ("BASE_FORCE", 21), ("SLIDING", 24)] if loaded else [("SLIDING", 12)]
     return {
         "stamp": f"written by msfp-gen {__version__}",
         "model": model_name(scene.spec),
@@ -35,7 +34,7 @@ def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
         "surface_size": len(surface),
         "seat_stiffness": surface.index("seat_stiffness") if effects.uplift else 0,
         "top_size": len(top),
-        "output_places": [*outputs, ("NORMAL", outputs[-1][1] + count)],
+        "output_places": _output_places(unit, loaded),
         "output_count": len(unit.at(Block.OUTPUTS)),
         "places": _places(unit, loaded),
         "names": [variable.name for variable in unit.variables],
@@ -43,6 +42,15 @@ def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
         "input_nominals": [unit.variables[i].nominal for i in unit.at(Block.INPUTS)],
         "state_nominals": [*(unit.variables[i].nominal for i in unit.at(Block.STATES)), 1.0],
     }
+
+
+def _output_places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
+    """Names in C of outputs, counted from the first output."""
+    names = [unit.variables[i].name for i in unit.at(Block.OUTPUTS)]
+    found = {"SLIDING": "surface[1].sliding", "NORMAL": "surface[1].normal"}
+    if loaded:
+        found |= {"TOP_FORCE": "top.force[1]", "BASE_FORCE": "lower.force[1]"}
+    return [(place, names.index(name)) for place, name in found.items()]
 
 
 def _places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:

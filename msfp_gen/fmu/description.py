@@ -10,7 +10,7 @@ from msfp_gen.fmu.units import CELSIUS, OFFSET, base_units
 from msfp_gen.fmu.variables import Block, Variable
 from msfp_gen.version import __version__
 
-CATEGORIES = {"logStatusWarning": "warnings", "logStatusDiscard": "states refused", "logStatusError": "errors"}
+CATEGORIES = {"logStatusDiscard": "states refused", "logStatusError": "errors"}
 STEP = 0.01  # communication step that is suggested [s]
 _CAUSALITY = {Block.TIME: "independent", Block.INPUTS: "input", Block.OUTPUTS: "output"}
 _PARAMETERS = (Block.PARAMETERS, Block.BOOLEANS)

@@ -42,7 +42,11 @@ _MACHINES = {"AMD64": "x86_64", "arm64": "aarch64"}
 
 @dataclass(frozen=True)
 class WrittenUnit:
-    """A unit that was written. kinds: "CoSimulation", "ModelExchange". inputs, outputs, parameters: their numbers."""
+    """A unit that was written.
+
+    kinds: "CoSimulation", "ModelExchange". model: name of the compiled model. variables: in the order of their value
+    references.
+    """
 
     path: Path
     model: str

@@ -76,15 +76,8 @@ def prepare(spec: ModelSpec, progress: Progress | None = None, portable: bool = 
         folder, ready = prebuilt
         return _info(spec, ready, folder, prebuilt_key(ready), True, perf_counter() - begin)
     entry = cache.Entry.of(spec, portable)
-    manifest, built = entry.find(), False
-    if manifest is None:
-        notify = progress or _no_progress
-        with entry.building(notify) as part:
-            # Another process may have built it while this one waited for the lock.
-            manifest = entry.find()
-            if manifest is None:
-                manifest, built = _build(spec, entry, part, notify), True
-                entry.publish(part)
+    notify = progress or cache.no_progress
+    manifest, built = entry.find_or_build(lambda part: _build(spec, entry, part, notify), notify)
     return _info(spec, manifest, entry.folder, entry.identity, not built, perf_counter() - begin)
 
 
@@ -232,7 +225,3 @@ def _replace(source: Path, target: Path) -> None:
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     shutil.copyfile(source, part)
     part.replace(target)
-
-
-def _no_progress(_: str, __: float) -> None:
-    """Progress callback that does nothing."""

@@ -135,8 +135,7 @@ class Entry:
     @classmethod
     def of_files(cls, module: str, files: Mapping[str, str]) -> Entry:
         """The entry of a module of given sources beside the header of the models: file name -> text."""
-        text = json.dumps(dict(sorted(files.items())))
-        return cls._of(module, {"files": _sha256(text), "sources": digest_sources()}, portable=True)
+        return cls._of(module, {"files": digest_files(files), "sources": digest_sources()}, portable=True)
 
     @classmethod
     def _of(cls, module: str, own: dict[str, Any], portable: bool) -> Entry:
@@ -171,6 +170,22 @@ class Entry:
             with suppress(OSError):  # records the time of last use for `msfp-gen cache --prune`
                 os.utime(self.folder / MANIFEST_NAME)
         return manifest if intact else None
+
+    def find_or_build(
+        self, build: Callable[[Path], Manifest], progress: Callable[[str, float], None] | None = None
+    ) -> tuple[Manifest, bool]:
+        """The manifest of the entry, and whether it was built now.
+
+        build: writes a complete entry into an empty folder. progress: as of `building`.
+        """
+        if (found := self.find()) is not None:
+            return found, False
+        with self.building(progress or no_progress) as part:
+            if (found := self.find()) is not None:  # another process has built it while this one waited for the lock
+                return found, False
+            made = build(part)
+            self.publish(part)
+        return made, True
 
     @contextmanager
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
@@ -212,6 +227,10 @@ class Entry:
             part.rename(self.folder)
 
 
+def no_progress(_: str, __: float) -> None:
+    """Progress callback that does nothing."""
+
+
 @contextmanager
 def write_errors(folder: Path, field: str = "MSFP_GEN_CACHE") -> Iterator[None]:
     """Convert an OSError of the block to an InputError that names `field`, `folder` and the remedy."""
@@ -227,6 +246,11 @@ def write_errors(folder: Path, field: str = "MSFP_GEN_CACHE") -> Iterator[None]:
 def digest(path: Path) -> str:
     """The sha256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def digest_files(files: Mapping[str, str]) -> str:
+    """The sha256 of file names and texts."""
+    return _sha256(json.dumps(dict(sorted(files.items()))))
 
 
 def tool_version(tool: str) -> str:

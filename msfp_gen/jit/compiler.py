@@ -22,6 +22,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import NamedTuple
 
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import CompileError
 from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
@@ -240,7 +241,7 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
         for step in chain:
             run(step)
 
-    with ThreadPoolExecutor(_processors()) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         tasks = [pool.submit(run_chain, chain) for chain in chains]
         try:
             yield 0
@@ -250,11 +251,6 @@ def run_parallel(chains: Sequence[Sequence[Step]], run: Callable[[Step], None]) 
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-
-
-def _processors() -> int:
-    """Number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:

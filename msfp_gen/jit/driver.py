@@ -14,7 +14,8 @@ from types import ModuleType
 
 from msfp_gen.jit import cache
 from msfp_gen.jit.build import load_extension
-from msfp_gen.jit.compiler import compile_extension
+from msfp_gen.jit.compiler import EXTENSION_SUFFIX, compile_extension
+from msfp_gen.jit.prebuilt import find_prebuilt_driver, prebuilt_key
 
 LIBRARIES = ("-pthread",)
 SUFFIXES = (".c", ".h", ".pyx")
@@ -26,17 +27,26 @@ def load_driver(package: str) -> tuple[ModuleType, str]:
 
     Raises CompileError: no C compiler was found, or it rejected a file; InputError: the cache cannot be written to.
     """
-    files = sources(resources.files(package) / "compiled")
-    module = next(Path(name).stem for name in files if name.endswith(".pyx"))
+    module, files = _named(package)
+    if (ready := find_prebuilt_driver(module, files)) is not None:
+        folder, manifest = ready
+        return load_extension(folder / manifest.extension, module), prebuilt_key(manifest)
+    entry = build_driver(package)
+    return load_extension(entry.folder / f"{module}{EXTENSION_SUFFIX}", module), entry.key
+
+
+def build_driver(package: str) -> cache.Entry:
+    """The module of a package in the cache, built unless it is there; errors as of `load_driver`."""
+    module, files = _named(package)
     entry = cache.Entry.of_files(module, files)
-    manifest = entry.find()
-    if manifest is None:
-        with entry.building(_silent) as part:
-            manifest = entry.find()
-            if manifest is None:
-                manifest = _build(entry, files, part)
-                entry.publish(part)
-    return load_extension(entry.folder / manifest.extension, module), entry.key
+    entry.find_or_build(lambda part: _build(entry, files, part))
+    return entry
+
+
+def _named(package: str) -> tuple[str, dict[str, str]]:
+    """Name of the module of a package, and its files."""
+    files = sources(resources.files(package) / "compiled")
+    return next(Path(name).stem for name in files if name.endswith(".pyx")), files
 
 
 def sources(folder: Traversable) -> dict[str, str]:
@@ -45,11 +55,17 @@ def sources(folder: Traversable) -> dict[str, str]:
     return {file.name: file.read_text(encoding="utf-8") for file in found if file.name.endswith(SUFFIXES)}
 
 
-def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
+def headers() -> dict[str, str]:
+    """The headers that a driver includes: file name -> text."""
     from msfp_gen.generator.header import public_header
 
+    math = resources.files("msfp_gen") / "runtime" / "msfp_math.h"
+    return {"msfp.h": public_header(), math.name: math.read_text(encoding="utf-8")}
+
+
+def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:
     begin = perf_counter()
-    extension = compile_extension({**files, "msfp.h": public_header()}, entry.module, folder, libraries=LIBRARIES)
+    extension = compile_extension({**files, **headers()}, entry.module, folder, libraries=LIBRARIES)
     manifest = cache.Manifest(
         module=entry.module,
         spec=entry.module,
@@ -63,7 +79,3 @@ def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Man
     )
     manifest.write(folder)
     return manifest
-
-
-def _silent(_: str, __: float) -> None:
-    """Progress callback that does nothing."""

@@ -19,10 +19,11 @@ from msfp_gen.jit.compiler import (
     Log,
     Step,
     compile_step,
+    find_compiler,
     object_file,
     run_parallel,
 )
-from msfp_gen.jit.platforms import EXPORTS, Platform, find_platform, find_tools
+from msfp_gen.jit.platforms import EXPORTS, Platform, find_tools
 from msfp_gen.specification.layout import ModelSpec
 
 GENERATION_SHARE = 0.3  # of the build time, for the progress display; compilation takes the rest
@@ -83,7 +84,7 @@ def build_shared(
     """
     from msfp_gen.generator import generate
 
-    compiler, _ = find_tools(find_platform(None))
+    compiler = find_compiler()
     progress(f"deriving and emitting {spec.key}", 0.0)
     files = {**runtime_sources(), **generate(spec).files, **others}
     files = {each: text for each, text in sorted(files.items()) if each.endswith((".c", ".h"))}
@@ -92,7 +93,9 @@ def build_shared(
     log = Log(folder)
     objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
     (folder / EXPORTS).write_text(f"{{ global: {exported}; local: *; }};\n", encoding="utf-8")
-    options = ("-dynamiclib",) if sys.platform == "darwin" else ("-shared", f"-Wl,--version-script={EXPORTS}")
+    # A missing symbol fails the build, and not the program that loads the library.
+    linux = ("-shared", f"-Wl,--version-script={EXPORTS}", "-Wl,-z,defs")
+    options = ("-dynamiclib",) if sys.platform == "darwin" else linux
     log.run(_link_step(compiler, options, objects, name))
     return files
 

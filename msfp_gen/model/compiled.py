@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from msfp_gen.common.arrays import Array
 
@@ -170,6 +170,16 @@ class Port(Protocol):
 
     def restore(self, snapshot: bytes) -> None:
         """Return to the state of a snapshot. Raises ValueError."""
+
+    @property
+    def trips(self) -> dict[str, tuple[float, int, float]]:
+        """First detections of the monitors in steps by stages: name -> (time, surface, value)."""
+
+    def state(self) -> dict[str, Any]:
+        """The committed state, as `RestartState` has it."""
+
+    def enter(self, time: float, q: Array, v: Array, f: Array, ends: Array, **state: Array | None) -> str:
+        """Continue, in a two-port at rest, from the state of another model; status."""
 
     def step_begin(self, step: float, expected: Array) -> str:
         """Begin a step by stages; status. The next methods: see `port_stage` and others of `msfp.h`."""

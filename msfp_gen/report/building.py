@@ -11,6 +11,7 @@ from msfp_gen.buildings.explain import explain_building
 from msfp_gen.buildings.summary import summary_tables
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
+from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.version import __version__
 
@@ -20,14 +21,13 @@ if TYPE_CHECKING:
 
 SCALES = (1, 2, 5, 10, 20, 50, 100)
 SHOWN = 0.12  # displacement in the view over the size of the building, about
-EDGE = 0.06  # of a floor beyond the outermost bearings, over the size of the plan
 FIGURES = {
     "plan": "Plan with the orbits of all bearings",
     "profile": "Peaks over the height",
     "spectra": "Floor spectra",
     "axial": "Axial force of every bearing",
 }
-SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
+SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
 TERMS = (
     ("friction pendulum bearing", "steel sliders in spherical dishes, between a structure and its foundation. It "
      "slides when the ground moves, friction dissipates energy, and the weight on the curved dishes brings it back."),
@@ -46,7 +46,7 @@ TERMS = (
 def scale_of(result: BuildingResult) -> int:
     """The magnification with which the view opens: displacements are seen and bearings stay apart."""
     peak = max(each.summary["peak_displacement"]["radial"] for each in result.bearings)
-    wanted = SHOWN * _size(result) / peak if peak > 0 else 1.0
+    wanted = SHOWN * size_of(result.scene) / peak if peak > 0 else 1.0
     return max((scale for scale in SCALES if scale <= wanted), default=1)
 
 
@@ -56,8 +56,8 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     nodes = [result.node(node.name)[rows] for node in scene.building.nodes]
     motion = np.stack([each[:, 0] for each in nodes], axis=1)
     motion[..., :3] -= result.ground[rows, None, 0]
-    low, high = _plan(result)
-    size = _size(result)
+    low, high = plan_of(scene)
+    size = size_of(scene)
     bearings = [each.displacement[rows] for each in result.bearings]
     mean = np.mean(bearings, axis=0)
     left = np.stack([(each.capacity - each.sliding[rows]).min(axis=1) for each in result.bearings], axis=1)
@@ -79,17 +79,16 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "peak": int(np.hypot(*mean[:, :2].T).argmax()),
         "azimuth": 0.0,
         "surfaces": [],
-        "events": [],
         "nodes": [{"name": node.name, "position": node.position.tolist()} for node in scene.building.nodes],
         "plates": bool(scene.building.columns),
         "storeys": [column.name for column in scene.building.columns],
-        "places": [[*place, _level(result, index)] for index, place in enumerate(scene.places.tolist())],
+        "places": [[*place, level_of(scene, index)] for index, place in enumerate(scene.places.tolist())],
         "labels": [each.name or str(index + 1) for index, each in enumerate(scene.bearings)],
         "loads": scene.axial_loads.tolist(),
-        "plan": [low, high],
+        "plan": [low.tolist(), high.tolist()],
         "size": size,
-        "height": max(float(node.position[2]) for node in scene.building.nodes),
-        "depth": 0.05 * size,
+        "height": height_of(scene),
+        "depth": DEPTH * size,
         "radius": 0.022 * size,
         "scale": scale_of(result),
         "frames": {name: packed(values) for name, values in frames.items()},
@@ -148,24 +147,3 @@ def _rows(result: BuildingResult, count: int) -> Array:
     peaks = [int(np.hypot(*each.displacement[:, :2].T).argmax()) for each in result.bearings]
     least = result.axial_force.argmin(axis=0).tolist()
     return np.unique([*even.round().astype(int), *peaks, *least])
-
-
-def _plan(result: BuildingResult) -> tuple[list[float], list[float]]:
-    """Corners of the floors: the outermost bearings and an edge."""
-    places = result.scene.places
-    low, high = places.min(axis=0), places.max(axis=0)
-    edge = max(EDGE * float(np.linalg.norm(high - low)), 1.0)
-    return (low - edge).tolist(), (high + edge).tolist()
-
-
-def _size(result: BuildingResult) -> float:
-    """Diagonal of plan and height [m]."""
-    low, high = map(np.array, _plan(result))
-    height = max(float(node.position[2]) for node in result.scene.building.nodes)
-    return float(np.hypot(np.linalg.norm(high - low), height))
-
-
-def _level(result: BuildingResult, index: int) -> float:
-    """Height of the upper end of a bearing [m]."""
-    scene = result.scene
-    return float(scene.building.node(scene.bearings[index].node).position[2])

@@ -66,11 +66,6 @@ class TitleBlock:
         return [(name, text) for name, text in entries.items() if text]
 
 
-def device_name(result: Result) -> str:
-    """The kind of the bearing of a run."""
-    return kind_of(result.scene.bearing)
-
-
 def kind_of(bearing: Bearing) -> str:
     """The kind of a bearing by its sliding surfaces, with its layout."""
     layout = bearing.layout

@@ -14,7 +14,6 @@ from msfp_gen.report.content import (
     TERMS,
     TitleBlock,
     characterisation_page,
-    device_name,
     kind_of,
     outcome,
     provenance_table,
@@ -33,7 +32,9 @@ if TYPE_CHECKING:
 NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
-SCRIPTS = ("three.min.js", "dom.js", "data.js", "chart.js", "section.js", "scene.js", "player.js", "page.js")
+SCRIPTS = (
+    "three.min.js", "dom.js", "canvas.js", "data.js", "chart.js", "section.js", "scene.js", "player.js", "page.js",
+)  # fmt: skip
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 FIGURES = {
     "overview": "Loops and sliding",
@@ -115,7 +116,7 @@ def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[
         "moving": "The bearing in motion",
         "stage": Markup(render("bearing.html.jinja")),
         "lead": _introduction(result),
-        "device": device_name(result),
+        "device": kind_of(result.scene.bearing),
         "terms": TERMS,
         "summary": summary_page(result),
         "characterisation": characterisation_page(result),

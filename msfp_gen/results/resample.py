@@ -22,14 +22,15 @@ def at_times(result: R, times: ArrayLike) -> R:
     times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
     """
     history = result.history
-    new_times = _checked(history.time, times)
+    new_times = checked_times(history.time, times)
     columns = history.arrays().items()
-    rows: dict[str, Any] = {name: _interpolated(history.time, values, new_times) for name, values in columns}
-    energy = {name: _interpolated(history.time, values, new_times) for name, values in history.energy.items()}
+    rows: dict[str, Any] = {name: interpolated(history.time, values, new_times) for name, values in columns}
+    energy = {name: interpolated(history.time, values, new_times) for name, values in history.energy.items()}
     return replace(result, history=History(**rows | {"time": new_times}, energy=energy))
 
 
-def _checked(rows: Array, times: ArrayLike) -> Array:
+def checked_times(rows: Array, times: ArrayLike) -> Array:
+    """`times` as an array. Raises InputError for one outside of `rows`, the times of a run, increasing."""
     new_times = np.atleast_1d(np.asarray(times, dtype=float))
     inside = (new_times >= rows[0]) & (new_times <= rows[-1])
     if not np.all(inside):
@@ -39,6 +40,7 @@ def _checked(rows: Array, times: ArrayLike) -> Array:
     return new_times
 
 
-def _interpolated(time: Array, values: Array, new_times: Array) -> Array:
+def interpolated(time: Array, values: Array, new_times: Array) -> Array:
+    """Rows of `values`, shape (k, ...) at `time`, at other times by linear interpolation."""
     columns = values.reshape(len(time), -1).T
     return np.stack([np.interp(new_times, time, column) for column in columns], axis=-1).reshape(-1, *values.shape[1:])

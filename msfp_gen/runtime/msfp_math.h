@@ -1,8 +1,8 @@
 /* msfp_math.h: elementary functions of the runtime and the kernels.
  *
  * The functions of C libraries differ in the last digit from system to system. These consist of additions, products,
- * quotients and square roots alone, which every processor rounds alike, so that a run gives the same numbers on every
- * system and in a browser. Errors in units of the last digit: one for exp, log, asin up to 1/2, sin and cos up to pi/4;
+ * quotients and square roots alone, which every processor rounds alike, so that the same inputs give the same numbers on
+ * every system and in a browser. Errors in units of the last digit: one for exp, log, asin up to 1/2, sin and cos up to pi/4;
  * four for all others, but for pow 1 + 2 |y log x|. The polynomials are printed by tools/polynomials.py.
  */
 #ifndef MSFP_MATH_H
@@ -160,12 +160,16 @@ static inline double msfp_log(double x)
     return exponent * 0.6931471803691238 + (f - (s * (f - 2.0 * z * msfp_log_rest(z)) - exponent * 1.9082149292705877e-10));
 }
 
-/* Of x < 0 the function of the C library. */
 static inline double msfp_pow(double x, double y)
 {
     if (y == 0.0)
         return 1.0;
-    return x < 0.0 ? pow(x, y) : msfp_exp(y * msfp_log(x));
+    if (!(x < 0.0)) /* NaN too */
+        return msfp_exp(y * msfp_log(x));
+    if (y != floor(y))
+        return NAN;
+    const double size = msfp_exp(y * msfp_log(-x));
+    return y - 2.0 * floor(0.5 * y) == 1.0 ? -size : size;
 }
 
 static inline double msfp_tanh(double x)

@@ -304,6 +304,13 @@ typedef struct {
 } msfp_step_history;
 #endif
 
+/* What the monitors know at the end of an accepted step. */
+typedef struct {
+    double velocity[MSFP_NB][3];           /* of the bodies [m/s] */
+    double energy[MSFP_NB], peak[MSFP_NB]; /* integral and peak of the scaled heat flux [K s^1/2], [K/s^1/2] */
+    msfp_trip trips[MSFP_MONITORS];
+} msfp_monitor_state;
+
 struct msfp_run {
     msfp_parameters parameters;
     msfp_history motion, load;
@@ -339,11 +346,7 @@ struct msfp_run {
     int pivots[MSFP_DOF];
     double acceleration_slope[MSFP_NB]
                              [MSFP_NQ]; /* rate of change of the accelerations over the last step; 0 after a jump */
-    struct {
-        double velocity[MSFP_NB][3];            /* at the end of the last step [m/s] */
-        double energy[MSFP_NB], peak[MSFP_NB];  /* integral and peak of the scaled heat flux [K s^1/2], [K/s^1/2] */
-        msfp_trip trips[MSFP_MONITORS];
-    } monitor;
+    msfp_monitor_state monitor;
     double unknowns[MSFP_UNKNOWNS]; /* of the momentum balances, the first guess of the next stage of dopri5 */
     int have_unknowns;
     int determinant;           /* sign that the determinant must keep; 0: not known yet */

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from msfp_gen.buildings.opening import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
+from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.effect_switching import check
 from msfp_gen.simulation.either import simulate
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.settling import needs_settling
@@ -116,11 +117,6 @@ def specs_of(scene: AnyScene) -> tuple[ModelSpec, ...]:
     return (scene.spec,) if isinstance(scene, Scene) else scene.specs
 
 
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def worker_count(requested: int | None) -> int:
     """Number of runs at the same time; None: one for each core. Raises InputError for an invalid number."""
     if requested is None:
@@ -132,17 +128,18 @@ def worker_count(requested: int | None) -> int:
 
 def run_to_end(scene: AnyScene, settled: AnyScene, strict: bool, proceed: Callable[[float, float], None]) -> Any:
     """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run."""
-    if not (isinstance(scene, Scene) and isinstance(settled, Scene)):
+    if isinstance(scene, BuildingScene):
         return _building_to_end(scene, proceed)
+    assert isinstance(settled, Scene)
     sequence = RunSequence.of(scene, strict, settled)
     while sequence.effects is not None:
         sequence.run_segment(proceed)
     return sequence.result(with_initial_row=True)
 
 
-def _building_to_end(scene: AnyScene, proceed: Callable[[float, float], None]) -> Any:
+def _building_to_end(scene: BuildingScene, proceed: Callable[[float, float], None]) -> Any:
     try:
-        return simulate(scene, progress=proceed)
+        return simulate(scene, progress=proceed, threads=1)  # the runs have the cores
     except RunError as error:
         if error.result is None:
             raise

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.scene.effect_switching import JAM_STATUSES
 from msfp_gen.scene.top import MassTop, RigTop
-from msfp_gen.simulation.effect_switching import JAM_STATUSES
 from msfp_gen.specification.contract import STATUSES
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""The notes of a run: monitors that tripped, with time, size and the effects that were added."""
+"""The notes that follow from the rows and events of a whole run; those of monitors: `results/monitor_notes.py`."""
 
 from __future__ import annotations
 
@@ -10,18 +10,14 @@ from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.effect_selection import rigid_mass_limit
-from msfp_gen.scene.friction_parameters import RANGES
 from msfp_gen.scene.plausibility import doubtful_values
-from msfp_gen.simulation.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
     from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
 
-_MAX_VELOCITY = RANGES["v"][-1]
 ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
 FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
@@ -29,17 +25,8 @@ LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] abov
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
-    "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
-    "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
     "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
     "not converge; give vertical_stiffness",
-    "inertia": "the inertial force of body {body} is {value:.2g} of N on surface {surface}; the model has none",
-    "heat": "friction may heat surface {surface} by {value:.3g} K; its friction law does not depend on temperature",
-    "law_speed": "the slip velocity of surface {surface} is {value:.3g} m/s; its friction law was checked up to "
-    f"{_MAX_VELOCITY:g} m/s",
-    "law_load": "the normal force of surface {surface} is {value:.4g} N; its friction law was not checked there",
-    "law_temperature": "surface {surface} is at {value:.4g} degC; its friction law was not checked there",
-    "plane": "motion or loads leave the vertical plane of the model",
     "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
     "give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
@@ -50,35 +37,7 @@ TEXTS = {
     "face: a real slider would tip; give effects.uplift = true",
     "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
     "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
-    "jammed": "the equations of this model have no solution beyond this time ({status})",
 }
-
-
-def notes_of(segment: Segment, after: Effects | None) -> list[Note]:
-    """The notes of a segment, in order of time.
-
-    after: the effects with which the run continues; None where it does not.
-    """
-    run = segment.run
-    trips = dict(run.trips)
-    if after is not None and segment.status == "ok":
-        trips["plane"] = (run.time, 0, 0.0)
-    if after is not None and segment.status == "uplift":
-        trips["uplift"] = (run.time, *run.status[1:])
-    if after is not None and segment.status in JAM_STATUSES:
-        trips["jammed"] = (run.time, *run.status[1:])
-    before = segment.model.effects
-    return [
-        Note(
-            time,
-            kind,
-            surface,
-            value,
-            TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=segment.status),
-            ", ".join(_changes(kind, before, after)),
-        )
-        for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
-    ]
 
 
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
@@ -178,16 +137,3 @@ def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
     if not error > ENERGY_LIMIT:
         return ()
     return (Note(float(history.time[row]), "energy", 0, error, TEXTS["energy"].format(value=error)),)
-
-
-def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
-    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift.
-
-    The monitors of a friction law change none, whatever another monitor changes at the same time.
-    """
-    names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
-    return [
-        f"{name} = {getattr(after, name)}"
-        for name in names
-        if after is not None and getattr(before, name) != getattr(after, name)
-    ]

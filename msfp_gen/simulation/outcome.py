@@ -8,8 +8,8 @@ from operator import or_
 from typing import TYPE_CHECKING
 
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.monitor_notes import monitor_notes
 from msfp_gen.simulation import failures
-from msfp_gen.simulation.notes import notes_of
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def message_of(scene: Scene, segment: Segment) -> str:
     """Message about a segment that failed, in one line; after a monitor stopped the run, the texts of its notes."""
     stopped = segment.status == "guard"
-    cause = "; ".join(note.text for note in notes_of(segment, None)) if stopped else None
+    cause = "; ".join(note.text for note in monitor_notes(segment.ending, None)) if stopped else None
     return failures.message(scene, segment.model, segment.run, segment.status, cause)
 
 

@@ -16,25 +16,16 @@ from msfp_gen.model.plane import (
     rotated_pairs,
     tilt_pieces,
     tilts_into_plane,
-    tilts_out_of_plane,
     wrench_in_plane,
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
-from msfp_gen.scene.effect_selection import (
-    UPLIFT_MONITOR_SHARE,
-    EffectSelection,
-    inertia_limit,
-    load_at_rest,
-    quasistatic,
-    rigid_mass_limit,
-    slider_period,
-)
-from msfp_gen.scene.friction_parameters import checked_range
-from msfp_gen.scene.friction_selection import heating_factors, thermal_softening
+from msfp_gen.results.restart_state import RestartState, transferred_foot, transferred_state
+from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
+from msfp_gen.scene.effect_switching import Ending
+from msfp_gen.scene.monitors import monitor_options
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import load_values
-from msfp_gen.simulation.restart_state import RestartState
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
@@ -42,9 +33,6 @@ if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.row_file import RowFile
-    from msfp_gen.specification.layout import Effects
-
-NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +50,12 @@ class Segment:
     wall: float
     setup: float
     stored: RowFile | None = None
+
+    @property
+    def ending(self) -> Ending:
+        """How it ended."""
+        _, surface, value = self.run.status
+        return Ending(self.model.effects, self.status, self.run.time, surface, value, self.run.trips)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +92,7 @@ def start_run(
     solver, stop = scene.solver, scene.stop
     load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
-    q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else _transferred_state(scene, model, at)
+    q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else transferred_state(scene.bearing, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
     grid = time_grid(scene)
     options: dict[str, Any] = {}
@@ -109,7 +103,7 @@ def start_run(
         becomes_spatial = at.planar and not model.planar
         origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
-        options["foot"] = _transferred_foot(at, q)
+        options["foot"] = transferred_foot(at, q)
         if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
             options["heat"] = at.heat
     run: Run = model.extension.Run(
@@ -134,7 +128,7 @@ def start_run(
         stop_all_rims=bool(stop and stop.all_rims),
         sampled=scene.motion.sampled,
         quasistatic=quasistatic(scene, model.effects),
-        **_monitor_options(scene, model.effects, selection, stops),
+        **monitor_options(scene, model.effects, selection, stops),
         **options,
     )
     return run, frame.azimuth
@@ -192,80 +186,3 @@ def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array,
     if np.any(np.abs(f[:, 1]) > 1e-12):
         raise InputError("initial_state.h leaves the vertical plane of the motion: use dimension = 'spatial'")
     return q, v, f
-
-
-def _transferred_state(scene: Scene, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
-    """The state q, v, f of the earlier model for the next one (docs/effects.md).
-
-    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
-    from the interface forces without those of the rims: the unilateral contacts are compressed by them.
-    """
-    q, v, f, force = at.q, at.v, at.f, at.contact_force(scene.bearing)
-    separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
-    q, v = q[:, :3], v[:, :3]
-    if at.planar and not model.planar:
-        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
-            q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
-            f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
-        else:
-            q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
-            f = out_of_plane(f, at.azimuth, "pair")
-        force = out_of_plane(force, at.azimuth, "vector")
-        if separations is not None:
-            separations = (
-                out_of_plane(separations[0], at.azimuth, "vector"),
-                out_of_plane(separations[1], at.azimuth, "vector"),
-            )
-    if model.effects.uplift:
-        stiffness = np.array([surface.seat_stiffness for surface in scene.bearing.surfaces])
-        if separations is None:
-            separations = (-force / stiffness[:, None], np.zeros_like(force))
-        q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
-    return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
-
-
-def _is_oblique(azimuth: float) -> bool:
-    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
-    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
-
-
-def _transferred_foot(at: RestartState, q: Array) -> Array:
-    """Height of the foot of the supported mass and its rate, shape (2,) [m], [m/s], above a stack at `q`.
-
-    The separations that the earlier model did not have lower the top plate. The foot follows, so that the force of its
-    spring does not change.
-    """
-    lowered = float(q[:, 5].sum()) if q.shape[1] > at.q.shape[1] else 0.0
-    return np.array([at.foot[0] + lowered, at.foot[1]])
-
-
-def _significant_rise(scene: Scene, effects: Effects, selection: EffectSelection) -> float:
-    """Temperature rise at which the monitor of heat trips [K]; see `thermal_softening`."""
-    softening = thermal_softening(effects.law, scene.bearing)
-    change = selection.error if effects.friction == "pv" else NOTED_SOFTENING
-    return change / softening if softening > 0 else 0.0
-
-
-def _monitor_options(
-    scene: Scene, effects: Effects, selection: EffectSelection, stops: tuple[str, ...]
-) -> dict[str, Any]:
-    """Monitors of everything that the model leaves out, and their limits, as arguments of the compiled run."""
-    heats = effects.law is not None and effects.law.depends_on_temperature
-    left_out = {
-        "rims": not effects.rims,
-        "uplift": "uplift" in stops and not effects.uplift,
-        "inertia": effects.sliders == "massless",
-        "heat": not heats,
-    }
-    checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
-    left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}
-    return checked | {
-        "monitors": tuple(name for name, out in left_out.items() if out),
-        "monitor_stop": tuple(stops),
-        "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
-        "monitor_peak": rigid_mass_limit(scene),
-        "monitor_inertia": inertia_limit(scene, selection.error),
-        "monitor_time": slider_period(scene),
-        "monitor_rise": _significant_rise(scene, effects, selection),
-        "monitor_heating": np.array(heating_factors(scene.bearing)),
-    }

@@ -22,9 +22,12 @@ from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined
+from msfp_gen.results.monitor_notes import monitor_notes
 from msfp_gen.results.note import Note
+from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
 from msfp_gen.results.thinning import thinned_history
+from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.checkpoint import (
     EVERY,
@@ -34,13 +37,11 @@ from msfp_gen.simulation.checkpoint import (
     require_no_checkpoint,
     segment_file,
 )
-from msfp_gen.simulation.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.gradients import gradient_notes, gradient_parameters, run_gradients, switching_error
 from msfp_gen.simulation.memory import outgrown, require_room
-from msfp_gen.simulation.notes import history_notes, landing_notes, notes_of
+from msfp_gen.simulation.notes import history_notes, landing_notes
 from msfp_gen.simulation.outcome import extremes_of, message_of
-from msfp_gen.simulation.restart_state import RestartState
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
@@ -172,9 +173,9 @@ class RunSequence:
         assert self.effects is not None
         segment = _segment(self, progress, options)
         self.segments.append(segment)
-        following = None if self.strict else next_effects(self.scene, self.effects, segment)
+        following = None if self.strict else next_effects(self.scene, segment.ending)
         known_kinds = {note.kind for note in self.notes if not note.action}
-        notes = notes_of(segment, following)
+        notes = monitor_notes(segment.ending, following)
         self.notes += [note for note in notes if note.action or note.kind not in known_kinds]
         if self.parameters and following is not None:
             raise switching_error(segment, notes)

@@ -261,9 +261,9 @@ typedef struct {
     int step_count;
 } msfp_gradient_inputs;
 
-/* A stiffly accurate ESDIRK method, for a program that takes its steps itself. Stage 0 is the start of the step, stage
- * count - 1 its end. Stage i is at the share shares[i] of the step h, where y = y_0 + h sum_j weights[i][j] y'_j over
- * j < i + h diagonal y'_i. The error of a step is estimated as h sum_j errors[j] y'_j. */
+/* A stiffly accurate ESDIRK method, for a program that takes its own steps. Stage 0 is the start of
+ * the step h, stage count - 1 its end; stage i lies at shares[i] h, with
+ * y = y_0 + h sum_(j<i) weights[i][j] y'_j + h diagonal y'_i. Error: h sum_j errors[j] y'_j. */
 #define MSFP_STAGES 7 /* of a method, at most */
 typedef struct {
     int count;
@@ -379,8 +379,8 @@ typedef struct msfp_api {
      * the bearing, about the present position of that end. The model is in space, with locked spin and top rotation. */
     /* A bearing that is centred and at rest at start_time, under the compression axial_load [N]. Of the scene: bearing,
      * whose top is the interface, start_time, q (separations alone), method, rtol, atol_angle, max_step, first_step, and
-     * max_steps, the limit of one trial; end_time is not read, the rest is as of scene_default. The bearing need not outlive
-     * this call. Status, *port and message: as of run_new. */
+     * max_steps, the limit of one trial, and the monitors; end_time is not read, the rest is as of scene_default. The
+     * bearing need not outlive this call. Status, *port and message: as of run_new. */
     int (*port_new)(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message);
     void (*port_free)(msfp_port *port);
     /* Integrate from the committed state to `time` [s], with steps of its own, the ends following the polynomials of degree
@@ -417,40 +417,50 @@ typedef struct msfp_api {
     /* Of the extremes with respect to one parameter, [extremes_size]. */
     void (*gradient_extremes)(const msfp_run *run, int parameter, double *out);
 
-    /* ---- the two-port by stages: your program takes the steps, and the bearing is one of its parts ---- */
-    /* A step: port_step_begin; port_stage for stage 1, 2, ..., each as often as your iteration needs; port_step_end; then
-     * port_step_commit, or port_step_begin once more. Wrenches are functions of the motion of the ends in the stage, of the
-     * stages before it and of the committed state. Ends and wrenches as above; the model too. After a failure begin a
-     * shorter step. These steps and trials exclude each other between two commits. */
-    int (*port_method)(int method, msfp_method_stages *stages); /* enum msfp_method, implicit ones */
-    /* step [s]; expected [2]: horizontal displacement of the upper end that you expect at its end [m]. */
+    /* ---- the two-port by stages: your program takes the steps ---- */
+    /* Call port_step_begin; port_stage for stages 1, 2, ..., each as often as you iterate;
+     * port_step_end; then port_step_commit, or port_step_begin again. A wrench is a function of the
+     * ends in its stage, the earlier stages and the committed state. Ends, wrenches, model as above.
+     * After a failure solve the stage for other ends, or begin a shorter step. Between two commits
+     * use either stages or trials. */
+    int (*port_method)(int method, msfp_method_stages *stages); /* enum msfp_method: implicit */
+    /* step [s]; expected [2]: horizontal displacement of the upper end expected at its end [m]. */
     int (*port_step_begin)(msfp_port *port, double step, const double *expected);
-    /* Solve a stage: the one after the last, or that one again for another motion of the upper end. */
+    /* Solve the next stage, or the last one again for another motion of the upper end. */
     int (*port_stage)(msfp_port *port, int stage, const double *ends, double *wrench);
-    /* Derivatives [6][6] of the wrench of the upper end in the stage just solved, with respect to its rates; its
+    /* Derivatives [6][6] of the wrench of the upper end in the stage just solved by its rates; its
      * displacements change with them by diagonal * step. */
     int (*port_stage_derivative)(msfp_port *port, double *derivative);
-    /* After the last stage: error of the bearing over its tolerance [-]; above 1 the step cannot be accepted, take a shorter
-     * one; share of the step at which its first event lies (a rim is met, a contact closes), below 1 end a step there. */
+    /* After the last stage. error: over the tolerance [-]; above 1: take a shorter step. share: of
+     * the step at which its first event lies (rim met, contact closed); below 1: end one there. */
     int (*port_step_end)(msfp_port *port, double *error, double *share);
-    /* Accept the step; time: of its end, as your program counts it [s]. */
+    /* Accept the step; time: of its end, as your program counts it [s], after the committed one. */
     int (*port_step_commit)(msfp_port *port, double time);
-    /* At the committed time the accelerations of the ends jump to those of `ends`, which else is the committed motion. */
+    /* At the committed time the accelerations of the ends jump to those of `ends`; displacements
+     * and rates in `ends` are the committed ones. */
     int (*port_jump)(msfp_port *port, const double *ends);
     /* Why no shorter step cures the `status` of a step: a status, with its place. */
     int (*port_cause)(msfp_port *port, int status, msfp_progress *cause);
 
     /* ---- further functions of the two-port ---- */
-    /* A two-port whose upper end is free: force in, motion out. The top of the bearing is a supported mass; ends[1] is the
-     * force [N] and the moment [N m] on the top plate at r_nn beside the weight, with two derivatives, and the wrench of
-     * end 1 is that load. Motions are in the row. The model is in space, with locked spin, without top rotation. The rest
-     * is as of port_new. */
+    /* A two-port whose upper end is free: force in, motion out. The top is a supported mass;
+     * ends[1] is force [N] and moment [N m] on the top plate at r_nn beside the weight, with two
+     * derivatives, and the wrench of end 1 is that load. Motions are in the row. The model is in
+     * space, with locked spin and without top rotation; the rest as of port_new. */
     int (*port_new_loaded)(const msfp_scene *scene, msfp_port **port, const char **message);
     /* The rows [2][row_size] and wrenches [2][2][6] at the end of the last trial, its steps held, with one freedom of its
      * ends, 0..11, moved by -step and by +step along the direction of port_derivative: differences give the derivative of
      * all that follows from them. step receives the size; rows and wrenches may be NULL. Returns as port_derivative. */
     int (*port_beside)(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
                        double *wrenches);
+    /* Monitors, those of the scene of port_new, check the steps by stages. Whether one stops the step of the last
+     * port_step_end, which you would accept now: do not commit it, and continue with a model that has the effect. */
+    int (*port_tripped)(msfp_port *port);
+    void (*port_trips)(const msfp_port *port, msfp_trip *trips);         /* [MSFP_MONITORS] */
+    void (*port_state)(const msfp_port *port, msfp_run_state *state);    /* the committed one, as of run_state */
+    /* Continue in a two-port at rest from the state of one of another model: of `state` start_time, q, v, f, and foot,
+     * origin, heat, monitor_heat, those NULL as of scene_default; ends: their motion. Status as of port_new. */
+    int (*port_enter)(msfp_port *port, const msfp_scene *state, const double *ends);
 } msfp_api;
 
 #ifdef __cplusplus

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from msfp_gen import BaseSlab, Bearing, Building, Motion, Solver, Storey, Top, presets
+from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 
 BEARING = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
@@ -41,6 +41,13 @@ def storey(frequency: float = 5.0, eccentricity: tuple[float, float] = (0.3, 0.1
 def frame(**options: object) -> Building:
     """Three storeys."""
     return Building.shear(BASE, 3 * [storey(**options)], 0.05)  # type: ignore[arg-type]
+
+
+def rocking(effects: Effects | Auto | None, rtol: float = 1e-3, bearing: Bearing = BEARING) -> BuildingScene:
+    """A slender frame, whose outer bearings lift off in turn."""
+    building = Building.shear(BASE, 3 * [replace(storey(), height=6.0)], 0.05)
+    bearings = [BuildingBearing(bearing, INTERFACE, place, effects=effects) for place in PLACES]
+    return BuildingScene(building, bearings, Motion.harmonic(0.07, 0.8, cycles=2), Solver(rtol=rtol))
 
 
 def scene(building: Building, rtol: float = 1e-4, bearing: Bearing = BEARING, **changes: object) -> BuildingScene:

@@ -34,15 +34,16 @@ def floors(ops: Any, given: list[dict[str, Any]]) -> None:
             ops.node(node, *place)
             ops.rigidLink("beam", master, node)
         tags = []
-        for spring in floor["springs"]:
+        times = floor["damping_time"] if isinstance(floor["damping_time"], list) else 6 * [floor["damping_time"]]
+        for spring, damping_time in zip(floor["springs"], times, strict=True):
             materials += 1
-            ops.uniaxialMaterial("Elastic", materials, spring, floor["damping_time"] * spring)
+            ops.uniaxialMaterial("Elastic", materials, spring, damping_time * spring)
             tags.append(materials)
         ops.element("zeroLength", 1000 + k, lower, upper, "-mat", *tags, "-dir", 1, 2, 3, 4, 5, 6)
 
 
 def native_bearing(ops: Any, tag: int, lower: int, upper: int, values: dict[str, Any]) -> None:
-    """The triple pendulum of OpenSees; its vertical spring is that of an interface."""
+    """The triple pendulum of OpenSees; its vertical spring, and damper if there is one, are those of an interface."""
     friction, spring = 10 * tag, 10 * tag + 4
     for i, coefficient in enumerate(values["frictions"]):
         ops.frictionModel("Coulomb", friction + i, coefficient)
@@ -51,6 +52,9 @@ def native_bearing(ops: Any, tag: int, lower: int, upper: int, values: dict[str,
     shape = (*values["lengths"], *values["capacities"], values["weight"], values["yield_displacement"])
     frictions, springs = (friction, friction + 1, friction + 2), (spring, spring + 1, spring + 2, spring + 3)
     ops.element("TripleFrictionPendulum", tag, lower, upper, *frictions, *springs, *shape, RIGID, 1e-3, 1e-8)
+    if damping := values.get("vertical_damping"):
+        ops.uniaxialMaterial("Viscous", spring + 4, damping, 1.0)
+        ops.element("zeroLength", 7000 + tag, lower, upper, "-mat", spring + 4, "-dir", 3)
 
 
 def bearings(ops: Any, given: list[dict[str, Any]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -124,6 +125,10 @@ class Unit:
     def derivative(self, unknowns: Sequence[int], known: int) -> Array:
         given: tuple[Any, ...] = (list(unknowns), [known], [1.0])
         return np.array(self.fmu.getDirectionalDerivative(*given))
+
+    def call(self, name: str, *given: Any) -> int:
+        """The status of a function of the standard that FMPy has not for this kind of instance."""
+        return int(getattr(self.fmu.dll, f"fmi{self.version}{name}")(ctypes.c_void_p(self.fmu.component), *given))
 
     def state(self) -> bytes:
         if self.version == 2:

@@ -4,6 +4,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
 #include "msfp_building.h"
+#include "msfp_math.h"
 
 enum { FACTORS = 3 }; /* step sizes whose factors are kept */
 enum { ENERGIES = 3, DAMPED = 0, RECEIVED, GROUND }; /* integrals over the run */
@@ -23,6 +24,7 @@ typedef struct {
     double wrench[2 * MSFP_WRENCH], derivative[MSFP_WRENCH * MSFP_WRENCH], rest[MSFP_WRENCH];
     double ends[2 * 3 * MSFP_WRENCH];
     double error, share; /* of the step */
+    double *row;         /* of its model, at the end of the last step */
 } member;
 
 /* What a task of the threads does for one bearing. */
@@ -71,6 +73,8 @@ struct msfp_building {
     double *scratch;             /* [3][attachments] */
     int status, bearing, surface;
     double value;
+    int *entries;  /* as in the scene, of the present models */
+    double *peaks; /* see peaks.c */
     double *rows;
     size_t row_count, row_capacity;
 };
@@ -104,13 +108,26 @@ void ground_at(msfp_building *b, double t);
 /* One step of length h [s], not accepted: its error over the tolerance, the share at which the first event lies, and the
  * bearing, from 1, with the largest error; 0: the building. */
 int try_step(msfp_building *b, double h, double *error, double *share, int *worst);
-/* The largest energy of the building so far, with that of the present state. */
-void note_energy(msfp_building *b);
+/* Kinetic and strain energy of the present state [J]; the largest energy of the building so far, with them. */
+void note_energy(msfp_building *b, double energies[2]);
+/* The status of the first bearing that has failed, which is noted. */
+int first_failure(msfp_building *b);
 /* Motion of both ends of each bearing at the present state, into the members. */
 void ends_now(msfp_building *b);
 
 /* ---- state.c ---- */
 
 int write_row(msfp_building *b);
+/* Take the row of a bearing from its two-port; MSFP_OK or MSFP_E_MEMORY. */
+int read_row(msfp_building *b, int bearing);
+
+/* ---- peaks.c ---- */
+
+size_t peak_count(const msfp_building *b);
+/* Values that every state exceeds, before the first one. */
+void begin_peaks(msfp_building *b);
+/* Peaks with those of the present state: of the building, and of one bearing. */
+void note_peaks(msfp_building *b);
+void note_bearing(msfp_building *b, int bearing);
 
 #endif

@@ -40,6 +40,11 @@ cdef extern from "msfp_building.h":
         const int *entry_count
         const int *entries
         double weight
+        int vectors
+        const int *vector_orders
+        const double *vector_rows
+        const double *vector_grounds
+        const double *arms
         const double *stops
         const double *jumps
         int stop_count, jump_count
@@ -60,6 +65,10 @@ cdef extern from "msfp_building.h":
     int msfp_building_advance(msfp_building *, long) noexcept nogil
     void msfp_building_state(const msfp_building *, msfp_building_progress *) noexcept nogil
     void msfp_building_counts(const msfp_building *, long *) noexcept nogil
+    size_t msfp_building_peak_count(const msfp_building *) noexcept nogil
+    const double *msfp_building_peaks(const msfp_building *) noexcept nogil
+    void msfp_building_ends(msfp_building *, int, double *) noexcept nogil
+    int msfp_building_replaced(msfp_building *, int, const int *) noexcept nogil
     size_t msfp_building_row_size(const msfp_building *) noexcept nogil
     const double *msfp_building_rows(const msfp_building *) noexcept nogil
     size_t msfp_building_snapshot_size(const msfp_building *) noexcept nogil
@@ -87,14 +96,15 @@ cdef class Run:
 
     matrices (3, n, n): mass, damping, stiffness. attached (r,): coordinates at the bearings. ports: the two-ports of all
     bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
-    of each bearing, indices into its row.
+    of each bearing, indices into its row. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
+    ground (k, grounds). arms (bearings, 2) [m].
     """
     cdef msfp_building *run
     cdef msfp_part *parts
     cdef msfp_piecewise *grounds
     cdef list held
 
-    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, *, double weight, stops, jumps,
+    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, vectors, arms, *, double weight, stops, jumps,
                   span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
                   double end, double output_step, int threads):
         cdef msfp_building_scene s
@@ -105,6 +115,8 @@ cdef class Run:
         s.attached, s.rows, s.ground_of = _ints(held, attached), _doubles(held, rows), _ints(held, ground_of)
         s.entry_count = _ints(held, [len(each) for each in entries])
         s.entries = _ints(held, np.concatenate(entries))
+        s.vectors, s.vector_orders = len(vectors[0]), _ints(held, vectors[0])
+        s.vector_rows, s.vector_grounds, s.arms = _doubles(held, vectors[1]), _doubles(held, vectors[2]), _doubles(held, arms)
         s.weight, s.rtol, s.max_step, s.first_step, s.max_steps = weight, rtol, max_step, first_step, max_steps
         s.end, s.output_step, s.threads, s.method = end, output_step, threads, method
         s.stops, s.stop_count, s.jumps, s.jump_count = _doubles(held, stops), len(stops), _doubles(held, jumps), len(jumps)
@@ -115,9 +127,7 @@ cdef class Run:
         if self.parts is NULL or self.grounds is NULL:
             raise MemoryError("no memory for the run of a building")
         for i, port in enumerate(ports):
-            self.parts[i] = (<msfp_part *>PyCapsule_GetPointer(port.capsule, "msfp_part"))[0]
-            if self.parts[i].api.abi_version != MSFP_ABI_VERSION:
-                raise ImportError(f"a model has ABI version {self.parts[i].api.abi_version}, the building {MSFP_ABI_VERSION}")
+            self.place(i, port)
         for i, (knots, coefficients) in enumerate(grounds):
             self.grounds[i].pieces = len(coefficients)
             self.grounds[i].knots, self.grounds[i].coefficients = _doubles(held, knots), _doubles(held, coefficients)
@@ -139,6 +149,26 @@ cdef class Run:
             more = msfp_building_advance(self.run, steps)
         PyErr_CheckSignals()
         return bool(more)
+
+    cdef place(self, int i, port):
+        self.parts[i] = (<msfp_part *>PyCapsule_GetPointer(port.capsule, "msfp_part"))[0]
+        if self.parts[i].api.abi_version != MSFP_ABI_VERSION:
+            raise ImportError(f"a model has ABI version {self.parts[i].api.abi_version}, the building {MSFP_ABI_VERSION}")
+
+    def ends(self, int bearing):
+        """Motion of the ends (2, 3, 6) of a bearing, from 0, at the present state."""
+        found = np.empty((2, 3, 6))
+        cdef double[:, :, ::1] view = found
+        msfp_building_ends(self.run, bearing, &view[0, 0, 0])
+        return found
+
+    def replace(self, int bearing, port, entries):
+        """Continue with another two-port of a bearing, from 0, in its present state; entries: indices into its row."""
+        cdef list held = []
+        cdef const int *given = _ints(held, entries)
+        self.place(bearing, port)
+        self.held.append(port)
+        msfp_building_replaced(self.run, bearing, given)
 
     cdef msfp_building_progress progress(self):
         cdef msfp_building_progress found
@@ -165,7 +195,16 @@ cdef class Run:
         cdef const double[:, ::1] view = <double[:count, :size]>msfp_building_rows(self.run)
         return np.array(view)
 
-    dropped_rows = 0  # it keeps all rows
+    @property
+    def row_count(self):
+        """How many they are."""
+        return self.progress().rows
+
+    @property
+    def peaks(self):
+        """Peaks over all steps, one number after the other; see msfp_building.h."""
+        cdef const double[::1] view = <double[:msfp_building_peak_count(self.run)]>msfp_building_peaks(self.run)
+        return np.array(view)
 
     @property
     def counts(self):

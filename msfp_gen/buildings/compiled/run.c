@@ -13,6 +13,14 @@ static double smallest(double t) { return smallest_step * fmax(1.0, t); }
 
 /* ---- begin and end ---- */
 
+static size_t entry_count(const msfp_building *b)
+{
+    size_t count = 0;
+    for (int i = 0; i < b->scene.bearings; ++i)
+        count += b->scene.entry_count[i];
+    return count;
+}
+
 static int allocate(msfp_building *b)
 {
     const size_t n = b->scene.n, r = b->scene.attachments, stages = MSFP_STAGES;
@@ -24,14 +32,15 @@ static int allocate(msfp_building *b)
                    { &b->free, n },        { &b->x, r },        { &b->residual, r }, { &b->change, r },
                    { &b->balance, r },     { &b->scale, r },    { &b->matrix, r * r }, { &b->next_u, n },
                    { &b->scratch, 3 * r }, { &b->stage_v, stages * n }, { &b->stage_a, stages * n },
-                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND } };
+                   { &b->ground, (size_t)b->scene.grounds * MSFP_GROUND }, { &b->peaks, peak_count(b) } };
     int complete = 1;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i)
         complete &= (*arrays[i].to = calloc(arrays[i].count, sizeof(double))) != NULL;
     b->members = calloc((size_t)b->scene.bearings, sizeof *b->members);
     b->piece = calloc((size_t)b->scene.grounds, sizeof *b->piece);
     b->pivots = calloc(r, sizeof *b->pivots);
-    return complete && b->members && b->piece && b->pivots ? MSFP_OK : MSFP_E_MEMORY;
+    b->entries = calloc(entry_count(b), sizeof *b->entries);
+    return complete && b->members && b->piece && b->pivots && b->entries ? MSFP_OK : MSFP_E_MEMORY;
 }
 
 /* Scale of the forces at the attachments: the weight, with its arms where they are moments. */
@@ -73,10 +82,8 @@ static void restart(msfp_building *b)
     ends_now(b);
     for_each_bearing(b, restart_bearing);
     for (int i = 0; i < b->scene.bearings && !b->status; ++i)
-        if (b->members[i].status) {
-            b->status = b->members[i].status;
-            b->bearing = i + 1;
-        }
+        if (b->members[i].status)
+            end_run(b, b->members[i].status, i + 1);
     memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
 }
 
@@ -85,8 +92,9 @@ static void begin(msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     for (int i = 0; i < s->bearings && !b->status; ++i) {
         member *m = &b->members[i];
-        if ((b->status = s->parts[i].api->port_wrench(s->parts[i].port, m->wrench)))
-            b->bearing = i + 1;
+        const int status = s->parts[i].api->port_wrench(s->parts[i].port, m->wrench);
+        if (status)
+            end_run(b, status, i + 1);
         memcpy(m->rest, m->wrench + MSFP_WRENCH, sizeof m->rest);
     }
     b->energy = 1e-5 * s->weight; /* that of its weight lifted by 0.01 mm: smaller ones do not matter */
@@ -96,8 +104,15 @@ static void begin(msfp_building *b)
         ++b->jump;
     if (!b->status)
         restart(b);
-    if (!b->status)
+    for (int i = 0; i < s->bearings && !b->status; ++i)
+        b->status = read_row(b, i);
+    if (!b->status) {
         b->status = write_row(b);
+        begin_peaks(b);
+        note_peaks(b);
+        for (int i = 0; i < s->bearings; ++i)
+            note_bearing(b, i);
+    }
     b->next_row = 1;
 }
 
@@ -112,6 +127,7 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
         return NULL;
     }
     set_scale(b);
+    memcpy(b->entries, scene->entries, entry_count(b) * sizeof *b->entries);
     b->status = scene->parts[0].api->port_method(scene->method, &b->method);
     begin(b);
     return b;
@@ -123,9 +139,12 @@ void msfp_building_free(msfp_building *b)
         return;
     pool_end(b);
     linear_free(b);
+    for (int i = 0; b->members && i < b->scene.bearings; ++i)
+        free(b->members[i].row);
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
                     b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u,
-                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows };
+                    b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows,
+                    b->entries, b->peaks };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         free(all[i]);
     free(b);
@@ -141,12 +160,13 @@ static double latest_end(msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     while (b->stop < s->stop_count && s->stops[b->stop] <= b->t + smallest(b->t))
         ++b->stop;
-    double end = fmin(s->end, next_row_time(b)), stop = end;
+    const double end = fmin(s->end, next_row_time(b));
+    double stop = INFINITY;
     if (b->stop < s->stop_count)
-        stop = fmin(stop, s->stops[b->stop]);
+        stop = s->stops[b->stop];
     if (b->jump < s->jump_count)
         stop = fmin(stop, s->jumps[b->jump]);
-    return stop < end - smallest(end) ? stop : end;
+    return stop <= end + smallest(end) ? stop : end; /* the given time, also where a row lies before it by rounding */
 }
 
 /* The step h, no longer than permitted at the present time; see allowed_step of run.c of the models. */
@@ -166,7 +186,7 @@ static double allowed(msfp_building *b, double h)
 static double divided(double h, double left)
 {
     const double count = ceil(left / h * (1.0 - 1e-9));
-    return count <= 8.0 ? left / fmax(count, 1.0) : pow(growth, floor(log(h) / log(growth)));
+    return count <= 8.0 ? left / fmax(count, 1.0) : fmin(h, msfp_pow(growth, floor(msfp_log(h) / msfp_log(growth) + 1e-9)));
 }
 
 /* The next length after a step of length h. A step that was cut to end at a given time leaves the proposal as it is,
@@ -175,8 +195,8 @@ static double next_length(const msfp_building *b, double h, double error)
 {
     const double e = fmax(error, 1e-6), last = fmax(b->previous_error, 1e-6), order = b->method.order;
     if (h < 0.9 * b->h && error < 0.5)
-        return fmax(b->h, h * fmin(5.0, 0.9 * pow(e, -1.0 / order)));
-    return h * fmin(5.0, fmax(0.2, 0.9 * pow(e, -0.7 / order) * pow(last, 0.4 / order)));
+        return fmax(b->h, h * fmin(5.0, 0.9 * msfp_pow(e, -1.0 / order)));
+    return h * fmin(5.0, fmax(0.2, 0.9 * msfp_pow(e, -0.7 / order) * msfp_pow(last, 0.4 / order)));
 }
 
 /* ---- steps ---- */
@@ -186,6 +206,9 @@ static void commit_bearing(msfp_building *b, int bearing)
     member *m = &b->members[bearing];
     const msfp_part *part = &b->scene.parts[bearing];
     m->status = part->api->port_step_commit(part->port, b->t);
+    m->status = m->status ? m->status : read_row(b, bearing);
+    if (!m->status)
+        note_bearing(b, bearing);
 }
 
 static void accept(msfp_building *b, double h, double t, double error)
@@ -209,11 +232,12 @@ static void accept(msfp_building *b, double h, double t, double error)
     b->t = t;
     ++b->counts[MSFP_BUILDING_STEPS];
     for_each_bearing(b, commit_bearing);
-    note_energy(b);
+    b->status = first_failure(b);
     b->h = next_length(b, h, error);
     b->previous_error = error;
     ground_at(b, t);
-    if (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t)) {
+    note_peaks(b);
+    if (!b->status && (t >= next_row_time(b) - smallest(t) || t >= s->end - smallest(t))) {
         b->next_row += t >= next_row_time(b) - smallest(t);
         b->status = write_row(b);
     }
@@ -235,6 +259,16 @@ static int shorten(msfp_building *b, double h, double factor, int status, int be
     return 0;
 }
 
+/* The first bearing, from 1, of which a monitor stops the step; 0: none. */
+static int tripped(msfp_building *b)
+{
+    int first = 0;
+    for (int i = b->scene.bearings - 1; i >= 0; --i)
+        if (b->scene.parts[i].api->port_tripped(b->scene.parts[i].port))
+            first = i + 1;
+    return first;
+}
+
 /* One step, or the rejection of one. Returns 0 where the run ends. */
 static int one_step(msfp_building *b)
 {
@@ -246,13 +280,47 @@ static int one_step(msfp_building *b)
         if (status)
             return shorten(b, h, 0.25, status, b->bearing);
         if (error > 1.0)
-            return shorten(b, h, fmax(0.1, 0.9 * pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
+            return shorten(b, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
         if (share >= 1.0 || relocations >= RELOCATIONS)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
     }
+    if ((b->bearing = tripped(b))) {
+        b->status = MSFP_E_GUARD;
+        return 0;
+    }
     accept(b, h, fabs(b->t + h - end) <= smallest(end) ? end : b->t + h, error);
     return b->status == MSFP_OK;
+}
+
+/* ---- a bearing continues with another model ---- */
+
+void msfp_building_ends(msfp_building *b, int bearing, double *ends)
+{
+    ground_at(b, b->t);
+    ends_now(b);
+    memcpy(ends, b->members[bearing].ends, sizeof b->members[bearing].ends);
+}
+
+int msfp_building_replaced(msfp_building *b, int bearing, const int *entries)
+{
+    const msfp_part *part = &b->scene.parts[bearing];
+    member *m = &b->members[bearing];
+    int *to = b->entries;
+    for (int i = 0; i < bearing; ++i)
+        to += b->scene.entry_count[i];
+    memcpy(to, entries, (size_t)b->scene.entry_count[bearing] * sizeof *to);
+    free(m->row);
+    m->row = NULL;
+    b->tangent_beta = 0.0;
+    b->h = fmin(b->h, 1e-3);
+    memset(b->slope, 0, (size_t)b->scene.n * sizeof *b->slope);
+    b->status = part->api->port_wrench(part->port, m->wrench);
+    b->status = b->status ? b->status : read_row(b, bearing);
+    b->bearing = b->status ? bearing + 1 : 0;
+    b->surface = 0;
+    b->value = 0.0;
+    return b->status;
 }
 
 static int finished(const msfp_building *b) { return b->t >= b->scene.end - smallest(b->scene.end); }

@@ -124,7 +124,7 @@ static void end_bearing(msfp_building *b, int bearing)
 }
 
 /* The status of the first bearing that has failed, which is noted. */
-static int first_failure(msfp_building *b)
+int first_failure(msfp_building *b)
 {
     for (int i = 0; i < b->scene.bearings; ++i)
         if (b->members[i].status) {
@@ -302,18 +302,26 @@ static void end_stage(msfp_building *b, int i, double beta)
         power[GROUND] += dot(3, b->members[j].wrench, b->ground + s->ground_of[j] * MSFP_GROUND + 3);
 }
 
-static double energy_of(msfp_building *b, const double *u, const double *v, double *product)
+/* Kinetic and strain energy; returns their sum. */
+static double energies_of(msfp_building *b, const double *u, const double *v, double *product, double energies[2])
 {
     const int n = b->scene.n;
     multiply(n, b->scene.mass, v, 0, product);
-    double twice = dot(n, v, product);
+    energies[0] = 0.5 * dot(n, v, product);
     multiply(n, b->scene.stiffness, u, 0, product);
-    return 0.5 * (twice + dot(n, u, product));
+    energies[1] = 0.5 * dot(n, u, product);
+    return energies[0] + energies[1];
 }
 
-void note_energy(msfp_building *b)
+static double energy_of(msfp_building *b, const double *u, const double *v, double *product)
 {
-    b->energy = fmax(b->energy, energy_of(b, b->u, b->v, b->Q));
+    double energies[2];
+    return energies_of(b, u, v, product, energies);
+}
+
+void note_energy(msfp_building *b, double energies[2])
+{
+    b->energy = fmax(b->energy, energies_of(b, b->u, b->v, b->Q, energies));
 }
 
 /* Error of the building in the norm of energy, over the tolerance. The embedded estimate of a stiff mode is as large as

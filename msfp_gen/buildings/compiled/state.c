@@ -40,13 +40,22 @@ static double *put(double *to, const double *from, size_t count)
     return to + count;
 }
 
+int read_row(msfp_building *b, int bearing)
+{
+    const msfp_part *part = &b->scene.parts[bearing];
+    member *m = &b->members[bearing];
+    if (!m->row && !(m->row = malloc((size_t)part->api->row_size * sizeof *m->row)))
+        return MSFP_E_MEMORY;
+    return part->api->port_row(part->port, m->row);
+}
+
 int write_row(msfp_building *b)
 {
     const msfp_building_scene *s = &b->scene;
     if (room_for(b, b->row_count + 1))
         return MSFP_E_MEMORY;
     double *row = b->rows + b->row_count * msfp_building_row_size(b);
-    const int *entries = s->entries;
+    const int *entries = b->entries;
     row = put(row, &b->t, 1);
     row = put(row, b->u, s->n);
     row = put(row, b->v, s->n);
@@ -54,15 +63,9 @@ int write_row(msfp_building *b)
     row = put(row, b->ground, (size_t)s->grounds * MSFP_GROUND);
     row = put(row, b->energies, ENERGIES);
     for (int i = 0; i < s->bearings; ++i) {
-        const msfp_part *part = &s->parts[i];
-        double *all = malloc((size_t)part->api->row_size * sizeof *all);
-        if (!all)
-            return MSFP_E_MEMORY;
-        part->api->port_row(part->port, all);
         row = put(row, b->members[i].wrench, 2 * MSFP_WRENCH);
         for (int k = 0; k < s->entry_count[i]; ++k)
-            *row++ = all[*entries++];
-        free(all);
+            *row++ = b->members[i].row[*entries++];
     }
     ++b->row_count;
     return MSFP_OK;
@@ -70,7 +73,7 @@ int write_row(msfp_building *b)
 
 /* ---- snapshots ---- */
 
-static const uint64_t magic = 0x6d73667062756931; /* "msfpbui1" */
+static const uint64_t magic = 0x6d73667062756932; /* "msfpbui2" */
 
 /* The numbers of the state in order, in both directions. */
 typedef struct {
@@ -101,6 +104,7 @@ static void pass_state(msfp_building *b, tape *t)
     pass(t, b->power[0], sizeof b->power[0]);
     pass(t, b->counts, sizeof b->counts);
     pass(t, b->tangent, r * s->attachments);
+    pass(t, b->peaks, peak_count(b) * sizeof *b->peaks);
     for (int i = 0; i < s->bearings; ++i)
         pass(t, b->members[i].wrench, sizeof b->members[i].wrench);
 }
@@ -111,7 +115,7 @@ static size_t state_size(const msfp_building *b)
     const msfp_building_scene *s = &b->scene;
     return 5 * sizeof(double) + 4 * sizeof(int) + 4 * (size_t)s->n * sizeof(double) + sizeof b->energies +
            sizeof b->power[0] + sizeof b->counts + (size_t)s->attachments * s->attachments * sizeof(double) +
-           (size_t)s->bearings * sizeof b->members[0].wrench;
+           (size_t)s->bearings * sizeof b->members[0].wrench + peak_count(b) * sizeof *b->peaks;
 }
 
 static size_t fixed_size(const msfp_building *b)

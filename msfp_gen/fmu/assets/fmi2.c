@@ -68,16 +68,15 @@ FMI2_EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[])
 {
     REQUIRE(ANY);
-    (void)count, (void)categories;
-    f->logging = on;
+    (void)on, (void)count, (void)categories;
     return fmi2OK;
 }
 
 FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
                                           const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean on)
 {
-    (void)resources, (void)visible;
-    return fmu_new(name, token, type == fmi2ModelExchange, on, send, functions ? (void (*)(void))functions->logger : NULL,
+    (void)resources, (void)visible, (void)on;
+    return fmu_new(name, token, type == fmi2ModelExchange, send, functions ? (void (*)(void))functions->logger : NULL,
                    functions ? functions->componentEnvironment : NULL);
 }
 
@@ -287,23 +286,20 @@ FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
     return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetRealOutputDerivatives: this unit has none");
 }
 
-FMI2_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2DoStepStatus || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetStatus: kind %d has no status", (int)kind);
-    *value = fmi2OK; /* steps never end later */
-    return fmi2OK;
-}
-
-FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2LastSuccessfulTime || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetRealStatus: kind %d is no number", (int)kind);
-    *value = f->values[FMU_TIME];
-    return fmi2OK;
-}
+/* Steps never end later: what a pending step would be asked. */
+#define STATUS(Function, type, known, result, is_not)                                                                  \
+    FMI2_EXPORT fmi2Status fmi2Get##Function(fmi2Component c, const fmi2StatusKind kind, type *value)                  \
+    {                                                                                                                  \
+        REQUIRE(ANY);                                                                                                  \
+        if (kind != known || !value)                                                                                   \
+            return (fmi2Status)fmu_fail(f, FMU_ERROR, "%s: kind %d " is_not, __func__, (int)kind);                     \
+        *value = result;                                                                                               \
+        return fmi2OK;                                                                                                 \
+    }
+STATUS(Status, fmi2Status, fmi2DoStepStatus, fmi2OK, "has no status")
+STATUS(RealStatus, fmi2Real, fmi2LastSuccessfulTime, f->values[FMU_TIME], "is no number")
+STATUS(BooleanStatus, fmi2Boolean, fmi2Terminated, 0, "is no Boolean")
+STATUS(StringStatus, fmi2String, fmi2PendingStatus, "", "is no text")
 
 FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
@@ -312,31 +308,12 @@ FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKin
     return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetIntegerStatus: kind %d is no integer", (int)kind);
 }
 
-FMI2_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2Terminated || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetBooleanStatus: kind %d is no Boolean", (int)kind);
-    *value = 0;
-    return fmi2OK;
-}
-
-FMI2_EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
-{
-    REQUIRE(ANY);
-    if (kind != fmi2PendingStatus || !value)
-        return (fmi2Status)fmu_fail(f, FMU_ERROR, "fmi2GetStringStatus: kind %d is no text", (int)kind);
-    *value = "";
-    return fmi2OK;
-}
-
 /* ---- Model Exchange ---- */
 
 FMI2_EXPORT fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->phase = FMU_EVENTS;
-    return fmi2OK;
+    return (fmi2Status)fmu_enter(f, __func__, FMU_EVENTS);
 }
 
 FMI2_EXPORT fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
@@ -349,8 +326,7 @@ FMI2_EXPORT fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *inf
 FMI2_EXPORT fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 {
     REQUIRE(EVENTS);
-    f->phase = FMU_RUNNING;
-    return fmi2OK;
+    return (fmi2Status)fmu_enter(f, __func__, FMU_RUNNING);
 }
 
 FMI2_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_state_before, fmi2Boolean *enter,
@@ -365,8 +341,7 @@ FMI2_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
 FMI2_EXPORT fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->values[FMU_TIME] = time; /* the equations do not contain it */
-    return fmi2OK;
+    return (fmi2Status)fmu_set_time(f, __func__, time);
 }
 
 FMI2_EXPORT fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)

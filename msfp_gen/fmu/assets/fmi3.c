@@ -69,8 +69,7 @@ FMI3_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on
                                            const fmi3String categories[])
 {
     REQUIRE(ANY);
-    (void)count, (void)categories;
-    f->logging = on;
+    (void)on, (void)count, (void)categories;
     return fmi3OK;
 }
 
@@ -78,8 +77,8 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3Strin
                                                       fmi3Boolean visible, fmi3Boolean on,
                                                       fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
-    (void)resources, (void)visible;
-    return fmu_new(name, token, 1, on, send, (void (*)(void))log, environment);
+    (void)resources, (void)visible, (void)on;
+    return fmu_new(name, token, 1, send, (void (*)(void))log, environment);
 }
 
 /* Steps are done as a whole: they need no event mode, no early return and no intermediate variables. */
@@ -89,9 +88,9 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String
                                                      size_t required_count, fmi3InstanceEnvironment environment,
                                                      fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
-    (void)resources, (void)visible, (void)event_mode, (void)early_return, (void)required, (void)required_count;
-    (void)update;
-    return fmu_new(name, token, 0, on, send, (void (*)(void))log, environment);
+    (void)resources, (void)visible, (void)on, (void)event_mode, (void)early_return, (void)required;
+    (void)required_count, (void)update;
+    return fmu_new(name, token, 0, send, (void (*)(void))log, environment);
 }
 
 FMI3_EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -132,10 +131,7 @@ FMI3_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 FMI3_EXPORT fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     REQUIRE(RUNNING | EVENTS);
-    if (!f->exchange)
-        return refuse(f, "fmi3EnterEventMode: this unit has no event mode in Co-Simulation");
-    f->phase = FMU_EVENTS;
-    return fmi3OK;
+    return (fmi3Status)fmu_enter(f, __func__, FMU_EVENTS);
 }
 
 FMI3_EXPORT fmi3Status fmi3Terminate(fmi3Instance instance)
@@ -483,8 +479,7 @@ FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3F
 FMI3_EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
     REQUIRE(EVENTS);
-    f->phase = FMU_RUNNING;
-    return fmi3OK;
+    return (fmi3Status)fmu_enter(f, __func__, FMU_RUNNING);
 }
 
 FMI3_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_state_before, fmi3Boolean *enter,
@@ -499,8 +494,7 @@ FMI3_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bo
 FMI3_EXPORT fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 {
     REQUIRE(RUNNING | EVENTS);
-    f->values[FMU_TIME] = time; /* the equations do not contain it */
-    return fmi3OK;
+    return (fmi3Status)fmu_set_time(f, __func__, time);
 }
 
 FMI3_EXPORT fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 states[], size_t count)

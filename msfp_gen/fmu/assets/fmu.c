@@ -16,12 +16,11 @@ fmu_status fmu_fail(const fmu *f, fmu_status status, const char *format, ...)
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     if (f->log)
-        f->log(f, status, status == FMU_WARNING ? "logStatusWarning" : status == FMU_DISCARD ? "logStatusDiscard"
-                                                                                             : "logStatusError", text);
+        f->log(f, status, status == FMU_DISCARD ? "logStatusDiscard" : "logStatusError", text);
     return status;
 }
 
-fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu_logger log, void (*callback)(void),
+fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, void (*callback)(void),
              void *environment)
 {
     fmu *f = calloc(1, sizeof *f);
@@ -30,7 +29,6 @@ fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu
     f->log = log;
     f->callback = callback;
     f->environment = environment;
-    f->logging = logging;
     f->exchange = exchange;
     const size_t length = name ? strlen(name) : 0;
     f->name = calloc(length + 1, 1);
@@ -153,6 +151,31 @@ fmu_status fmu_set(fmu *f, const unsigned *references, size_t count, int boolean
     }
     if (count)
         f->known = 0;
+    return FMU_OK;
+}
+
+static int exchanging(const fmu *f, const char *call)
+{
+    if (!f->exchange)
+        fmu_fail(f, FMU_ERROR, "%s: this instance is for Co-Simulation", call);
+    return f->exchange;
+}
+
+fmu_status fmu_enter(fmu *f, const char *call, fmu_phase phase)
+{
+    if (!exchanging(f, call))
+        return FMU_ERROR;
+    f->phase = phase;
+    return FMU_OK;
+}
+
+fmu_status fmu_set_time(fmu *f, const char *call, double time)
+{
+    if (!exchanging(f, call))
+        return FMU_ERROR;
+    if (!(fabs(time) < INFINITY))
+        return fmu_fail(f, FMU_ERROR, "%s: give a finite number [s]", call);
+    f->values[FMU_TIME] = time; /* the equations do not contain it */
     return FMU_OK;
 }
 

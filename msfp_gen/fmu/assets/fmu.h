@@ -32,7 +32,6 @@ struct fmu {
     void (*callback)(void); /* of the importer; `log` knows its type */
     void *environment;
     char *name;
-    int logging;  /* whether messages that are no errors are sent */
     int exchange; /* Model Exchange: the importer integrates */
     fmu_phase phase;
     double values[FMU_VALUES];
@@ -51,10 +50,11 @@ struct fmu {
     double jacobian[FMU_ORDERS][FMU_OUTPUT_COUNT][FMU_FREEDOMS];
 };
 
-/* ---- fmu.c: what both versions of the standard share; every failure is logged ---- */
+/* ---- fmu.c: what both versions of the standard share ---- */
+/* Every message says why a call failed, so all are sent: there is no debug logging to switch on. */
 
 /* NULL: no memory, or another unit's token. */
-fmu *fmu_new(const char *name, const char *token, int exchange, int logging, fmu_logger log, void (*callback)(void),
+fmu *fmu_new(const char *name, const char *token, int exchange, fmu_logger log, void (*callback)(void),
              void *environment);
 void fmu_free(fmu *f);
 /* Whether a call may be made in this phase; phases: bits FMU_AT. */
@@ -66,6 +66,9 @@ fmu_status fmu_begin(fmu *f, double start, double tolerance);
 fmu_status fmu_ready(fmu *f);
 fmu_status fmu_get(fmu *f, const unsigned *references, size_t count, int boolean, double *values);
 fmu_status fmu_set(fmu *f, const unsigned *references, size_t count, int boolean, const double *values);
+/* Of Model Exchange alone, as `call`: enter a phase; the time of the importer [s]. */
+fmu_status fmu_enter(fmu *f, const char *call, fmu_phase phase);
+fmu_status fmu_set_time(fmu *f, const char *call, double time);
 /* All states; a list of `size` numbers as they are now. */
 fmu_status fmu_set_states(fmu *f, const double *states, size_t count);
 fmu_status fmu_get_list(fmu *f, const double *list, size_t size, double *values, size_t count);
@@ -93,11 +96,12 @@ void fmu_release(fmu *f);
 /* Outputs of a row and of the wrenches [12], the ends at `ends`; outputs [FMU_OUTPUT_COUNT]. */
 void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs);
 fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int found, const char *message);
-
-/* ---- fmu_exchange.c: Model Exchange ---- */
-
+#if FMU_MASS
 /* Base motion [order][u_1..3, psi, theta, phi] of the lower end of `ends`. */
 void fmu_base(const double *ends, double base[FMU_ORDERS][6]);
+#endif
+
+/* ---- fmu_exchange.c: Model Exchange ---- */
 
 /* States at rest. */
 void fmu_exchange_start(fmu *f);

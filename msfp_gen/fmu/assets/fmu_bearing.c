@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
+#include "port.h"
 
 enum { NB = FMU_SURFACES, NQ = FMU_COORDINATES };
 
@@ -112,6 +113,18 @@ fmu_status fmu_build(fmu *f)
 }
 
 #if FMU_MASS
+void fmu_base(const double *ends, double base[FMU_ORDERS][6])
+{
+    double rotation[FMU_ORDERS][3], angles[FMU_ORDERS][3];
+    for (int order = 0; order < FMU_ORDERS; ++order)
+        memcpy(rotation[order], ends + 6 * order + 3, sizeof rotation[order]);
+    msfp_end_angles((const double(*)[3])rotation, angles);
+    for (int order = 0; order < FMU_ORDERS; ++order) {
+        memcpy(base[order], ends + 6 * order, 3 * sizeof *ends);
+        memcpy(base[order] + 3, angles[order], sizeof angles[order]);
+    }
+}
+
 /* Displacement, velocity and acceleration of r_nn since the start, and psi, theta, phi of the top plate with rates. */
 static void motion_of_top(const fmu *f, const double *row, const double *ends, double *motion)
 {

@@ -8,22 +8,9 @@
 #include "fmu.h"
 
 #if FMU_EXCHANGE
-#include "port.h"
 
 enum { NB = FMU_SURFACES, MOTIONS = FMU_SURFACES * FMU_COORDINATES };
 typedef char states_are_q_v_Y_Z[FMU_STATES == 2 * MOTIONS + 2 * NB ? 1 : -1];
-
-void fmu_base(const double *ends, double base[FMU_ORDERS][6])
-{
-    double rotation[FMU_ORDERS][3], angles[FMU_ORDERS][3];
-    for (int order = 0; order < FMU_ORDERS; ++order)
-        memcpy(rotation[order], ends + 6 * order + 3, sizeof rotation[order]);
-    msfp_end_angles((const double(*)[3])rotation, angles);
-    for (int order = 0; order < FMU_ORDERS; ++order) {
-        memcpy(base[order], ends + 6 * order, 3 * sizeof *ends);
-        memcpy(base[order] + 3, angles[order], sizeof angles[order]);
-    }
-}
 
 void fmu_exchange_start(fmu *f)
 {

@@ -75,7 +75,7 @@ fmu_status fmu_state_read(fmu *f, const void *state)
     f->phase = (fmu_phase)h->phase;
     f->known = 0;
     if (!h->ready) {
-        f->ready = 0;
+        fmu_release(f);
         return FMU_OK;
     }
     const fmu_status status = same ? FMU_OK : fmu_build(f); /* of the parameters of that state */

@@ -66,12 +66,7 @@ function addSettings(scene) {
     scene.settings.scale = Number(event.target.value);
     scene.show(current);
   });
-  for (const button of document.querySelectorAll("[data-view]")) {
-    button.addEventListener("click", () => {
-      scene.settings.view = button.dataset.view;
-      scene.setView();
-    });
-  }
+  addViewButtons(scene);
 }
 
 find("frame").max = frameCount - 1;

@@ -20,7 +20,7 @@ function at(name, ...indices) {
     size /= shape[depth];
     offset += index * size;
   });
-  return size === 1 ? values[offset] : values.subarray(offset, offset + size);
+  return indices.length === shape.length ? values[offset] : values.subarray(offset, offset + size);
 }
 
 const column = (read) => Array.from({ length: frameCount }, (_, frame) => read(frame));

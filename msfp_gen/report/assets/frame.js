@@ -61,16 +61,10 @@ function placed(frame, node, point, scale) {
 
 // Adds the view to `parent`. Returns { show, setView, settings }, or null if the browser has no WebGL.
 function addFrame(parent) {
-  const canvas = element(parent, "canvas", { role: "img", "aria-label": "The frame on its bearings; drag to turn, wheel to zoom" });
-  const context = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
-  if (!context) {
-    canvas.remove();
-    element(parent, "p", { class: "note" }, "This browser has no WebGL: tables, charts and figures show the run.");
-    return null;
-  }
+  const renderer = addRenderer(parent, "The frame on its bearings", "tables, charts and figures show the run.");
+  if (!renderer) return null;
   const { size, places, nodes, plates } = report;
   const [low, high] = report.plan;
-  const renderer = new THREE.WebGLRenderer({ canvas, context, alpha: true });
   const scene = new THREE.Scene();
   scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b4bc, 2.4));
   const sun = new THREE.DirectionalLight(0xffffff, 1.8);
@@ -105,7 +99,7 @@ function addFrame(parent) {
   });
   const camera = new THREE.PerspectiveCamera(26, 1, size / 100, size * 100);
   camera.up.set(0, 0, 1);
-  const controls = new THREE.OrbitControls(camera, canvas);
+  const controls = new THREE.OrbitControls(camera, renderer.domElement);
   const draw = () => renderer.render(scene, camera);
   controls.addEventListener("change", draw);
   const middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, report.height / 2 - tall];
@@ -144,14 +138,6 @@ function addFrame(parent) {
     }
     draw();
   };
-  new ResizeObserver(() => {
-    const { clientWidth, clientHeight } = parent;
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-    renderer.setSize(clientWidth, clientHeight, false);
-    camera.aspect = clientWidth / clientHeight;
-    camera.updateProjectionMatrix();
-    setView();
-  }).observe(parent);
-  setView();
+  followSize(parent, renderer, camera, setView);
   return { show, setView, settings };
 }

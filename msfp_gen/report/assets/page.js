@@ -73,12 +73,7 @@ function addSettings(scene) {
       scene.show(current);
     });
   }
-  for (const button of document.querySelectorAll("[data-view]")) {
-    button.addEventListener("click", () => {
-      scene.settings.view = button.dataset.view;
-      scene.setView();
-    });
-  }
+  addViewButtons(scene);
 }
 
 function addEvents() {

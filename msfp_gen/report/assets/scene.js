@@ -124,14 +124,8 @@ function fittingDistance(points, away, camera) {
 
 // Adds the view to `parent`. Returns { show, setView, settings }, or null if the browser has no WebGL.
 function addScene(parent) {
-  const canvas = element(parent, "canvas", { role: "img", "aria-label": "The bearing in three dimensions; drag to turn, wheel to zoom" });
-  const context = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
-  if (!context) {
-    canvas.remove();
-    element(parent, "p", { class: "note" }, "This browser has no WebGL: the bearing is drawn from the side only.");
-    return null;
-  }
-  const renderer = new THREE.WebGLRenderer({ canvas, context, alpha: true });
+  const renderer = addRenderer(parent, "The bearing in three dimensions", "the bearing is drawn from the side only.");
+  if (!renderer) return null;
   const scene = new THREE.Scene();
   lights(scene);
   const settings = { open: true, forces: true, still: true, view: "oblique" };
@@ -155,7 +149,7 @@ function addScene(parent) {
   stack.add(forces);
   const camera = new THREE.PerspectiveCamera(28, 1, reach / 50, reach * 200);
   camera.up.set(0, 0, 1);
-  const controls = new THREE.OrbitControls(camera, canvas);
+  const controls = new THREE.OrbitControls(camera, renderer.domElement);
   const draw = () => {
     marks.forEach(({ circle }) => circle.quaternion.copy(camera.quaternion));
     renderer.render(scene, camera);
@@ -187,15 +181,7 @@ function addScene(parent) {
     });
     draw();
   };
-  new ResizeObserver(() => {
-    const { clientWidth, clientHeight } = parent;
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-    renderer.setSize(clientWidth, clientHeight, false);
-    camera.aspect = clientWidth / clientHeight;
-    camera.updateProjectionMatrix();
-    setView();
-  }).observe(parent);
-  setView();
+  followSize(parent, renderer, camera, setView);
   return { show, setView, settings };
 }
 

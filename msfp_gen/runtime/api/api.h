@@ -18,6 +18,8 @@ int msfp_check_bearing(double gravity, const double *bodies, const double *surfa
                        const char **message);
 int msfp_check_scene(const msfp_scene *scene, const char **message);
 int msfp_check_port(const msfp_scene *scene, double axial_load, const char **message);
+/* A state that a port of another model has reached. */
+int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const double *ends);
 int msfp_check_port_loaded(const msfp_scene *scene, const char **message);
 /* Also the status of a two-port that has failed at its start. */
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message);
@@ -85,7 +87,12 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench);
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative);
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share);
+int msfp_api_port_step_commit(msfp_port *port, double time);
 int msfp_api_port_jump(msfp_port *port, const double *ends);
+int msfp_api_port_tripped(msfp_port *port);
+void msfp_api_port_trips(const msfp_port *port, msfp_trip *trips);
+void msfp_api_port_state(const msfp_port *port, msfp_run_state *state);
+int msfp_api_port_enter(msfp_port *port, const msfp_scene *state, const double *ends);
 int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause);
 
 #endif

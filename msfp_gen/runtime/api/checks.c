@@ -203,13 +203,14 @@ static int check_ends(const msfp_scene *s, const char **message)
     REQUIRE(!s->motion.pieces && !s->load.pieces && !s->support.pieces && !s->jump_count,
             "motion, load, support, jumps: leave them out; the ends of a two-port move as its trials say");
     REQUIRE(!s->stop_count && !s->span_count && s->output_step == 0.0 && s->stop_displacement == 0.0 && !s->stop_all_rims
-                && !s->monitors && !s->monitor_stop && !s->sampled && !s->quasistatic,
-            "stops, span_ends, output_step, stop_displacement, stop_all_rims, monitors, sampled, quasistatic: leave them as "
+                && !s->sampled && !s->quasistatic,
+            "stops, span_ends, output_step, stop_displacement, stop_all_rims, sampled, quasistatic: leave them as "
             "scene_default does");
     REQUIRE(!s->v && !s->f && !s->foot && !s->heat && !s->origin && !s->monitor_heat,
             "v, f, foot, heat, origin, monitor_heat: leave them out; a two-port starts at rest");
     REQUIRE(centred(s->q), "q: give zero angles and finite separations; a two-port starts centred");
-    return check_solver(s, message);
+    const int status = check_solver(s, message);
+    return status ? status : check_monitors(s, message);
 }
 
 int msfp_check_port(const msfp_scene *s, double axial_load, const char **message)
@@ -223,6 +224,21 @@ int msfp_check_port(const msfp_scene *s, double axial_load, const char **message
     REQUIRE(natural(axial_load, 0), "axial_load: give a finite number of at least 0 [N]");
     const int status = check_ends(s, message);
     return status ? status : check_interface(s->bearing->parameters.top, message);
+}
+
+int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const double *ends)
+{
+    if (port->committed.status)
+        return port->committed.status;
+    const int size = NB * MSFP_NQ;
+    if (port->loaded || !state || !state->q || !state->v || !state->f || !ends || !msfp_valid_ends(ends, 0) ||
+        !(fabs(state->start_time) < INFINITY) || (state->heat && !MSFP_HEAT))
+        return MSFP_E_ARGUMENT;
+    const int finite = msfp_all_finite(state->q, size) && msfp_all_finite(state->v, size) &&
+                       msfp_all_finite(state->f, 2 * NB) && msfp_all_finite(state->foot, 2) &&
+                       msfp_all_finite(state->origin, 3) && msfp_all_finite(state->heat, NB * MSFP_HEAT) &&
+                       msfp_all_finite(state->monitor_heat, 2 * NB);
+    return finite ? MSFP_OK : MSFP_E_FINITE;
 }
 
 int msfp_check_port_loaded(const msfp_scene *s, const char **message)

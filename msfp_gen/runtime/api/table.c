@@ -106,11 +106,15 @@ static const msfp_api table = {
     .port_stage = msfp_api_port_stage,
     .port_stage_derivative = msfp_api_port_stage_derivative,
     .port_step_end = msfp_api_port_step_end,
-    .port_step_commit = msfp_port_step_commit,
+    .port_step_commit = msfp_api_port_step_commit,
     .port_jump = msfp_api_port_jump,
     .port_cause = msfp_api_port_cause,
     .port_new_loaded = msfp_api_port_new_loaded,
     .port_beside = msfp_api_port_beside,
+    .port_tripped = msfp_api_port_tripped,
+    .port_trips = msfp_api_port_trips,
+    .port_state = msfp_api_port_state,
+    .port_enter = msfp_api_port_enter,
 };
 
 VISIBLE const msfp_api *MSFP_MODEL(void);

@@ -146,7 +146,7 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench)
 {
     const int now = port->step.stage;
-    if (now < 0 || stage < 1 || (stage != now && stage != now + 1) || stage >= port->step.stages.method->stages ||
+    if (now < 0 || stage < 1 || (stage != now && (stage != now + 1 || !port->step.solved)) || stage >= port->step.stages.method->stages ||
         !wrench)
         return MSFP_E_ARGUMENT;
     if (!ends || !msfp_valid_ends(ends, 0))
@@ -156,25 +156,62 @@ int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *
 
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative)
 {
-    return port->step.stage > 0 && derivative ? msfp_port_stage_derivative(port, derivative) : MSFP_E_ARGUMENT;
+    if (port->step.stage < 1 || !port->step.solved || !derivative)
+        return MSFP_E_ARGUMENT;
+    return msfp_port_stage_derivative(port, derivative);
 }
 
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
 {
-    if (port->step.stage < 1 || port->step.stage != port->step.stages.method->stages - 1 || !error || !share)
+    const msfp_port_step *step = &port->step;
+    if (step->stage < 1 || step->stage != step->stages.method->stages - 1 || !step->solved || !error || !share)
         return MSFP_E_ARGUMENT;
     return msfp_port_step_end(port, error, share);
 }
 
+int msfp_api_port_step_commit(msfp_port *port, double time)
+{
+    return time > port->committed.now.t && time < INFINITY ? msfp_port_step_commit(port, time) : MSFP_E_ARGUMENT;
+}
+
 int msfp_api_port_jump(msfp_port *port, const double *ends)
 {
+    if (port->committed.status)
+        return port->committed.status;
     return !port->loaded && ends && msfp_valid_ends(ends, 0) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)
 {
     msfp_run *run = &port->committed;
-    status = msfp_port_cause(port, status);
+    if (port->loaded || !cause)
+        return MSFP_E_ARGUMENT;
+    status = run->status ? run->status : msfp_port_cause(port, status);
     *cause = (msfp_progress){ status, run->status_surface, run->status_value, run->now.t, run->h, 0 };
+    return status;
+}
+
+/* ---- monitors, and the change of models that they ask for ---- */
+
+int msfp_api_port_tripped(msfp_port *port) { return msfp_port_tripped(port); }
+
+void msfp_api_port_trips(const msfp_port *port, msfp_trip *trips) { msfp_api_run_trips(&port->committed, trips); }
+
+void msfp_api_port_state(const msfp_port *port, msfp_run_state *state) { msfp_api_run_state(&port->committed, state); }
+
+int msfp_api_port_enter(msfp_port *port, const msfp_scene *state, const double *ends)
+{
+    const int wrong = msfp_check_entry(port, state, ends);
+    if (wrong)
+        return wrong;
+    msfp_options options = port->committed.options;
+    options.start_time = state->start_time;
+    options.duration = state->start_time + 1.0;
+    options.origin = state->origin;
+    options.foot = state->foot;
+    options.heat = state->heat;
+    const int status = msfp_port_enter(port, &options, state->q, state->v, state->f, state->monitor_heat, ends);
+    port->committed.options.origin = port->committed.options.foot = port->committed.options.heat = NULL;
+    port->run.options.origin = port->run.options.foot = port->run.options.heat = NULL;
     return status;
 }

@@ -32,9 +32,9 @@ static void copy_state(msfp_run *to, const msfp_run *from)
            MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN);
 }
 
-static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q)
+static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
+                 const double *v, const double *f)
 {
-    static const double v[NB * MSFP_NQ] = { 0.0 }, f[NB * 2] = { 0.0 };
     msfp_history motion, load;
     attach(&motion, port->knots, &port->motion);
     attach(&load, port->knots, &port->load);
@@ -47,9 +47,25 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 #endif
 }
 
+/* Start the committed run; the trial begins as a copy of it. Returns its status. */
+static int begin(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
+                 const double *v, const double *f)
+{
+    const int status = start(port, p, options, q, v, f);
+    port->run = port->committed;
+    port->run.rows = NULL;
+    port->run.events = NULL;
+    port->run.row_count = port->run.row_capacity = port->run.event_count = port->run.event_capacity = 0;
+    attach_all(port, &port->run);
+    port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
+    port->committed.options.duration = INFINITY;
+    return status;
+}
+
 msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
                          int loaded)
 {
+    static const double v[NB * MSFP_NQ] = { 0.0 }, f[NB * 2] = { 0.0 };
     msfp_port *port = calloc(1, sizeof *port);
     if (!port)
         return NULL;
@@ -60,16 +76,10 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->knots[1] = options->start_time + 1.0;
     port->knots[2] = options->start_time + 2.0;
     msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
-    const int status = start(port, p, options, q);
-    port->run = port->committed;
-    port->run.rows = NULL;
-    port->run.events = NULL;
-    port->run.row_count = port->run.row_capacity = port->run.event_count = port->run.event_capacity = 0;
-    attach_all(port, &port->run);
-    port->committed.options.start_time = -INFINITY; /* a snapshot may be of any time */
-    port->committed.options.duration = INFINITY;
-    if (status == MSFP_OK)
+    if (begin(port, p, options, q, v, f) == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
+        msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    }
     return port;
 }
 
@@ -81,6 +91,28 @@ void msfp_port_free(msfp_port *port)
     msfp_run_free(&port->run);
     free(port->times);
     free(port);
+}
+
+int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *q, const double *v, const double *f,
+                    const double *monitor_heat, const double *ends)
+{
+    msfp_run *run = &port->committed;
+    memcpy(&port->from, ends, sizeof port->from);
+    run->now.t = options->start_time;
+    msfp_port_hold(port); /* springs too */
+    const msfp_parameters parameters = run->parameters;
+    msfp_run_free(run);
+    msfp_run_free(&port->run);
+    const int status = begin(port, &parameters, options, q, v, f);
+    if (status == MSFP_OK)
+        msfp_port_wrench_of(port, run, &port->from, port->wrench);
+    if (monitor_heat) {
+        memcpy(run->monitor.energy, monitor_heat, sizeof run->monitor.energy);
+        memcpy(run->monitor.peak, monitor_heat + NB, sizeof run->monitor.peak);
+    }
+    port->tried = port->ready = port->step.finished = port->step.moved = 0;
+    port->step.stage = MSFP_NO_STEP;
+    return status;
 }
 
 double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
@@ -219,7 +251,10 @@ void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_
 
 void msfp_port_wrench(const msfp_port *port, double *wrench)
 {
-    msfp_port_wrench_of(port, current(port), port->tried ? &port->to : &port->from, wrench);
+    if (port->tried)
+        msfp_port_wrench_of(port, &port->run, &port->to, wrench);
+    else
+        memcpy(wrench, port->wrench, sizeof port->wrench);
 }
 
 int msfp_port_commit(msfp_port *port)
@@ -227,6 +262,7 @@ int msfp_port_commit(msfp_port *port)
     if (!port->ready)
         return MSFP_E_ARGUMENT;
     if (port->tried) {
+        msfp_port_wrench(port, port->wrench);
         port->committed.rows[0] = *msfp_port_row(port);
         copy_state(&port->committed, &port->run);
         port->from = port->to;
@@ -261,6 +297,7 @@ int msfp_valid_ends(const double *ends, int loaded)
 /* All numbers: no bytes between them. */
 typedef struct {
     msfp_ends from;
+    double wrench[MSFP_PORT_FREEDOMS];
     double moves[MSFP_DOF][MSFP_END_FREEDOMS], moved; /* as in msfp_port_step */
 } head;
 
@@ -272,6 +309,7 @@ void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
 {
     head h;
     h.from = port->from;
+    memcpy(h.wrench, port->wrench, sizeof h.wrench);
     memcpy(h.moves, port->step.moves, sizeof h.moves);
     h.moved = port->step.moved;
     const uint64_t sum = msfp_checksum(&h, sizeof h);
@@ -289,6 +327,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     memcpy(&h, snapshot, sizeof h);
     memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
     if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
+        !msfp_all_finite(h.wrench, MSFP_PORT_FREEDOMS) ||
         !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;
     msfp_run found = port->committed;
@@ -304,6 +343,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
     msfp_run_free(&port->committed);
     port->committed = found;
     port->from = h.from;
+    memcpy(port->wrench, h.wrench, sizeof h.wrench);
     memcpy(port->step.moves, h.moves, sizeof h.moves);
     port->step.moved = h.moved != 0.0;
     msfp_port_revert(port);

@@ -4,8 +4,8 @@
  * is [order][u_1..3 [m], rotation vector [rad]]: values, first and second derivatives. A wrench is force [N] and moment
  * [N m] that an end exerts on the bearing, about the present position of that end. End 0 is A, end 1 is B.
  *
- * In a loaded two-port end B is free: in place of its motion stand the force [N] and the moment [N m] on the top plate at
- * r_nn, with two derivatives, and its wrench is that load.
+ * In a loaded two-port end B is free: of[1] is then the force [N] and moment [N m] on the top plate
+ * at r_nn with two derivatives, and the wrench of end B is that load.
  *
  * A trial goes from the committed state to a given motion of the ends at a later time, with the step control of a run
  * in between. It depends on nothing else, so that trials may be repeated in any order.
@@ -25,8 +25,7 @@ typedef struct {
     double of[MSFP_ENDS][MSFP_ORDERS][MSFP_END_FREEDOMS];
 } msfp_ends;
 
-/* Piecewise polynomials: a trial, and what begins at its end. With the second piece the end of a trial is exactly the
- * motion given, as in a run over several pieces. */
+/* Two pieces: the trial, and the motion going on from its end, so that its end is exact. */
 enum { MSFP_PORT_PIECES = 2 };
 typedef struct {
     double coefficients[MSFP_PORT_PIECES][6][MSFP_DEGREE + 1];
@@ -36,18 +35,22 @@ typedef struct {
 typedef struct {
     msfp_stages stages;
     int stage;         /* that is being solved; 0: none yet, -1: no step was begun */
-    double anchor[2];  /* where the horizontal springs of the interface are fixed in this step [m] */
-    double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* derivatives of the rates of a stage with respect to those of end B */
-    int moved;         /* those are of the latest stage that was differentiated; otherwise there was none */
-    double before[MSFP_EVENTS], after[MSFP_EVENTS]; /* event functions at its ends */
+    int solved;        /* that stage has been; stage 0 is the committed state */
+    double anchor[2];  /* where the horizontal springs are fixed in this step [m] */
+    double moves[MSFP_DOF][MSFP_END_FREEDOMS]; /* d(rates of the stage)/d(rates of end B) */
+    int moved;         /* `moves` has been computed */
+    double after[MSFP_EVENTS]; /* event functions at its end */
     double energy;     /* at its end, with springs as in `committed.now` [J] */
     int finished;      /* it may be committed */
+    msfp_monitor_state monitor; /* at its end */
+    int tripped;       /* a monitor stops it */
 } msfp_port_step;
 
 struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
     msfp_ends from, to; /* motion of the ends in those states */
+    double wrench[MSFP_PORT_FREEDOMS]; /* of the committed state: stages that are given up change committed.work */
     double knots[MSFP_PORT_PIECES + 1]; /* of the trial, and any later one [s] */
     msfp_polynomials motion, load;
 #if MSFP_TOP_ROTATION
@@ -65,12 +68,16 @@ struct msfp_port {
 
 /* ---- port.c ---- */
 
-/* A bearing at rest under the axial load [N], both ends at u = 0. The top's springs of `p` are the interface. q: as in
- * msfp_run_start, without tilts. loaded: end B is free, and the axial load is zero. The status is that of `committed`. The port is released by msfp_port_free, also after a
- * failure; NULL: no memory. */
+/* A bearing at rest under the axial load [N], both ends at u = 0; the springs of the top in `p` are
+ * the interface. q: as in msfp_run_start, without tilts. loaded: end B is free, axial load zero.
+ * The status is that of `committed`. Free it also after a failure; NULL: no memory. */
 msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, double axial_load, const double *q,
                          int loaded);
 void msfp_port_free(msfp_port *port);
+/* Continue in a port at rest from the state of a port of another model. options: start time, origin, foot and heat are
+ * those of that state, as q, v, f are; monitor_heat: as in a scene, NULL: none; ends [end][order][6]: their motion. */
+int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *q, const double *v, const double *f,
+                    const double *monitor_heat, const double *ends);
 /* Go from the committed state to the time `t` [s], not before it, at which the ends are at `to` [end][order][6]. At the
  * committed time `to` is the committed motion. Returns MSFP_OK, or a status: see port->run. */
 int msfp_port_trial(msfp_port *port, double t, const double *to);
@@ -87,36 +94,42 @@ size_t msfp_port_snapshot_size(const msfp_port *port);
 void msfp_port_snapshot_write(const msfp_port *port, void *snapshot);
 /* Returns MSFP_OK, or MSFP_E_MEMORY or MSFP_E_SNAPSHOT, after which nothing has changed. */
 int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
-/* Whether the motion of the ends [end][order][6] is finite and no end is turned by more than MSFP_LARGEST_TURN. */
+/* Whether all numbers [end][order][6] are finite and no end turns by more than MSFP_LARGEST_TURN;
+ * loaded: those of end B are a load. */
 int msfp_valid_ends(const double *ends, int loaded);
 /* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
 void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench);
 
-/* Fix the horizontal springs of the interface where end B is at u = `at` [m], instead of `from`; returns by how much
- * their energy is larger there, with the top plate at `plate` [m]: [J]. */
+/* Fix the horizontal springs where end B is at u = `at` [m] instead of `from`; returns the change
+ * of their energy [J], the top plate at `plate` [m]. */
 double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double *plate, const double *from,
                              const double *at);
 
 /* ---- stage.c: steps by the stages of a method that another program drives ---- */
 
-/* Begin a step of length h [s] from the committed state; a step that was begun before is forgotten. expected [2]:
- * horizontal displacement of end B that is expected at its end [m]. */
+/* Begin a step of length h [s] from the committed state, in place of one begun before.
+ * expected [2]: horizontal displacement of end B expected at its end [m]. */
 void msfp_port_step_begin(msfp_port *port, double h, const double *expected);
-/* Solve stage i, 1 or the last one again or the one after it, with the ends moving as `ends` [end][order][6] says, and
- * state the wrenches [end][6]. Returns MSFP_OK or a status, with its place as in a run. */
+/* Solve stage i, the last one again or the next, at the motion `ends` [end][order][6]; gives the
+ * wrenches [end][6]. Returns MSFP_OK or a status, with its place as in a run. */
 int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench);
-/* Derivatives [6][6] of the wrench of end B in that stage with respect to the rates of end B, whose displacements change
- * with them by the diagonal entry of the method times the step. Returns MSFP_OK or a status. */
+/* Derivatives [6][6] of the wrench of end B in that stage by the rates of end B; its displacements
+ * change with them by gamma h. Returns MSFP_OK or a status. */
 int msfp_port_stage_derivative(msfp_port *port, double *derivative);
-/* After the last stage: error of the step over its tolerance [-], and the share of the step at which the first event of
- * the bearing lies; 1: none. Returns MSFP_OK or a status. */
+/* After the last stage: error over tolerance [-], and the share of the step at which the first
+ * event lies; 1: none. Returns MSFP_OK or a status. */
 int msfp_port_step_end(msfp_port *port, double *error, double *share);
+/* Whether a monitor stops the step that has just ended and that would be accepted now. Its trip is noted then, and the
+ * step must not be committed. */
+int msfp_port_tripped(msfp_port *port);
 /* Accept the step, which ends at the time t [s]. */
 int msfp_port_step_commit(msfp_port *port, double t);
-/* The accelerations of the ends in the committed state jump to those of `ends`. Returns MSFP_OK or a status. */
+/* The accelerations of the ends jump to those of `ends`. Returns MSFP_OK or a status. */
 int msfp_port_jump(msfp_port *port, const double *ends);
+/* Histories that hold the ends as they move in the committed state. */
+void msfp_port_hold(msfp_port *port);
 /* The cause of a `status` that a shorter step does not cure. */
 int msfp_port_cause(msfp_port *port, int status);
 
@@ -138,8 +151,8 @@ void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msf
 #endif
 
 #if MSFP_TOP_ROTATION
-/* Angular velocities [direction][3] of the axis of end B for unit rates of its rotation vector, and the derivatives of
- * its present angular velocity with respect to the rotation vector. rotation [order][3]. */
+/* Angular velocities [direction][3] of the axis of end B at unit rates of its rotation vector, and
+ * derivatives of its present angular velocity by that vector. rotation [order][3]. */
 void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3]);
 #endif
 

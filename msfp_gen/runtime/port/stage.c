@@ -8,7 +8,7 @@
 #include <string.h>
 #include "port.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, FORCE = MSFP_FORCE_SIZE, FREEDOMS = MSFP_END_FREEDOMS };
+enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, FREEDOMS = MSFP_END_FREEDOMS };
 
 /* Base motion, load and rotation of the support of a stage. */
 static void set_ends(const msfp_port *port, const msfp_ends *ends, msfp_point *at)
@@ -43,6 +43,7 @@ void msfp_port_step_begin(msfp_port *port, double h, const double *expected)
     port->step.energy =
         run->now.energy + msfp_port_move_anchor(port, run, run->rows[0].top, port->from.of[1][0], port->step.anchor);
     port->step.stage = port->step.finished = 0;
+    port->step.solved = 1;
     port->tried = port->ready = 0;
     run->status_surface = 0;
     run->status_value = 0.0;
@@ -73,6 +74,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
         msfp_stage_begin(run, s, i);
         port->step.stage = i;
     }
+    port->step.solved = 0;
     set_ends(port, &to, &s->now.at);
     s->now.seed.same_base = again; /* the lower end moves as it does */
     if (again) {
@@ -86,6 +88,7 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     run->retry_after_newton |= status == MSFP_E_NEWTON;
     if (status)
         return status;
+    port->step.solved = 1;
     msfp_port_wrench_of(port, run, &port->to, wrench);
     return MSFP_OK;
 }
@@ -254,8 +257,20 @@ int msfp_port_step_end(msfp_port *port, double *error, double *share)
 #endif
     msfp_event_values(run, &run->next, step->after);
     *share = msfp_first_event(run, run->events_now, step->after);
+    const msfp_monitor_state before = run->monitor;
+    step->tripped = msfp_monitor_step(run, step->after);
+    step->monitor = run->monitor;
+    run->monitor = before; /* until the step is accepted */
     step->finished = 1;
     return MSFP_OK;
+}
+
+int msfp_port_tripped(msfp_port *port)
+{
+    if (!port->step.finished || !port->step.tripped)
+        return 0;
+    port->committed.monitor = port->step.monitor;
+    return 1;
 }
 
 int msfp_port_step_commit(msfp_port *port, double t)
@@ -267,9 +282,11 @@ int msfp_port_step_commit(msfp_port *port, double t)
     run->next.energy = port->step.energy;
     ++run->counts[MSFP_COUNT_STEPS];
     memcpy(run->events_now, port->step.after, sizeof run->events_now);
+    run->monitor = port->step.monitor;
     run->now = run->next;
     run->restart = run->retry_after_newton = 0;
     port->from = port->to;
+    msfp_port_wrench_of(port, run, &port->from, port->wrench);
     port->step.finished = 0;
     msfp_row *row = &run->rows[0];
     msfp_record(&run->parameters, &run->reached, &run->work, &run->now.mechanical, row);
@@ -278,8 +295,7 @@ int msfp_port_step_commit(msfp_port *port, double t)
     return MSFP_OK;
 }
 
-/* Histories that hold the ends as they move in the committed state. */
-static void hold(msfp_port *port)
+void msfp_port_hold(msfp_port *port)
 {
     msfp_run *run = &port->committed;
     set_histories(port, &port->from, 1.0);
@@ -289,12 +305,15 @@ static void hold(msfp_port *port)
 int msfp_port_jump(msfp_port *port, const double *ends)
 {
     memcpy(&port->from, ends, sizeof port->from);
-    hold(port);
-    return msfp_consistent_initial_state(&port->committed);
+    msfp_port_hold(port);
+    const int status = msfp_consistent_initial_state(&port->committed);
+    if (status == MSFP_OK)
+        msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
+    return status;
 }
 
 int msfp_port_cause(msfp_port *port, int status)
 {
-    hold(port);
+    msfp_port_hold(port);
     return msfp_classify_failure(&port->committed, status);
 }

@@ -10,7 +10,7 @@ import numpy as np
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
-from msfp_gen.figures.loops import SIDE
+from msfp_gen.figures.loops import axes_along
 from msfp_gen.figures.style import THIN, headline, subscript
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.studies.bounding.runs import CASES
@@ -36,7 +36,7 @@ def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
     A run that failed is drawn up to its last row. Raises InputError for a path that cannot be written.
     """
     drawn = [case for name in LINE_STYLES for case in found.cases if case.name == name and case.result is not None]
-    axes = sorted({axis for case in drawn for axis in _moving(_loop(case.result))}) or [0]
+    axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in found.cases if case.name == "nominal") or "unnamed scene"
         headline(figure, f"{name}: bounds by {found.table.name}")
@@ -76,12 +76,6 @@ def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
         return u, np.sum([each.top_force for each in result.bearings], axis=0)
     assert result is not None
     return result.history.displacement, result.history.top_force
-
-
-def _moving(loop: tuple[Array, Array]) -> list[int]:
-    """Horizontal axes along which a loop moves."""
-    peaks = np.abs(loop[0][:, :2]).max(axis=0)
-    return [axis for axis in (0, 1) if peaks[axis] > SIDE * peaks.max()]
 
 
 def _label(found: Bounds, case: Case) -> str:

@@ -180,9 +180,10 @@ def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> li
 
 
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
-    """Case -> the scene with its properties multiplied; "nominal" is `scene` itself. Raises InputError as `bound`.
+    """Case -> the scene with its properties multiplied; "nominal" is `scene` itself.
 
-    The bearings of a building have the same effects in all cases: with uplift where any case needs it.
+    The bearings of a building have the same effects in all cases, nominal too: with uplift where any case needs it.
+    Raises InputError as `bound`.
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
     buildings = [each for each in scenes.values() if isinstance(each, BuildingScene)]

@@ -76,7 +76,8 @@ def plot_residuals(tests: Sequence[FittedTest], path: str | Path | None = None) 
             over_force.plot(force(test.measured.force, large), residual, color=colour, **points)
         over_u.set(title="over the displacement", xlabel=displacement_label(0), ylabel=_residual_label(small))
         over_force.set(title="over the force", xlabel=f"measured force {shown_sign().force} [{large.unit}]")
-        ordered = np.sort(np.concatenate([test.measured.weight * test.residual / _spread(tests) for test in tests]))
+        ordered = np.sort(np.concatenate([test.measured.weight * test.residual for test in tests]))
+        ordered /= float(np.sqrt(np.mean(ordered**2))) or 1.0
         expected = norm.ppf((np.arange(len(ordered)) + 0.5) / len(ordered))
         normal.axline((0, 0), slope=1, color=FAINT, linewidth=HAIR)
         normal.plot(expected, ordered, color=INK, **points)
@@ -86,12 +87,6 @@ def plot_residuals(tests: Sequence[FittedTest], path: str | Path | None = None) 
         for axes in (over_u, over_force):
             axes.axhline(0, color=FAINT, linewidth=HAIR)
     return figure
-
-
-def _spread(tests: Sequence[FittedTest]) -> float:
-    """Root mean square of all weighted residuals [N]; 1 where all are zero."""
-    squares = np.concatenate([(test.measured.weight * test.residual) ** 2 for test in tests])
-    return float(np.sqrt(squares.mean())) or 1.0
 
 
 def _residual_label(scale: Scale) -> str:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
-from msfp_gen.simulation.batch import Workers, raise_if_stopped, usable_cores
+from msfp_gen.simulation.batch import Workers, raise_if_stopped
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.calibration.intervals import SINGULAR
@@ -63,8 +64,8 @@ class Evaluation:
 
     def step_in_errors(self, step: Array) -> float:
         """Length of a step of the unknowns in their standard errors (Bates and Watts 1981); step: shape (k,)."""
-        error = float(np.sqrt(len(step) * self.variance))
-        return float(np.linalg.norm(self.jacobian @ step) / error) if error else np.inf
+        length, error = float(np.linalg.norm(self.jacobian @ step)), float(np.sqrt(len(step) * self.variance))
+        return length / error if error else np.inf if length else 0.0
 
 
 @dataclass(eq=False)

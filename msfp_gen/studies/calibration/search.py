@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import RunError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.studies.calibration.residuals import Evaluation, Residuals
 
 TOLERANCE = 1e-5  # relative change of cost and values at which the search ends; errors of runs hide smaller ones
@@ -22,20 +22,24 @@ def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, m
     The search also ends where the next step is shorter than a tenth of the standard errors: the noise of the tests
     makes smaller ones meaningless, and the error of runs, which varies irregularly with the values, hides them.
 
-    most: number of evaluations. Raises RunError where the start fails or the search has not ended by then.
+    most: number of evaluations. Raises RunError where the start fails, the search has not ended by then, or it ends
+    beside values whose runs fail.
     """
     from scipy.optimize import least_squares as search
 
     best, found, begun = start, residuals.at(start), False
+    failure: RunError | InputError | None = None  # of the last trial
     if found.failure is not None:
         raise found.failure
 
     def values(x: Array) -> Array:
-        nonlocal best, found
-        if begun and not np.array_equal(x, best) and found.step_in_errors(x - best) < WITHIN:
+        nonlocal best, found, failure
+        # After a failed run the next step is short because the search was thrown back, not because it ends.
+        if begun and failure is None and not np.array_equal(x, best) and found.step_in_errors(x - best) < WITHIN:
             raise _WithinError
         at = residuals.at(x)
-        if at.failure is None and at.square < found.square:
+        failure = at.failure
+        if failure is None and at.square < found.square:
             best, found = x.copy(), at
         return at.residuals
 
@@ -52,6 +56,13 @@ def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, m
     if ended.status == 0:
         raise RunError(
             f"fit: not converged after {most} evaluations; give tighter bounds, fewer parameters, or more evaluations",
+            status="fit",
+        )
+    free = (best > low) & (best < high)
+    if failure is not None and found.step_in_errors(found.step(free)) > 1.0:
+        raise RunError(
+            f"fit: the search ended beside values whose runs fail ({failure}); give bounds without them, or "
+            "other values to start from",
             status="fit",
         )
     return best, found

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from msfp_gen.buildings.columns import column_names
 from msfp_gen.buildings.opening import AnyScene, scene_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -23,6 +24,8 @@ from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, bearing
 from msfp_gen.studies.study.sampling import Sampling
 
 MOST_RUNS = 100_000_000
+_Counts = tuple[int, int, int]  # floors, storeys and bearings of a building
+
 TRIED = 1000  # values of one axis that are tried before the first run, at least
 PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
 LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
@@ -173,9 +176,15 @@ def check_study(study: Study) -> Study:
             _check_axis(axis, plain, bool(study.recipe.records))
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
-    tried = list(_tried(study, SceneMaker(study.recipe)))
-    surfaces = max(len(bearing.surfaces) for scene in tried for bearing in _bearings(scene))
-    found = replace(study, keep=replace(study.keep, surfaces=surfaces, building=_counts(tried[0])))
+    surfaces, building = 0, None
+    columns: tuple[str, ...] = ()
+    for scene in _tried(study, SceneMaker(study.recipe)):  # one after the other: their motions are long
+        surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in _bearings(scene)))
+        building = _larger(building, _counts(scene))
+        if isinstance(scene, BuildingScene) and study.keep.formulas and not columns:
+            columns = column_names(scene)
+    keep = replace(study.keep, surfaces=surfaces, building=building, building_columns=columns)
+    found = replace(study, keep=keep)
     reserved = [INTENSITY] if study.recipe.intensities else []
     names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
     if twice := [name for name in names if names.count(name) > 1]:
@@ -187,8 +196,15 @@ def _bearings(scene: AnyScene) -> list[Bearing]:
     return [each.bearing for each in scene.bearings] if isinstance(scene, BuildingScene) else [scene.bearing]
 
 
-def _counts(scene: AnyScene) -> tuple[int, int, int] | None:
-    """Floors, storeys and bearings of a building; None for a scene of one bearing."""
+def _larger(one: _Counts | None, other: _Counts | None) -> _Counts | None:
+    """The larger count of each kind; None where there is none."""
+    if one is None or other is None:
+        return one or other
+    return max(one[0], other[0]), max(one[1], other[1]), max(one[2], other[2])
+
+
+def _counts(scene: AnyScene) -> _Counts | None:
+    """Those of a building; None for a scene of one bearing."""
     if not isinstance(scene, BuildingScene):
         return None
     return len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.buildings.columns import columns_of
+from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
@@ -26,7 +28,7 @@ EXTREMES: dict[str, Callable[[Any], Any]] = {
     "most": np.max,
     "last": lambda values: values[-1],
 }
-_EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*(\w+)\s*\)")
+_EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
 # Quantities of the summary beside the columns of a sweep: name -> (unit, path).
 _MORE = {
     "axial_load": ("N", "axial_load"),
@@ -69,6 +71,7 @@ class Keep:
         surfaces: the most surfaces of any bearing of the study.
         axes: names of the axes that hold numbers.
         building: floors, storeys and bearings where the base is a building.
+        building_columns: of its history, as in an exported file.
     """
 
     names: tuple[str, ...]
@@ -76,6 +79,7 @@ class Keep:
     surfaces: int
     axes: tuple[str, ...]
     building: tuple[int, int, int] | None = None
+    building_columns: tuple[str, ...] = ()
 
     @property
     def known(self) -> dict[str, Source]:
@@ -83,9 +87,9 @@ class Keep:
         return catalogue(self.surfaces) if self.building is None else building_catalogue(self.building)
 
     @property
-    def history(self) -> dict[str, tuple[str, tuple[int, ...]]]:
-        """Columns of the history of which extremes can be taken; none of a building."""
-        return history_columns(self.surfaces) if self.building is None else {}
+    def history(self) -> Collection[str]:
+        """Columns of the history of which extremes can be taken."""
+        return history_columns(self.surfaces) if self.building is None else self.building_columns
 
     def columns(self) -> tuple[Column, ...]:
         """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
@@ -96,7 +100,7 @@ class Keep:
 
         at: the values of the axes that hold numbers.
         """
-        reader = _Reader(result, self.known, self.history)
+        reader = _Reader(result, self)
         formulas = dict(self.formulas)
         found = {
             column.name: self._evaluated(column.name, formulas[column.name], reader, at)
@@ -140,17 +144,20 @@ def _columns(keep: Keep) -> tuple[Column, ...]:
 @lru_cache(maxsize=64)
 def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[str, str]]]:
     """Syntax tree of a formula, and the extremes in it: symbol -> (word, column of the history)."""
-    extremes = {f"{word}_of_{column}": (word, column) for word, column in _EXTREME.findall(text)}
-    columns = keep.history
-    for word, column in extremes.values():
-        if keep.building is not None:
-            raise InputError(f"quantities.{name}: {word}({column}): a building has no such history; give a quantity")
+    columns, extremes = keep.history, {}
+
+    def symbol(match: re.Match[str]) -> str:
+        word, column = match.groups()
         if column not in columns:
             hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
             raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
+        extremes[found := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
+        return found
+
+    plain = _EXTREME.sub(symbol, text)
     numbers = [key for key in keep.known if key not in TEXTS]
     try:
-        return formula.parse(_EXTREME.sub(r"\1_of_\2", text), [*numbers, *keep.axes, *extremes]), extremes
+        return formula.parse(plain, [*numbers, *keep.axes, *extremes]), extremes
     except ValueError as error:
         word, named, _ = str(error).partition(" is no name of a law")
         why = f"{word} is no quantity and no axis that holds numbers; see docs/studies.md" if named else str(error)
@@ -214,13 +221,11 @@ def _finite(value: Any) -> float | None:
 class _Reader:
     """Reads quantities of one run; its summary and its characterisation are made when they are first needed."""
 
-    def __init__(
-        self, result: Any, known: Mapping[str, Source], columns: Mapping[str, tuple[str, tuple[int, ...]]]
-    ) -> None:
+    def __init__(self, result: Any, keep: Keep) -> None:
         self.result = result
         self.problem = ""
-        self._known = known
-        self._columns = columns
+        self._keep = keep
+        self._known = keep.known
         self._found: Any = None
 
     def value(self, name: str) -> Any:
@@ -241,13 +246,20 @@ class _Reader:
 
     def extreme(self, word: str, column: str) -> float | None:
         """An extreme of a column of the history; None where the run has no such column."""
-        field, index = self._columns[column]
+        values = self._building_columns.get(column) if self._keep.building else self._history_column(column)
+        return None if values is None else _finite(EXTREMES[word](values))
+
+    @cached_property
+    def _building_columns(self) -> dict[str, Array]:
+        return columns_of(self.result)
+
+    def _history_column(self, column: str) -> Array | None:
+        field, index = history_columns(self._keep.surfaces)[column]
         values = self.result.history.arrays().get(field)
         if values is None or any(place >= length for place, length in zip(index, values.shape[1:], strict=True)):
             return None
-        return _finite(
-            EXTREMES[word](values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])])
-        )
+        found: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
+        return found
 
     def _capacity_used(self, surface: int) -> float | None:
         surfaces = self.result.scene.bearing.surfaces

@@ -8,10 +8,11 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import TYPE_CHECKING
 
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
-from msfp_gen.simulation.batch import check_method, specs_of, usable_cores
+from msfp_gen.simulation.batch import check_method, specs_of
 from msfp_gen.simulation.either import simulate
 
 if TYPE_CHECKING:

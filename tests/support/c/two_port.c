@@ -117,6 +117,7 @@ static void refusals(const msfp_scene *scene, msfp_port *port, const double *las
     TRIAL(ends[7] = NAN);
     TRIAL(ends[21] = 2.0);
     refused("no handle", api->port_new(scene, 1e5, NULL, NULL), NULL);
+    refused("no place for the cause", api->port_cause(port, MSFP_E_NEWTON, NULL), NULL);
     refused("nothing to commit", api->port_commit(port), NULL);
     refused("no trial", api->port_derivative(port, tangent, derivative), NULL);
     require(api->port_trial(port, now, last, NULL));
@@ -127,6 +128,21 @@ static void refusals(const msfp_scene *scene, msfp_port *port, const double *las
     api->port_revert(port);
     refused("reverted", api->port_commit(port), NULL);
     api->port_free(NULL);
+}
+
+/* Functions of steps by stages where there is nothing to step. */
+static void failed_start(const msfp_scene *scene)
+{
+    const double ends[36] = { 0.0 };
+    msfp_progress cause;
+    msfp_port *port;
+    const int status = api->port_new(scene, 1e300, &port, NULL);
+    if (status == MSFP_OK || status >= MSFP_E_ARGUMENT || !port)
+        puts("no failed start");
+    else if (api->port_jump(port, ends) != status || api->port_cause(port, MSFP_E_NEWTON, &cause) != status ||
+             cause.status != status || api->port_step_begin(port, 0.01, ends) != status)
+        puts("the failed start is lost");
+    api->port_free(port);
 }
 
 int main(void)
@@ -165,6 +181,7 @@ int main(void)
     }
     print(derivative, 144);
     refusals(&scene, port, ends);
+    failed_start(&scene);
     top[MSFP_5_2_2_TOP_MASS] = 1.0;
     msfp_bearing *loaded;
     require(api->bearing_new(gravity, bodies, surfaces, top, &loaded, NULL));

@@ -21,13 +21,14 @@ from msfp_gen import (
     Effects,
     InputError,
     Scene,
+    Soil,
     Storey,
     Top,
     load_scene,
     presets,
 )
 from msfp_gen.buildings.file import building_from_table
-from msfp_gen.buildings.opening import load_bearing_scene
+from msfp_gen.buildings.opening import files_of, load_bearing_scene, with_absolute_paths
 
 TEXT = """
 name = "one storey"
@@ -185,6 +186,20 @@ def test_one_opener_for_scenes_and_buildings():
         load_scene("hospital-cc")
 
 
+def test_soil_below_bearings_is_in_series_with_their_interfaces():
+    given = table()
+    given["building"]["soil"] = {"stiffness": 4e7, "vertical_stiffness": "200 kN/mm", "damping": 4e4}
+    given["building"]["bearing"][2]["soil"] = {"stiffness": 2e7, "vertical_stiffness": 5e7}
+    scene = building_from_table(given)
+    assert scene.bearings[0].interface == Top.node(8e6, 4e7, 1e6, damping=4e4 * 0.2**2)
+    assert scene.bearings[2].interface == Top.node(1e7, 2.5e7, 1e6)
+    own = Soil(4e7, 2e8, 4e4, 4e5)
+    # Where damping over stiffness is the same of both, dampers in series have that ratio too.
+    both = own.below(Top.node(1e7, 5e7, 1e6, damping=1e4, vertical_damping=1e5, rotational_damping=3.0))
+    wanted = Top.node(8e6, 4e7, 1e6, damping=8e3, vertical_damping=8e4, rotational_damping=3.0)
+    assert list(vars(both).values()) == pytest.approx(list(vars(wanted).values()), rel=1e-14)
+
+
 def table() -> dict:
     return deepcopy(tomllib.loads(TEXT))
 
@@ -210,6 +225,17 @@ def table() -> dict:
         ("motion.kind", "harmonics", r"motion\.kind = 'harmonics': give one of"),
         ("building.highest_frequency", 0.0, r"building\.highest_frequency = 0\.0: give"),
         ("top", {}, "top: unknown key"),
+        (
+            "building.soil",
+            {"stiffness": 1e8, "vertical_stiffness": 1e8, "rotational_stiffness": 1e9},
+            r"building\.bearing\[0\]\.soil\.rotational_stiffness = 1e\+09: the lower plate .* leave it out",
+        ),
+        (
+            "building.bearing.1.soil",
+            {"stiffness": 1e8, "vertical_stiffness": 1e8, "mass": "20 t"},
+            r"building\.bearing\[1\]\.soil\.mass = 20000: a foundation .* has no inertia; leave it out",
+        ),
+        ("building.soil", {"stiffness": 1e8}, r"building\.soil\.vertical_stiffness"),
     ],
 )
 def test_messages_name_the_field(path, value, message):
@@ -250,3 +276,15 @@ def test_examples_of_the_page(tmp_path: Path):
 
 
 OTHERS = ([6, -4], [-6, 4], [6, 4])  # [m]
+
+
+def test_files_of_a_table_are_found_wherever_they_are_named(tmp_path: Path):
+    """A study names them all, and resolves them before its workers start elsewhere."""
+    for name in ("ground.csv", "corner.csv", "M.mtx", "K.mtx"):
+        (tmp_path / name).write_text("", encoding="utf-8")
+    rows = [{"motion": {"kind": "file", "file": "corner.csv"}}, {}]
+    given = {"motion": {"file": "ground.csv"}, "building": {"mass": "M.mtx", "stiffness": "K.mtx", "bearing": rows}}
+    assert files_of(given) == ["ground.csv", "M.mtx", "K.mtx", "corner.csv"]
+    found = with_absolute_paths(given, tmp_path)
+    assert files_of(found) == [str(tmp_path / name) for name in ("ground.csv", "M.mtx", "K.mtx", "corner.csv")]
+    assert files_of(given)[-1] == "corner.csv"  # the table given is as before

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from support.buildings import MOTION, PLACES, frame, scene
 
-from msfp_gen import Auto, BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
+from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
 from msfp_gen.buildings.characterise import cycles_of
-from msfp_gen.buildings.notes import TEXTS
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.summary import summary_tables
+from msfp_gen.results.note import Note
 
 
 @cache
@@ -55,12 +55,14 @@ def test_summary_is_that_of_the_rows():
     weight = made().axial_loads.sum()
     assert s["weight"] == pytest.approx(weight, rel=1e-9)
     shear = np.hypot(*found.base_reaction[:, :2].T).max()
-    assert s["peak_base_shear"]["radial"] == shear and s["base_shear_ratio"] == pytest.approx(shear / weight)
+    assert 1.05 * shear > s["peak_base_shear"]["radial"] >= shear
+    assert s["base_shear_ratio"] == s["peak_base_shear"]["radial"] / s["weight"]
     roof = found.node("floor 3")[:, 2, :2]
-    assert s["floors"][3]["peak_acceleration"]["radial"] == np.hypot(*roof.T).max()
+    assert s["floors"][3]["peak_acceleration"]["radial"] >= np.hypot(*roof.T).max()
     assert s["storeys"][0]["peak_drift_ratio"] == s["storeys"][0]["peak_drift"]["radial"] / 3.0
-    assert s["minimum_load_ratio"] == (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
-    assert s["peak_displacement"]["E1"] == np.abs(found.bearing_displacement[:, :, 0]).max() > 0
+    assert s["minimum_load_ratio"] <= (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
+    moved = np.abs(found.bearing_displacement[:, :, 0]).max()
+    assert moved > 0 and s["peak_displacement"]["E1"] == pytest.approx(moved)
     assert [each["position"] for each in s["bearings"]] == [list(place) for place in PLACES]
     assert s["wall_time"] > 0 and s["counters"]["steps"] > 0 and s["notes"] == [] and s["rims_met"] == []
 
@@ -161,20 +163,17 @@ def test_a_failed_run_states_how_it_ended():
     assert "steps" in repr(found)
 
 
-def test_monitors_name_the_bearing():
-    given = made()
-    bearings = [*given.bearings[:2], replace(given.bearings[2], effects=Auto(rims=False)), given.bearings[3]]
-    found = replace(result(), scene=replace(given, bearings=bearings))
-    found.sliding[2][5:, 1] += 1.0
-    found.normal_force[0][7, 2] = 0.0
-    try:
-        notes = found.notes
-        assert [(note.kind, note.surface, note.time) for note in notes] == [("rims", 2, 0.1), ("uplift", 3, 0.14)]
-        assert notes[0].text.startswith("bearing 3: a slider is ") and notes[1].text.startswith("bearing 1 (A): ")
-        assert {note.kind for note in notes} < set(TEXTS) and "notes" in repr(found)
-    finally:
-        found.sliding[2][5:, 1] -= 1.0
-        found.normal_force[0][7, 2] = result().normal_force[0][6, 2]
+def test_notes_of_monitors_name_the_bearing():
+    uplift = Note(0.14, "uplift", 3, 5.0, "it is unloaded", "uplift = True")
+    heat = [(index, Note(0.2 + index, "heat", 1, 10.0 + index, "it is hot")) for index in range(3)]
+    found = replace(result(), monitored=(*heat[::-1], (0, uplift), (2, replace(uplift, time=0.3, action=""))))
+    assert [note.line for note in found.notes] == [
+        "t = 0.14 s: bearing 1 (A): it is unloaded; continued with uplift = True",
+        "t = 0.2 s: bearing 1 (A): it is hot; so do 2 other bearings",
+        "t = 0.3 s: bearing 3: it is unloaded",
+    ]
+    assert found.bearings[0].transitions == (uplift,) and found.bearings[2].transitions == ()
+    assert "notes" in repr(found)
 
 
 def test_characterisation_of_the_isolation_system():
@@ -208,6 +207,9 @@ def test_effects_of_each_bearing_are_selected_and_explained():
     assert given.modelled == 4 * (Effects(),)
     lifted = replace(given, motion=replace(MOTION, coefficients=_vertical(MOTION.coefficients)))
     assert all(effects.uplift for effects in lifted.modelled)
+    shaken = replace(given, bearings=[replace(given.bearings[0], motion=lifted.motion), *given.bearings[1:]])
+    assert all(effects.uplift for effects in shaken.modelled)  # bearing 1 may take the load off the others
+    assert "the ground moves differently" in "\n".join(table.text for table in explain(shaken))
     mixed = replace(given, bearings=[replace(given.bearings[0], effects=Effects(rims=False)), *given.bearings[1:]])
     text = "\n".join(table.text for table in explain(mixed))
     assert "bearing 1: effects as given" in text and "bearings 2-4: effects selected" in text

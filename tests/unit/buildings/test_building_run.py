@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
+from msfp_gen.buildings import run
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.run import simulate_building
@@ -117,3 +120,16 @@ def test_equal_motions_of_the_supports_are_the_common_motion():
     assert np.abs(moved.displacement - common.displacement).max() < 1e-4 * np.abs(common.displacement).max()
     assert np.array_equal(moved.ground, np.zeros_like(moved.ground))
     assert moved.axial_force.min() > 0.5 * LOAD
+
+
+def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
+    """A result without rows would have no summary and no figure."""
+
+    def failed(made: BuildingScene, threads: int | None) -> Any:
+        compiled = SimpleNamespace(rows=(), status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False)
+        return SimpleNamespace(scene=made, run=compiled)
+
+    monkeypatch.setattr(run, "start_run", failed)
+    with pytest.raises(RunError, match="bearing 1: stopped at t = 0 s") as caught:
+        simulate(scene(frame()))
+    assert caught.value.result is None

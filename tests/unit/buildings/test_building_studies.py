@@ -119,6 +119,9 @@ keep = ["peak_base_shear", "bearing_displacement"]
 
 [quantities]
 ratio = "peak_base_shear / 441000"
+slab = "peak(node_acceleration_base_u1) / 9.81"
+corner = "last(axial_force_2) - least(axial_force_2)"
+left = "least( sliding_3_4 ) + most(bearing_displacement_3_E1)"
 
 [axes.mu]
 multiplies = "building.bearing[*].bearing.friction"
@@ -148,9 +151,13 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     outcome = study(file, tmp_path / "runs", workers=1, threads=True)
     assert outcome.runs == outcome.done == 2 and outcome.failed == 0
     rows = parquet.read_table(next((tmp_path / "runs").glob("part-*.parquet"))).to_pydict()
-    wanted = simulate(scene).summary
+    run = simulate(scene)
+    wanted = run.summary
     assert rows["peak_base_shear"][1] == wanted["peak_base_shear"]["radial"] > rows["peak_base_shear"][0]
     assert rows["bearing_displacement_3"][1] == wanted["bearings"][2]["peak_displacement"]["radial"]
+    assert rows["slab"][1] == np.abs(run.node("base")[:, 2, 0]).max() / 9.81
+    assert rows["corner"][1] == run.axial_force[-1, 1] - run.axial_force[:, 1].min() > 0
+    assert rows["left"][1] == run.sliding[2][:, 3].min() + run.bearings[2].displacement[:, 0].max() > 0
     assert rows["ratio"][1] == pytest.approx(rows["peak_base_shear"][1] / 441000)
 
 
@@ -160,7 +167,9 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
         ("bearing[*]", "bearing[5]", r"axes\.mu.*there are 3 bearings; give an index from 0 to 2"),
         ("surfaces = [1, 4]", "surfaces = [7]", "this bearing has surfaces 1 to 4"),
         ('"peak_base_shear",', '"peak_top_force",', "'peak_top_force' is no quantity"),
-        ("peak_base_shear / 441000", "peak(displacement_E1)", "a building has no such history"),
+        ("peak_base_shear / 441000", "peak(displacement_E1)", "'displacement_E1' is no column of a history"),
+        ("node_acceleration_base_u1", "node_acceleration_base_u7", "did you mean 'node_acceleration_base_u"),
+        ("sliding_3_4", "sliding_4_4", "'sliding_4_4' is no column of a history"),
         ('"building.interface.vertical_stiffness"', '"building.interfaces.stiffness"', "interfaces: unknown key"),
     ],
 )
@@ -180,6 +189,8 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     assert main(["explain", str(path)]) == 0 and "all bearings: effects selected" in capsys.readouterr().out
     assert main(["characterise", str(out)]) == 0 and "isolation system of slab" in capsys.readouterr().out
     assert main(["plot", str(out), "--figure", "plan", "-o", str(tmp_path / "plan.svg")]) == 0
+    assert main(["animate", str(out), "-o", str(tmp_path / "m.gif"), "--seconds", "0.5", "--rate", "4"]) == 0
+    assert (tmp_path / "m.gif").read_bytes().startswith(b"GIF8")
     assert main(["export", str(out), "-o", str(tmp_path / "n.csv"), "--columns", "axial_force"]) == 0
     assert "axial_force_3 [N]" in (tmp_path / "n.csv").read_text(encoding="utf-8")
     assert main(["run", str(path)]) == 0 and "peaks of bearings" in capsys.readouterr().out
@@ -189,7 +200,7 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     ("arguments", "words"),
     [
         (["run", "--error", "1%"], "--error = 0.01: this is a building"),
-        (["animate", "-o", "x.gif"], "this is a building"),
+        (["animate", "-o", "x.gif", "--end", "9"], "time = 9 s: the run holds 0 to 0.24 s"),
         (["fit", "test.csv", "--parameters", "bearing.friction"], "this is a building"),
         (["plot", "--figure", "loops"], "--figure = 'loops': give one of overview, plan"),
         (["export", "-o", "x.csv", "--sign", "top-base"], "columns of a building have one sign"),

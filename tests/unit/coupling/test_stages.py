@@ -72,6 +72,23 @@ def test_steps_by_stages_and_trials_agree():
         assert wrench[1, 0] == pytest.approx(forces[n - 1], abs=2e-3 * max(forces))
 
 
+def test_a_step_given_up_leaves_the_committed_wrench():
+    """In the port, and in a snapshot that it writes afterwards."""
+    port, other = TwoPort(BEARING, INTERFACE, LOAD).compiled, TwoPort(BEARING, INTERFACE, LOAD).compiled
+    assert port.step_begin(STEP, np.zeros(2)) == "ok"
+    for stage, share in STAGES:
+        status, wrench = port.stage(stage, ends(*swing(share * STEP)[:2]))
+        assert status == "ok"
+    assert port.step_end()[0] == "ok" and port.step_commit(STEP) == "ok"
+    assert np.array_equal(port.wrench, wrench)
+    assert port.step_begin(STEP, np.zeros(2)) == "ok"
+    assert np.abs(port.stage(1, ends(0.01 * RATES, RATES))[1] - wrench).max() > 0.01 * LOAD
+    port.revert()
+    assert np.array_equal(port.wrench, wrench)
+    other.restore(port.snapshot())
+    assert np.array_equal(other.wrench, wrench)
+
+
 def test_stages_out_of_order_are_refused():
     compiled = TwoPort(BEARING, INTERFACE, LOAD).compiled
     at = ends(np.zeros(6), np.zeros(6))
@@ -90,5 +107,19 @@ def test_stages_out_of_order_are_refused():
     assert compiled.stage(1, at * np.nan)[0] == "finite"
     assert compiled.stage(3, at)[0] == "argument"
     assert compiled.stage(2, at)[0] == "ok" and compiled.step_commit(STEP) == "argument"
-    assert compiled.step_end()[0] == "ok" and compiled.step_commit(STEP) == "ok"
-    assert compiled.step_commit(STEP) == "argument"
+    assert compiled.step_end()[0] == "ok"
+    for time in (np.nan, -1.0, 0.0, np.inf):
+        assert compiled.step_commit(time) == "argument"
+    assert compiled.step_commit(STEP) == "ok" and compiled.step_commit(2 * STEP) == "argument"
+
+
+def test_a_stage_that_failed_must_be_solved_before_what_follows():
+    compiled = TwoPort(BEARING, INTERFACE, LOAD).compiled
+    at = ends(np.zeros(6), np.zeros(6))
+    far = ends(np.array([1.0, 0, 0, 0, 0, 0]), np.zeros(6))
+    assert compiled.step_begin(STEP, np.zeros(2)) == "ok"
+    assert compiled.stage(1, far)[0] == "newton"
+    assert compiled.stage(2, at)[0] == compiled.stage_derivative()[0] == "argument"
+    assert compiled.stage(1, at)[0] == compiled.stage_derivative()[0] == "ok"
+    assert compiled.stage(2, far)[0] == "newton" and compiled.step_end()[0] == "argument"
+    assert compiled.stage(2, at)[0] == compiled.step_end()[0] == compiled.step_commit(STEP) == "ok"

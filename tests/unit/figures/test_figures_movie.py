@@ -10,9 +10,7 @@ import pytest
 from support import preset_run
 
 from msfp_gen.errors import InputError
-from msfp_gen.figures import animate, movie, page
-from msfp_gen.results.geometry.section import sections
-from msfp_gen.results.resample import at_times
+from msfp_gen.figures import animate, film, movie, page
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}
 
@@ -38,15 +36,13 @@ def test_a_frame_is_what_a_complete_drawing_shows():
     """Moving artists over a copy of what stands still gives every pixel that drawing all of them gives."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    result = preset_run("fenz-test5")
-    frames = at_times(result, [40.0, 100.0, 150.0])
-    found = sections(frames)
+    shown = movie.stack_film(preset_run("fenz-test5"), np.array([40.0, 100.0, 150.0]), None)
     with page(10.0, 5.5) as figure:
-        moved = list(movie._pictures(figure, result, frames, found, None))
+        moved = list(film.pictures(figure, shown, None))
     with page(10.0, 5.5) as figure:
-        figure.set_dpi(movie.DOTS)
+        figure.set_dpi(film.DOTS)
         canvas = FigureCanvasAgg(figure)
-        update, moving = movie._layout(figure, result, frames, found)
+        update, moving = shown.layout(figure)
         canvas.draw()
         figure.set_layout_engine("none")
         for row, picture in enumerate(moved):
@@ -59,10 +55,9 @@ def test_a_frame_is_what_a_complete_drawing_shows():
 
 def test_the_section_spans_the_movie():
     """No half of the picture is white: bodies cover most columns of the upper part."""
-    result = preset_run("fenz-test5")
-    frames = at_times(result, np.linspace(0, 300, 7))
-    with page(10.0, movie._height(sections(frames))) as figure:
-        pictures = np.array(list(movie._pictures(figure, result, frames, sections(frames), None)))[..., :3]
+    shown = movie.stack_film(preset_run("fenz-test5"), np.linspace(0, 300, 7), None)
+    with page(10.0, shown.height) as figure:
+        pictures = np.array(list(film.pictures(figure, shown, None)))[..., :3]
     height = pictures.shape[1]
     drawn = (pictures.min(axis=(0, 3)) < 235)[round(0.25 * height) : round(0.5 * height)]
     assert drawn.any(axis=0).mean() > 0.8

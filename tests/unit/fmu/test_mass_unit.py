@@ -117,6 +117,16 @@ def test_it_conforms_to_the_standard(unit: Path) -> None:
     assert objections(unit, 2) == []
 
 
+def test_a_unit_for_co_simulation_alone_steps(unit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is built without an archiver."""
+    monkeypatch.setenv("AR", "no-such-ar")
+    steps = []
+    for path in (write_fmu(mass(), tmp_path / "isolated.fmu").path, unit):
+        with Unit(path, inputs_at_step_end=True) as at_work:
+            steps.append(at_work.start().step(0.0, STEP, base(STEP)))
+    assert np.array_equal(*steps) and steps[0].any()
+
+
 # ---- Model Exchange ----------------------------------------------------------------------------------------------
 
 
@@ -204,3 +214,13 @@ def test_what_model_exchange_refuses(unit: Path) -> None:
         with pytest.raises(FMICallException):
             at_work.read(at_work.outputs)
         assert "uplift" in at_work.messages[-1]
+
+
+def test_functions_of_model_exchange_are_refused_in_co_simulation(unit: Path) -> None:
+    with Unit(unit, inputs_at_step_end=True) as at_work:
+        at_work.start()
+        for function, given in (("EnterEventMode", ()), ("SetTime", (ctypes.c_double(0.5),))):
+            assert at_work.call(function, *given) == 3  # an error
+            assert f"{function}: this instance is for Co-Simulation" in at_work.messages[-1]
+        assert at_work.get("time") == 0.0
+        assert at_work.step(0.0, STEP).any()

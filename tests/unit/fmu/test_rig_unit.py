@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import subprocess
@@ -131,6 +132,20 @@ def test_states_go_back_and_damaged_ones_are_refused(unit: Path) -> None:
         assert np.array_equal(advance(at_work, 5, 8), first)
 
 
+def test_a_state_from_before_the_start_has_no_step(unit: Path) -> None:
+    """At the start the outputs do not depend on the inputs."""
+    with Unit(unit, inputs_at_step_end=True) as at_work:
+        at_work.fmu.enterInitializationMode(startTime=0.0)
+        state = at_work.state()
+        at_work.fmu.exitInitializationMode()
+        first = advance(at_work, 0, 3)
+        assert at_work.derivative(at_work.outputs, 19).any()
+        at_work.restore(state)
+        assert not at_work.derivative(at_work.outputs, 19).any()
+        at_work.fmu.exitInitializationMode()
+        assert np.array_equal(advance(at_work, 0, 3), first)
+
+
 def test_parameters_are_those_of_a_two_port(unit: Path) -> None:
     with Unit(unit, inputs_at_step_end=True, axial_load=90e3, solver__rtol=1e-5) as at_work:
         at_work.start()
@@ -198,3 +213,13 @@ def test_what_it_refuses_is_named(unit: Path) -> None:
         assert "make a step first" in at_work.messages[-1]
         with pytest.raises(FMICallException):
             at_work.fmu.enterEventMode()
+
+
+def test_functions_of_model_exchange_are_refused_in_co_simulation(unit: Path) -> None:
+    with Unit(unit, inputs_at_step_end=True) as at_work:
+        at_work.start()
+        for function, given in (("EnterEventMode", ()), ("SetTime", (ctypes.c_double(0.5),))):
+            assert at_work.call(function, *given) == 3  # an error
+            assert f"{function}: this instance is for Co-Simulation" in at_work.messages[-1]
+        assert at_work.get("time") == 0.0
+        assert at_work.step(0.0, STEP).any()

@@ -26,7 +26,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setitem(__import__("sys").modules, "msfp_gen.generator", fake_model.generator())
         built = build.prepare(SPEC, portable=True)
         for level in prebuilt.LEVELS:
-            prebuilt.add_prebuilt(SPEC, level, built.folder, prebuilt.prebuilt_folder())
+            prebuilt.add_prebuilt(level, built.folder, prebuilt.prebuilt_folder())
     return folder / "house"
 
 
@@ -103,11 +103,14 @@ def test_a_prebuilt_model_is_of_these_sources(installed: Path) -> None:
 
 def test_presets_are_among_the_prebuilt_models() -> None:
     from msfp_gen import load_scene
+    from msfp_gen.buildings.opening import load_scene as load_building
     from msfp_gen.scene.effect_selection import select_effects
 
     names = {spec.key for spec in prebuilt.prebuilt_specs()}
-    assert len(names) == 24
+    assert len(names) == 30
     for preset in ("fenz-test1", "becker-circle-50", "single-push", "double-push", "triple-push", "ridgecrest-clc"):
         scene = load_scene(preset)
         assert scene.spec.key in names
         assert select_effects(scene).effects == scene.spec.effects
+    for preset in ("hospital-ccc", "hospital-clc"):
+        assert {spec.key for spec in load_building(preset).specs} <= names

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.buildings import frame, scene
+from support.buildings import BEARING, INTERFACE, frame, scene
 
-from msfp_gen import Motion, simulate
+from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Motion, RunError, Storey, simulate
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import BUILDING_FIGURES
 from msfp_gen.report import TitleBlock, report_html
@@ -70,6 +70,46 @@ def test_a_browser_draws_it(tmp_path: Path):
     peak = building_view(result(), 1500)["peak"]
     shown = float(re.findall(r"<td>([^<]*)</td>", rows[0][1])[0].replace("−", "-"))
     assert shown == pytest.approx(1e3 * result().bearings[0].displacement[peak, 0], abs=0.06)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to draw the page")
+def test_a_building_of_one_storey_on_one_bearing_is_shown(tmp_path: Path):
+    """Rows of one storey and one bearing have one value: none of them is read as a row of that value."""
+    mass = 2e4
+    slab, upper = BaseSlab(mass, 3 * (mass,)), Storey(3.0, mass, 3 * (mass,), 1e7, 1e7)
+    bearing = BuildingBearing(BEARING, INTERFACE, effects=Effects())
+    motion = Motion.harmonic(0.02, 0.6, cycles=1)
+    small = BuildingScene(Building.shear(slab, [upper], 0.02), [bearing], motion, duration=0.3, output_step=0.02)
+    path = tmp_path / "frame.html"
+    path.write_text(report_html(simulate(small)), encoding="utf-8")
+    command = [CHROMIUM, *FLAGS, "--virtual-time-budget=10000", "--dump-dom", path.as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    assert 'data-ready="true"' in dom and "NaN" not in re.sub(r"<script.*?</script>", "", dom, flags=re.DOTALL)
+
+
+@cache
+def first_row() -> BuildingResult:
+    """The result of a run that ends before its second row."""
+
+    def interrupt(_: float, __: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(RunError) as caught:
+        simulate(scene(frame(), duration=0.8, output_step=0.4), progress=interrupt)
+    found = caught.value.result
+    assert isinstance(found, BuildingResult) and len(found.time) == 1
+    return found
+
+
+@pytest.mark.parametrize("name", BUILDING_FIGURES)
+def test_a_result_of_one_row_is_drawn(name, tmp_path: Path):
+    path = tmp_path / f"{name}.png"
+    BUILDING_FIGURES[name](first_row(), path)
+    assert path.stat().st_size > 1e4
+
+
+def test_a_result_of_one_row_has_a_page():
+    assert "interrupted" in report_html(first_row())
 
 
 @pytest.mark.parametrize("name", BUILDING_FIGURES)

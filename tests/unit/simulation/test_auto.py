@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,12 +27,12 @@ from msfp_gen import (
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
+from msfp_gen.scene.effect_switching import Ending, next_effects
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
-from msfp_gen.simulation.effect_switching import next_effects
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -377,11 +376,9 @@ def test_a_run_interrupted_before_a_switch_resumes_through_it(tmp_path: Any, mon
 def test_a_note_in_the_step_of_a_switch_does_not_end_the_run() -> None:
     """Heat without numbers can only be noted; inertia, in the same step, is answered."""
     scene = replace(TEST2, effects=Auto())
-    segment = SimpleNamespace(
-        status="guard",
-        run=SimpleNamespace(row_count=1, time=1.0, trips={"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}),
-    )
-    assert next_effects(scene, scene.modelled, segment) == replace(scene.modelled, sliders="inertial")  # type: ignore[arg-type]
+    trips = {"heat": (1.001, 2, 11.0), "inertia": (1.0, 1, 0.1)}
+    ending = Ending(scene.modelled, "guard", 1.0, 0, 0.0, trips)
+    assert next_effects(scene, ending) == replace(scene.modelled, sliders="inertial")
 
 
 def test_displacements_go_on_from_their_start_in_the_frame_of_the_user() -> None:

@@ -37,6 +37,7 @@ from msfp_gen import (
 )
 from msfp_gen.buildings.opening import changed_scene
 from msfp_gen.cli import main
+from msfp_gen.common.cores import usable_cores
 from msfp_gen.model import model as models
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Rotation
@@ -288,7 +289,7 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
 
 def test_the_number_of_workers_is_that_of_the_cores_or_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    assert batch.usable_cores() == batch.worker_count(None) == 3 and batch.worker_count(2) == 2
+    assert usable_cores() == batch.worker_count(None) == 3 and batch.worker_count(2) == 2
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
     assert batch.worker_count(None) == 7

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from support import preset_run
 
-from msfp_gen import Effects
 from msfp_gen.results.history import History
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.notes import energy_notes, notes_of
+from msfp_gen.simulation.notes import energy_notes
 
 SLID, NORMAL, WORK = 0.05, 2e5, 700.0
 
@@ -45,30 +42,3 @@ def test_the_energy_that_is_missing_is_measured_by_the_largest_term(work: float,
     _, history = given(0.0)
     assert note.time == history.time[len(history.time) // 2]
     assert energy_notes(*given(0.019 * scale, work, slid)) == ()
-
-
-def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
-    """What the monitors of a friction law noted before, another effect does not change."""
-    trips = {"law_load": (0.5, 1, 9e6), "law_speed": (0.6, 2, 2.1), "heat": (1.0, 3, 12.0), "uplift": (1.0, 1, 0.0)}
-    run: Any = SimpleNamespace(trips=trips, time=1.0, status=("guard", 1, 0.0))
-    before = Effects(dimension="planar", friction="pv", sliders="massless")
-    segment: Any = SimpleNamespace(run=run, status="guard", model=SimpleNamespace(effects=before))
-    after = replace(before, friction="pvt", uplift=True, sliders="inertial")
-    actions = {note.kind: note.action for note in notes_of(segment, after)}
-    assert actions == {
-        "law_load": "",
-        "law_speed": "",
-        "heat": "friction = pvt",
-        "uplift": "uplift = True, sliders = inertial",
-    }
-
-
-@pytest.mark.parametrize("status", ["newton", "irregular"])
-def test_a_jam_names_the_effects_that_follow(status: str) -> None:
-    run: Any = SimpleNamespace(trips={}, time=1.0, status=(status, 2, 5.0))
-    segment: Any = SimpleNamespace(run=run, status=status, model=SimpleNamespace(effects=Effects(sliders="massless")))
-    (note,) = notes_of(segment, Effects())
-    assert (note.kind, note.action, note.surface) == ("jammed", "sliders = inertial", 2)
-    segment.model.effects = Effects()
-    (note,) = notes_of(segment, Effects(uplift=True))
-    assert note.action == "uplift = True" and f"({status})" in note.text

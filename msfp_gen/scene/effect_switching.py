@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from msfp_gen.errors import InputError
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.segment import Segment
+    from msfp_gen.scene.solver import Solver
 
 # The effects that a model needs after a monitor has tripped.
 REQUIRED_EFFECTS: dict[str, dict[str, object]] = {
@@ -25,7 +25,38 @@ JAM_STATUSES = ("newton", "step", "irregular")
 MONITORS = ("rims", "uplift", "inertia", "heat")
 
 
-def check(scene: Scene, effects: Effects) -> None:
+class Requested(Protocol):
+    """What a user asks of the run of a bearing: its scene, or its part in a building."""
+
+    @property
+    def effects(self) -> Effects | Auto:
+        """Given, or selected."""
+
+    @property
+    def solver(self) -> Solver:
+        """Of the run."""
+
+    @property
+    def end(self) -> float:
+        """Of the run [s]."""
+
+
+class Ending(NamedTuple):
+    """How a run with one model ended, or a part of it.
+
+    effects: of the model. status: name. time: reached [s]. surface, value: of the status; surface 0: none. trips: of
+    the monitors, name -> (time, surface, value).
+    """
+
+    effects: Effects
+    status: str
+    time: float
+    surface: int
+    value: float
+    trips: Mapping[str, tuple[float, int, float]]
+
+
+def check(scene: Requested, effects: Effects) -> None:
     """Raise InputError where the method of the scene does not support these effects."""
     if effects.sliders == "massless" and scene.solver.method == "dopri5":
         raise InputError(
@@ -37,7 +68,7 @@ def check(scene: Scene, effects: Effects) -> None:
         )
 
 
-def stopping_monitors(scene: Scene, effects: Effects, strict: bool) -> tuple[str, ...]:
+def stopping_monitors(scene: Requested, effects: Effects, strict: bool) -> tuple[str, ...]:
     """The monitors that stop a run with these effects; the others only write notes.
 
     strict: all monitors, except that of uplift where the scene gives `Effects`. Otherwise those after which the run can
@@ -48,10 +79,10 @@ def stopping_monitors(scene: Scene, effects: Effects, strict: bool) -> tuple[str
     return tuple(name for name in MONITORS if _extended(scene, effects, name) is not None)
 
 
-def next_effects(scene: Scene, effects: Effects, segment: Segment) -> Effects | None:
-    """The effects with which a run continues after a segment with `effects`; None where the run has ended."""
-    run, status = segment.run, segment.status
-    if status == "ok" and run.time < scene.end:
+def next_effects(scene: Requested, ending: Ending) -> Effects | None:
+    """The effects with which a run continues; None where it has ended."""
+    effects, status = ending.effects, ending.status
+    if status == "ok" and ending.time < scene.end:
         return _extended(scene, effects, "plane")
     if status == "uplift":
         return _extended(scene, effects, "uplift")
@@ -61,12 +92,12 @@ def next_effects(scene: Scene, effects: Effects, segment: Segment) -> Effects | 
         return None
     extended = effects
     for name in stopping_monitors(scene, effects, strict=False):  # several may have tripped in the same step
-        if name in run.trips:
+        if name in ending.trips:
             extended = _extended(scene, extended, name) or extended
     return extended
 
 
-def _extended(scene: Scene, effects: Effects, name: str) -> Effects | None:
+def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:
     """Effects extended by those that the monitor `name` requires.
 
     None where the scene fixes one of them, the method does not support it, or the model has them already.

@@ -1,0 +1,106 @@
+"""`Member`: a bearing in the run of a building, with the monitors of what its model leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.coupling.two_port import compiled_port, scene_at_rest
+from msfp_gen.errors import InputError
+from msfp_gen.model.model import Model, build_model
+from msfp_gen.results.restart_state import RestartState, transferred_foot, transferred_state
+from msfp_gen.scene.effect_switching import Ending, stopping_monitors
+from msfp_gen.scene.monitors import monitor_options
+from msfp_gen.specification.layout import Auto, Effects
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.scene import BuildingScene
+    from msfp_gen.model.compiled import Port
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.solver import Solver
+
+KEPT = ("normal", "sliding", "kinetic", "potential", "rim_stored", "seat_stored", "work")  # of the row of a bearing
+
+
+class Asked(NamedTuple):
+    """What is asked of a bearing: see `effect_switching.Requested`."""
+
+    effects: Effects | Auto
+    solver: Solver
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A bearing in a run.
+
+    asked: of its effects. effects: of its model. rest: the scene of the bearing at rest between its ends. port: that
+    the run steps.
+    """
+
+    asked: Asked
+    effects: Effects
+    rest: Scene
+    model: Model
+    port: Port
+
+    @classmethod
+    def of(cls, scene: BuildingScene, index: int, effects: Effects) -> Self:
+        """A bearing of a building at rest, from 0, with a model of these effects. Raises InputError."""
+        given, load, solver = scene.bearings[index], float(scene.axial_loads[index]), scene.solver
+        asked = Asked(Auto() if given.effects is None else given.effects, solver, scene.end)
+        try:
+            rest = scene_at_rest(given.bearing, given.interface, load, effects, solver)
+        except InputError as error:
+            raise InputError(f"scene.bearings[{index}]: {error}") from None
+        model = build_model(given.bearing.layout, rest.modelled)
+        stops = stopping_monitors(asked, effects, strict=False)
+        options = monitor_options(rest, effects, scene.effect_selections[index], stops, noted=("uplift",))
+        return cls(asked, effects, rest, model, compiled_port(rest, model, load, **options))
+
+    @property
+    def shapes(self) -> list[tuple[str, tuple[int, ...]]]:
+        """The parts of its row that a run keeps: names and shapes, in order."""
+        return [(name, tuple(shape)) for name, shape in self.model.extension.ROW if name in KEPT]
+
+    @property
+    def slices(self) -> dict[str, slice]:
+        """Where they lie among each other; "all": the whole."""
+        found, begin = {}, 0
+        for name, shape in self.shapes:
+            found[name] = slice(begin, begin + int(np.prod(shape, dtype=int)))
+            begin = found[name].stop
+        return {**found, "all": slice(0, begin)}
+
+    @property
+    def entries(self) -> Array:
+        """Indices into the row of its model of the numbers that are kept."""
+        found, begin = [], 0
+        for name, shape in self.model.extension.ROW:
+            count = int(np.prod(shape, dtype=int))
+            if name in KEPT:
+                found.append(np.arange(begin, begin + count))
+            begin += count
+        return np.concatenate(found)
+
+    @property
+    def work(self) -> Array:
+        """Integrals of its powers since its model began, at the committed state [J]."""
+        found: Array = self.model.unpack(self.port.row)["work"]
+        return found
+
+    def ending(self, status: str, surface: int = 0, value: float = 0.0) -> Ending:
+        """How it ended with its model."""
+        return Ending(self.effects, status, self.port.time, surface, value, self.port.trips)
+
+    def continue_from(self, other: Member, ends: Array) -> None:
+        """Enter the state of another model of the same bearing; ends: their motion in it, shape (2, 3, 6)."""
+        at = RestartState.of_port(other.port)
+        q, v, f = transferred_state(self.rest.bearing, self.model, at)
+        law = self.effects.law
+        heat = at.heat if law is not None and law.depends_on_temperature else None
+        state = {"origin": at.origin, "monitor_heat": at.monitor_heat, "foot": transferred_foot(at, q), "heat": heat}
+        self.port.enter(at.time, q, v, f, ends, **state)

@@ -1,0 +1,190 @@
+"""Peaks of a building over all steps of its run, which do not depend on the times of the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.buildings.data import BuildingData
+    from msfp_gen.buildings.scene import BuildingScene
+
+VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Peaks of a run.
+
+    Of vectors, shape (..., 4), the largest magnitude along E1, E2, E3 and in the horizontal plane: node_acceleration
+    [m/s^2]; node_displacement, relative to the ground, drift of the storeys and mean_displacement of the bearings [m];
+    storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top [m]. Largest
+    magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad]; energy:
+    kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2) [N];
+    normal_force, shape (bearings, 2, surfaces) [N]. sliding: largest, shape (bearings, surfaces) [m]. A bearing with
+    fewer surfaces than another has zeros in the place of the others.
+    """
+
+    node_acceleration: Array
+    node_displacement: Array
+    drift: Array
+    storey_shear: Array
+    storey_torsion: Array
+    base_twist: Array
+    mean_displacement: Array
+    base_reaction: Array
+    base_torsion: Array
+    energy: Array
+    bearing_displacement: Array
+    top_force: Array
+    axial_force: Array
+    sliding: Array
+    normal_force: Array
+
+    @classmethod
+    def of_rows(cls, result: BuildingData) -> Peaks:
+        """Peaks of the rows alone."""
+        scene = result.scene
+        names = [node.name for node in scene.building.nodes]
+        nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
+        lower = np.einsum("bin,kn->bki", scene.attachments[:, :3], result.displacement)
+        across = np.moveaxis(result.support[:, :, 0], 1, 0) - lower
+        slid, normal = (_padded([each.max(axis=0) for each in of]) for of in (result.sliding, result.normal_force))
+        least = _padded([each.min(axis=0) for each in result.normal_force])
+        force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
+        base = scene.bearings[0].node
+        return cls(
+            node_acceleration=_vectors(nodes[:, :, 2, :3]),
+            node_displacement=_vectors(nodes[:, :, 0, :3] - result.ground[:, 0]),
+            drift=_vectors(np.moveaxis(result.drift[..., :3], 1, 0)),
+            storey_shear=_vectors(np.moveaxis(result.storey_force[..., :3], 1, 0)),
+            storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
+            base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
+            mean_displacement=_vectors(across.mean(axis=0)),
+            base_reaction=_vectors(result.base_reaction),
+            base_torsion=np.abs(result.base_torsion).max(keepdims=True),
+            energy=np.array([result.kinetic.max(), result.strain.max()]),
+            bearing_displacement=_vectors(across),
+            top_force=_vectors(force),
+            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
+            sliding=slid,
+            normal_force=np.stack([least, normal], axis=1),
+        )
+
+    @classmethod
+    def of_run(cls, scene: BuildingScene, recorded: Array, entries: Sequence[dict[str, slice]]) -> Peaks:
+        """Peaks that the compiled run recorded (`msfp_building.h`).
+
+        entries: of each bearing, where its normal forces and sliding lie in the kept numbers; "all": these.
+        """
+        nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
+        counts = (nodes, nodes, storeys, storeys, storeys, 1, 1, 1)
+        parts, begin = [], 0
+        for count in counts:
+            parts.append(recorded[begin : begin + VECTOR * count].reshape(count, VECTOR))
+            begin += VECTOR * count
+        acceleration, displacement, drift, shear, torsion, twist, mean, base = parts
+        rest, bearings = recorded[begin:], []
+        base_torsion, energy, begin = rest[:1], rest[1:3], 3
+        for where in entries:
+            kept = where["all"].stop
+            bearings.append(rest[begin : begin + 2 * VECTOR + 2 + 2 * kept])
+            begin += 2 * VECTOR + 2 + 2 * kept
+        most = [each[2 * VECTOR + 2 + where["all"].stop :] for each, where in zip(bearings, entries, strict=True)]
+        least = [each[2 * VECTOR + 2 :] for each in bearings]
+        normal = [_padded([x[w["normal"]] for x, w in zip(of, entries, strict=True)]) for of in (least, most)]
+        return cls(
+            node_acceleration=acceleration,
+            node_displacement=displacement,
+            drift=drift,
+            storey_shear=shear,
+            storey_torsion=torsion[:, 2],
+            base_twist=twist[:, 2],
+            mean_displacement=mean[0],
+            base_reaction=base[0],
+            base_torsion=base_torsion,
+            energy=energy,
+            bearing_displacement=np.array([each[:VECTOR] for each in bearings]),
+            top_force=np.array([each[VECTOR : 2 * VECTOR] for each in bearings]),
+            axial_force=np.array([each[2 * VECTOR : 2 * VECTOR + 2] for each in bearings]),
+            sliding=_padded([x[w["sliding"]] for x, w in zip(most, entries, strict=True)]),
+            normal_force=np.stack(normal, axis=1),
+        )
+
+    def to_arrays(self) -> xr.Dataset:
+        """As a group of a file."""
+        import xarray as xr
+
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return xr.Dataset({k: (tuple(f"{k}_{axis}" for axis in range(x.ndim)), x) for k, x in values.items()})
+
+
+def shapes(scene: BuildingScene) -> dict[str, tuple[int, ...]]:
+    """The shapes of these arrays."""
+    nodes, storeys, bearings = len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
+    surfaces = max(each.bearing.layout.surfaces for each in scene.bearings)
+    return {
+        **dict.fromkeys(("node_acceleration", "node_displacement"), (nodes, VECTOR)),
+        **dict.fromkeys(("drift", "storey_shear"), (storeys, VECTOR)),
+        "storey_torsion": (storeys,),
+        **dict.fromkeys(("base_twist", "base_torsion"), (1,)),
+        **dict.fromkeys(("mean_displacement", "base_reaction"), (VECTOR,)),
+        "energy": (2,),
+        **dict.fromkeys(("bearing_displacement", "top_force"), (bearings, VECTOR)),
+        "axial_force": (bearings, 2),
+        "sliding": (bearings, surfaces),
+        "normal_force": (bearings, 2, surfaces),
+    }
+
+
+def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
+    """The vectors of a building of which the compiled run keeps peaks, in the order of `Peaks.of_run`.
+
+    The order of the derivative of the coordinates that each is of; its rows, shape (vectors, 3, n); the shares of the
+    motions of the ground that are taken off it, shape (vectors, grounds).
+    """
+    building, size = scene.building, len(scene.building.mass)
+    grounds, ground_of = scene.grounds
+    still = np.zeros(len(grounds))
+    common, mean = still.copy(), np.bincount(ground_of, minlength=len(grounds)) / len(ground_of)
+    common[0] = 1.0
+    about = np.zeros((3, size))
+
+    def turned(row: Array) -> Array:
+        return np.vstack([about[:2], row])
+
+    found = [(2, node.rows[:3], still) for node in building.nodes]
+    found += [(0, node.rows[:3], common) for node in building.nodes]
+    found += [(0, each.deformation[:3], still) for each in building.columns]
+    found += [(2, each.inertia[:3], still) for each in building.columns]
+    found += [(2, turned(each.inertia[5]), still) for each in building.columns]
+    found.append((0, turned(building.node(scene.bearings[0].node).rows[5]), still))
+    found.append((0, scene.attachments[:, :3].mean(axis=0), mean))
+    orders, rows, shares = zip(*found, strict=True)
+    return list(orders), np.stack(rows), np.stack(shares)
+
+
+def named(vector: Array) -> dict[str, float]:
+    """A peak of a vector, shape (4,), as plain data."""
+    return dict(zip(("E1", "E2", "E3", "radial"), vector.tolist(), strict=True))
+
+
+def _vectors(values: Array) -> Array:
+    """Peaks of vectors along time, shape (..., k, 3)."""
+    radial = np.hypot(values[..., 0], values[..., 1]).max(axis=-1)
+    found: Array = np.concatenate([np.abs(values).max(axis=-2), radial[..., None]], axis=-1)
+    return found
+
+
+def _padded(columns: Sequence[Array]) -> Array:
+    found = np.zeros((len(columns), max(len(each) for each in columns)))
+    for row, each in zip(found, columns, strict=True):
+        row[: len(each)] = each
+    return found

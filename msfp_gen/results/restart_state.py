@@ -1,0 +1,105 @@
+"""`RestartState`: what a segment of a run hands over to the next one, and the state of the next model from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.model.plane import out_of_plane, rotated_pairs, tilts_out_of_plane
+from msfp_gen.results.geometry.shape import rim_forces
+
+if TYPE_CHECKING:
+    from msfp_gen.model.compiled import Port, Run
+    from msfp_gen.model.model import Model
+    from msfp_gen.scene.bearing import Bearing
+
+
+@dataclass(frozen=True, eq=False)
+class RestartState:
+    """The state in which a segment ended, from which the next one starts with another model.
+
+    time [s]. azimuth: of the frame of the earlier model [rad]. planar: whether it was planar. q, v, f: its angles and
+    separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
+    (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
+    base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
+    heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
+    """
+
+    time: float
+    azimuth: float
+    planar: bool
+    q: Array
+    v: Array
+    f: Array
+    foot: Array
+    force: Array
+    rim_force: Array
+    base_angles: Array
+    origin: Array
+    monitor_heat: Array
+    heat: Array | None = None
+
+    @classmethod
+    def of(cls, model: Model, run: Run, azimuth: float) -> RestartState:
+        """The current state of `run`; a row of it is recorded."""
+        run.record_now()
+        return cls(azimuth=azimuth, planar=model.planar, **model.extension.read_state(run.snapshot(rows=1)))
+
+    @classmethod
+    def of_port(cls, port: Port) -> RestartState:
+        """The committed state of a two-port, whose ends move in space."""
+        return cls(azimuth=0.0, planar=False, **port.state())
+
+    def contact_force(self, bearing: Bearing) -> Array:
+        """Interface forces without those of the rims, shape (n-1, 3) [N]."""
+        angles = np.vstack([self.base_angles, self.q[:, :3]])
+        force: Array = self.force - rim_forces(bearing, angles[None], self.rim_force[None])[0]
+        return force
+
+
+def transferred_state(bearing: Bearing, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
+    """The state q, v, f of the earlier model for the next one (docs/effects.md).
+
+    Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
+    from the interface forces without those of the rims: the unilateral contacts are compressed by them.
+    """
+    q, v, f, force = at.q, at.v, at.f, at.contact_force(bearing)
+    separations = (q[:, 3:], v[:, 3:]) if q.shape[1] > 3 else None
+    q, v = q[:, :3], v[:, :3]
+    if at.planar and not model.planar:
+        if _is_oblique(at.azimuth):  # to order tilt squared only, plates would jump against stiff springs
+            q, v, twist = tilts_out_of_plane(q, v, at.azimuth)
+            f = np.concatenate([rotated_pairs(pair[None], t - at.azimuth) for pair, t in zip(f, twist, strict=True)])
+        else:
+            q, v = (out_of_plane(x, at.azimuth, "angles") for x in (q, v))
+            f = out_of_plane(f, at.azimuth, "pair")
+        force = out_of_plane(force, at.azimuth, "vector")
+        if separations is not None:
+            separations = (
+                out_of_plane(separations[0], at.azimuth, "vector"),
+                out_of_plane(separations[1], at.azimuth, "vector"),
+            )
+    if model.effects.uplift:
+        stiffness = np.array([surface.seat_stiffness for surface in bearing.surfaces])
+        if separations is None:
+            separations = (-force / stiffness[:, None], np.zeros_like(force))
+        q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
+    return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
+
+
+def _is_oblique(azimuth: float) -> bool:
+    """Whether a plane is neither E1-E3 nor E2-E3, whose tilts are theta or psi alone."""
+    return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
+
+
+def transferred_foot(at: RestartState, q: Array) -> Array:
+    """Height of the foot of the supported mass and its rate, shape (2,) [m], [m/s], above a stack at `q`.
+
+    The separations that the earlier model did not have lower the top plate. The foot follows, so that the force of its
+    spring does not change.
+    """
+    lowered = float(q[:, 5].sum()) if q.shape[1] > at.q.shape[1] else 0.0
+    return np.array([at.foot[0] + lowered, at.foot[1]])

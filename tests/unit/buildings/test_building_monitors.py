@@ -1,0 +1,87 @@
+"""Monitors of the bearings of a building, and the change of their models in the run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.buildings import LOAD, rocking
+
+from msfp_gen import Auto, Effects, RunError, simulate
+from msfp_gen.buildings import effects as selection
+from msfp_gen.buildings.compiled_run import start_run
+from msfp_gen.buildings.result import BuildingResult
+
+
+@pytest.fixture
+def unforeseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The estimate does not ask for uplift."""
+    monkeypatch.setattr(selection, "LEAST_SHARE", -np.inf)
+
+
+def same(one: BuildingResult, other: BuildingResult) -> bool:
+    names = ("time", "displacement", "acceleration", "wrench", "dissipated", "stored", "input", "received")
+    rows = all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+    peaks = zip(vars(one.peaks).values(), vars(other.peaks).values(), strict=True)
+    return rows and all(np.array_equal(*pair) for pair in peaks) and one.monitored == other.monitored
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_a_run_is_resumed_bit_by_bit_before_and_after_a_switch(tmp_path):
+    scene = rocking(None)
+    whole = simulate(scene)
+    times = [note.time for each in whole.bearings for note in each.transitions]
+    assert [len(each.transitions) for each in whole.bearings] == [0, 1, 1, 0] and times[0] != times[1]
+    for stop in (min(times) - 0.1, max(times) + 0.1):
+        file = tmp_path / f"{stop}.ckpt"
+
+        def interrupt(time: float, _: float, stop: float = stop) -> None:
+            if time > stop:
+                raise KeyboardInterrupt
+
+        with pytest.raises(RunError, match="interrupted") as caught:
+            simulate(scene, progress=interrupt, checkpoint=file)
+        assert len(caught.value.result.monitored) < len(whole.monitored) or stop > max(times)
+        assert same(simulate(scene, checkpoint=file, resume=True, threads=2), whole)
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_transitions_and_peaks_are_in_the_file(tmp_path):
+    found = simulate(rocking(None))
+    notes = [note for note in found.notes if note.kind == "uplift"]
+    assert [note.text[:11] for note in notes] == ["bearing 3: ", "bearing 2: "]
+    assert {note.action for note in notes} == {"uplift = True"}
+    read = BuildingResult.from_netcdf(found.to_netcdf(tmp_path / "out.nc"))
+    assert same(found, read) and read.summary == found.summary and read.notes == found.notes
+    rows = replace(found, recorded_peaks=None, monitored=())
+    assert BuildingResult.from_netcdf(rows.to_netcdf(tmp_path / "rows.nc")).recorded_peaks is None
+
+
+@pytest.mark.parametrize("fixed", [Effects(), Auto(uplift=False)], ids=["effects", "auto"])
+def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fixed):
+    with pytest.raises(RunError, match=r"^bearing 3: stopped at t = .* give effects.uplift = true") as caught:
+        simulate(rocking(fixed))
+    found = caught.value.result
+    notes = [note for note in found.notes if note.kind == "uplift"]
+    assert caught.value.status == "uplift" and [note.text[:10] for note in notes] == ["bearing 3:", "bearing 2:"]
+    assert all(0 < note.value < 0.05 * LOAD * 1.2 and not note.action for note in notes)
+    assert notes[0].time < found.time[-1] + 0.01 and not any(each.transitions for each in found.bearings)
+
+
+def test_a_damaged_change_of_models_is_refused():
+    run = start_run(rocking(None))
+    table = {"bearing": 7, "effects": {}, "rows": 1, "work": [], "build": "", "notes": []}
+    for change in ({**table}, {**table, "bearing": 1}):
+        with pytest.raises(ValueError, match=r"change of models of no bearing|another build"):
+            run.restore(str([change]).replace("'", '"').encode() + b"\n" + run.run.snapshot())
+
+
+def test_a_state_that_no_bearing_has_is_not_entered():
+    rest = start_run(rocking(None)).members[0]
+    q, ends = np.zeros((4, 3)), np.zeros((2, 3, 6))
+    assert rest.port.enter(1.0, q, q, np.zeros((4, 2)), ends) == "ok" and rest.port.time == 1.0
+    assert rest.port.enter(1.0, q * np.nan, q, np.zeros((4, 2)), ends) == "finite"
+    assert rest.port.enter(np.inf, q, q, np.zeros((4, 2)), ends) == "argument"
+    with pytest.raises(ValueError, match="q: needs 12 values"):
+        rest.port.enter(1.0, np.zeros((4, 6)), q, np.zeros((4, 2)), ends)

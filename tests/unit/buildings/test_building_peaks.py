@@ -1,0 +1,50 @@
+"""Peaks of a building over all steps."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from support.buildings import BEARING, frame, scene
+
+from msfp_gen import Motion, Solver, simulate
+from msfp_gen.buildings.peaks import Peaks
+
+EVENTFUL = scene(frame(), duration=0.8)
+
+
+def test_peaks_do_not_depend_on_the_rows():
+    fine, coarse = (
+        simulate(replace(EVENTFUL, output_step=step, solver=Solver(rtol=1e-5, max_step=1e-3))) for step in (1e-3, 0.1)
+    )
+    assert len(coarse.time) == 9
+    for one in fields(Peaks):
+        expected = getattr(fine.peaks, one.name)
+        assert getattr(coarse.peaks, one.name) == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max()), one.name
+    short = Peaks.of_rows(coarse)
+    assert np.all(short.node_acceleration <= coarse.peaks.node_acceleration)
+    assert np.any(short.node_acceleration < 0.8 * coarse.peaks.node_acceleration)
+    assert coarse.summary["floors"][-1]["peak_acceleration"]["E1"] == coarse.peaks.node_acceleration[-1, 0]
+    assert coarse.summary["peak_base_shear"]["radial"] == coarse.peaks.base_reaction[3] >= short.base_reaction[3]
+    found = coarse.characterise()
+    assert found.peak_force == coarse.peaks.base_reaction[3] and found.peak_drift_ratio > 0
+    assert found.bearings[1].minimum_load_ratio == coarse.peaks.axial_force[1, 0] / coarse.scene.axial_loads[1]
+
+
+def test_peaks_are_those_of_rows_at_every_step():
+    """The compiled sums against those of the result, also with a motion of its own below one bearing."""
+    times = np.linspace(0.0, 1.0, 101)
+    path = np.zeros((101, 3))
+    path[:, :2] = 0.02 * np.sin(np.pi * times)[:, None] ** 4 * [1.0, 0.5]
+    bearings = [*EVENTFUL.bearings[:3], replace(EVENTFUL.bearings[3], motion=Motion.from_arrays(times, path))]
+    made = replace(EVENTFUL, bearings=bearings, duration=0.5, output_step=1e-3, solver=Solver(max_step=1e-3))
+    found = simulate(made)
+    rows, surfaces = Peaks.of_rows(found), BEARING.layout.surfaces
+    assert found.peaks.normal_force.shape == (4, 2, surfaces)
+    for one in fields(Peaks):
+        recorded, of_rows = getattr(found.peaks, one.name), getattr(rows, one.name)
+        assert recorded == pytest.approx(of_rows, rel=1e-2, abs=1e-3 * np.abs(of_rows).max()), one.name
+        assert np.count_nonzero(recorded) == recorded.size or one.name in ("node_displacement", "node_acceleration")
+    assert np.all(found.peaks.normal_force[:, 0] <= rows.normal_force[:, 0])
+    assert np.all(found.peaks.normal_force[:, 1] >= rows.normal_force[:, 1])
