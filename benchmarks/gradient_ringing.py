@@ -22,11 +22,11 @@ WINDOWS = ((7.0, 7.4), (7.85, 8.1))  # [s]: after the second contact, and after 
 
 def sampled(damping: float) -> Scene:
     """The scene with a contact damping [s]."""
-    time = np.linspace(0.0, 10.0, 200)
-    path = np.outer(np.sin(0.2 * np.pi * time), [0.12, 0.0, 0.0])
+    cycle = Motion.harmonic(0.12, 0.1, cycles=1.0)
+    time = np.linspace(0.0, cycle.duration, 200)
     scene = load_scene("fenz-test2")
     bearing = scene.bearing.replace(contact_damping=damping, friction=list(FRICTION))
-    motion = Motion.from_arrays(time, path)
+    motion = Motion.from_arrays(time, cycle.evaluate(time)[:, :3])
     return replace(scene, bearing=bearing, motion=motion, motion_table=None, stop=None, duration=8.2, output_step=1e-3)
 
 

@@ -31,7 +31,6 @@ RINGING = (
     f"{DAMPING}, or longer steps (a larger solver.rtol)"
 )
 UNDAMPED = f"surface {{surface}} has no contact damping, and ringing of its slider disturbs the gradients; {DAMPING}"
-
 RINGS_AT_RIM = (
     "surface {surface} met its rim, and sliders ring after it: contact_damping = {damping:.3g} s is below their "
     "critical damping ({critical:.2g} s), so that gradients contain the phase of the ringing and may not converge as "
