@@ -1,6 +1,8 @@
-"""Cost of a step of a triple pendulum in C and in Python: `python benchmarks/embedding.py`. Rows of docs/embedding.md.
+"""Cost of a step of a triple pendulum by every door: `python benchmarks/embedding.py`. Tables of docs/embedding.md.
 
-The example of an exported library, run by both: nanoseconds of CPU time a step, the best of many, and the ratio to C.
+First the example of an exported library, run in C and in Python: CPU time of a step, the best of many, and the ratio to
+C. Then a two-port in steps of an analysis by every door (`embedding_ports.py`): with gfortran, fmpy and openseespy where
+they are installed. Derivatives and lengths of steps in detail: `two_port.py`; states and Model Exchange: `fmu.py`.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from pathlib import Path
 from time import process_time_ns
 
 import numpy as np
+from embedding_ports import doors, worked_example
 
 from msfp_gen import Layout, build_model
 from msfp_gen.embedding import export_library, values
@@ -66,7 +69,7 @@ def least(once: Callable[[], float]) -> float:
 
 
 def main() -> None:
-    """Print one row for each way to step a run."""
+    """Print the tables."""
     kept, callback, single = in_c()
     rows = {
         "C, rows kept": kept,
@@ -78,6 +81,14 @@ def main() -> None:
     print("| | microseconds a step | over C |\n|---|---|---|")
     for text, time in rows.items():
         print(f"| {text} | {1e-3 * time:.2f} | {time / kept:.2f} |")
+    steps = doors()
+    print("\n| | microseconds a step | over C | with the tangent, over C |\n|---|---|---|---|")
+    for text, (plain, tangent) in steps.items():
+        print(f"| {text} | {1e-3 * plain:.0f} | {plain / steps['C'][0]:.1f} | {tangent / steps['C'][0]:.1f} |")
+    example = worked_example()
+    print("\n| worked example | microseconds a step |\n|---|---|")
+    for text, time in example.items():
+        print(f"| {text} | {time:.0f} |")
 
 
 if __name__ == "__main__":

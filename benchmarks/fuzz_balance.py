@@ -47,14 +47,20 @@ def verified(scene: Scene, given: Result) -> dict[str, Any]:
     found: dict[str, Any] = {"unbalanced": left, "wrong": []}
     if left > 1e-5 + 3 * scene.solver.rtol:
         found["wrong"].append(f"balance {left:.1e}")
-    if given.status != whole.status:
+    if given.status != whole.status and not rings(scene, given, whole):
         found["wrong"].append(f"{given.status} with the rows given, {whole.status} with those of every step")
-    elif given.succeeded and (far := apart(given, whole)) > MUCH and not jammed(given, whole):
+    elif given.succeeded and whole.succeeded and (far := apart(given, whole)) > MUCH and not jammed(given, whole):
         found["wrong"].append(f"{far:.2g} between the rows given and those of every step")
     if whole.succeeded:
         found |= halved(scene, whole)
         found["wrong"] += [f"half the longest step: {found['halved']:.2g}"] if found["verdict"] == "wrong" else []
     return found
+
+
+def rings(scene: Scene, *results: Result) -> bool:
+    """Whether steps were used up by an undamped vibration, which rounding starts where the tolerance hides it or not."""
+    undamped = any(surface.contact_damping == 0.0 for surface in scene.bearing.surfaces)
+    return undamped and any(result.status == "steps" for result in results)
 
 
 def worst_row(scene: Scene, sequence: RunSequence, history: History) -> float:

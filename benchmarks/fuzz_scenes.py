@@ -226,7 +226,7 @@ def case(seed: int, number: int, short: bool = False) -> Case:
     rtol = draw.decades((1e-5, 1e-3), (1e-7, 3e-2))
     duration = None
     if explicit:
-        duration = min(motion.duration, EXPLICIT_STEPS / 6 / explicit_rate(bearing, top))
+        duration = max(min(motion.duration, EXPLICIT_STEPS / 6 / explicit_rate(bearing, top)), 1e-8)  # no run is shorter
     solver = Solver(method="dopri5" if explicit else "implicit", rtol=rtol, max_steps=100_000)
     scene = Scene(
         bearing,

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MAX_LENGTH = 500  # characters of a message: texts quoted from a file can have any length
-
 
 class MsfpError(Exception):
     """Base class of all errors of this package; `exit_code` is that of the command line.
@@ -17,9 +15,10 @@ class MsfpError(Exception):
     """
 
     exit_code = 1
+    max_length = 500  # characters of a message: texts quoted from a file can have any length
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(_one_line(message))
+        super().__init__(_one_line(message, self.max_length))
 
 
 class InputError(MsfpError, ValueError):
@@ -43,6 +42,7 @@ class CompileError(MsfpError, RuntimeError):
 class RunError(MsfpError, RuntimeError):
     """A run that failed: the message gives time, surface and cause; `result` has the rows until then, or is None."""
 
+    max_length = 1000  # more than cause, last state and all remedies take
     exit_code = 1  # 130 where the run was interrupted, the convention of shells
 
     def __init__(self, message: str, *, status: str = "", result: object | None = None) -> None:
@@ -58,8 +58,8 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() or letter == "\n" else ascii(letter)[1:-1] for letter in text)
 
 
-def _one_line(message: str) -> str:
+def _one_line(message: str, longest: int) -> str:
     """A message in one line: white space collapsed, control characters escaped, the middle of a long text omitted."""
     text = printable(" ".join(message.split()))
-    half = MAX_LENGTH // 2 - 3
-    return text if len(text) <= MAX_LENGTH else f"{text[:half]} ... {text[-half:]}"
+    half = longest // 2 - 3
+    return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"

@@ -63,7 +63,7 @@ class BearingResult:
         return across
 
     @property
-    def transitions(self) -> tuple[Note, ...]:
+    def model_changes(self) -> tuple[Note, ...]:
         """The notes of its monitors after which it continued with another model; `action` says with which effects."""
         return tuple(note for index, note in self.building.monitored if index == self.index and note.action)
 

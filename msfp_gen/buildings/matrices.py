@@ -28,7 +28,7 @@ def matrix_of(source: Matrix, name: str) -> Array:
     values = _read(Path(source), path, name) if isinstance(source, str | PathLike) else source
     try:
         found = np.array(values.toarray() if hasattr(values, "toarray") else values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{path}: these are no numbers; give a square array or the path of a file") from None
     if found.ndim != 2 or found.shape[0] != found.shape[1] or not 0 < len(found) <= MOST:
         raise InputError(f"{path} has the shape {found.shape}: give a square matrix of 1 to {MOST} coordinates")

@@ -100,10 +100,11 @@ class Choice:
         return self.words if isinstance(self.words, Mapping) else dict.fromkeys(self.words, "")
 
     def parse(self, value: object, *, text: bool = False) -> Any:
-        """`value` itself if it is permitted. Raises ValueError that states the remedy only."""
-        if not any(type(value) is type(word) and value == word for word in self.words):
-            raise ValueError("give one of " + ", ".join(repr(word) for word in self.words))
-        return value
+        """The permitted value that `value` equals. Raises ValueError that states the remedy only."""
+        for word in self.words:
+            if isinstance(value, type(word)) and value == word:  # a text of NumPy too, but 1 is not True
+                return word
+        raise ValueError("give one of " + ", ".join(repr(word) for word in self.words))
 
 
 @dataclass(frozen=True)

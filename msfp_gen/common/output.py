@@ -68,6 +68,14 @@ def write_bytes(path: Path, parts: Iterable[bytes | memoryview], *, tidy: bool =
         os.fsync(file.fileno())
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file with the line ends of the text. Raises OSError that names the file, also on a full disk."""
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
 def clear_leftovers(path: Path, age: float = 3600.0) -> None:
     """Delete temporary files of `path` that were last modified at least `age` [s] ago.
 

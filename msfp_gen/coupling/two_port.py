@@ -99,6 +99,7 @@ class TwoPort:
         spatial, inertial sliders, with rims. Raises InputError as the class, and where the top is no rig with
         horizontal, vertical and rotational stiffness, or the scene has parts that a two-port has not.
         """
+        require_type(scene, Scene, "scene")
         return cls(scene.bearing, *parts_of_rig(scene), scene.solver)
 
     @property

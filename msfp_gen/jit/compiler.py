@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from msfp_gen.common.cores import usable_cores
+from msfp_gen.common.output import write_text
 from msfp_gen.errors import CompileError
 from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
@@ -170,7 +171,7 @@ def compile_extension(
     compiler, include = find_compiler(), check_headers()
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in sources.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
     log = Log(folder)
     wrapper = next(Path(name).stem for name in sources if name.endswith(".pyx"))
     # The longest first, so that no processor waits for another in the end: the wrapper, then the files with kernels.
@@ -201,7 +202,7 @@ class Log:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / LOG_NAME
-        self.path.write_text("", encoding="utf-8")
+        write_text(self.path, "")
 
     def run(self, step: Step) -> None:
         """Run one step. Raises CompileError if its exit status is not 0."""

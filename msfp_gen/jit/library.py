@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msfp_gen.common.output import write_text
 from msfp_gen.generator.interface import model_name
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import (
@@ -61,7 +62,7 @@ def build_library(
     objects = _compile(units, ", ".join(sources), compiler, log, progress)
     log.run(Step(STATIC, (*archiver, "rcs", STATIC, *objects)))
     # Versions of a function for several processors stay visible in spite of -fvisibility=hidden.
-    (folder / EXPORTS).write_text(f"{{ global: {'; '.join(sources)}; local: *; }};\n", encoding="utf-8")
+    write_text(folder / EXPORTS, f"{{ global: {'; '.join(sources)}; local: *; }};\n")
     shared = Path(platform.shared).name
     log.run(_link_step(compiler, platform.options, objects, shared))
     public = {name: files[name] for model, files in sources.items() for name in ("msfp.h", f"{model}.h")}
@@ -89,10 +90,10 @@ def build_shared(
     files = {**runtime_sources(), **generate(spec).files, **others}
     files = {each: text for each, text in sorted(files.items()) if each.endswith((".c", ".h"))}
     for each, text in files.items():
-        (folder / each).write_text(text, encoding="utf-8", newline="\n")
+        write_text(folder / each, text)
     log = Log(folder)
     objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
-    (folder / EXPORTS).write_text(f"{{ global: {exported}; local: *; }};\n", encoding="utf-8")
+    write_text(folder / EXPORTS, f"{{ global: {exported}; local: *; }};\n")
     # A missing symbol fails the build, and not the program that loads the library.
     linux = ("-shared", f"-Wl,--version-script={EXPORTS}", "-Wl,-z,defs")
     options = ("-dynamiclib",) if sys.platform == "darwin" else linux
@@ -125,7 +126,7 @@ def _write_sources(
     for model, files in found.items():
         (folder / model).mkdir()
         for name, text in files.items():
-            (folder / model / name).write_text(text, encoding="utf-8", newline="\n")
+            write_text(folder / model / name, text)
     return found
 
 

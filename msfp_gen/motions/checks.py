@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -21,7 +23,7 @@ def positive(field: str, value: float) -> float:
     """`value` as a float. Raises InputError unless it is positive, and neither it nor its reciprocal above LARGEST."""
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{field}: {value!r} is not a number; give a positive one") from None
     if not (np.isfinite(number) and number > 0):
         raise InputError(f"{field}: {number!r} is not a positive finite number; give one")
@@ -38,11 +40,41 @@ def storable(field: str, text: str) -> str:
         raise InputError(f"{field} = {text!r}: {error}") from None
 
 
+def number(field: str, value: float) -> float:
+    """`value` as a float. Raises InputError unless it is one finite number."""
+    array = numbers(field, value)
+    if array.ndim:
+        raise InputError(f"{field}: shape {array.shape}; give one number")
+    return float(array)
+
+
+def order(derivative: int) -> int:
+    """The order of a derivative. Raises InputError unless it is a whole number that is not negative."""
+    if not isinstance(derivative, Integral) or derivative < 0:
+        raise InputError(f"derivative: {derivative!r}; give 0 (the value), 1 (its rate) or 2 (the rate of that)")
+    return int(derivative)
+
+
+def vector(field: str, values: ArrayLike, components: int = 3) -> Array:
+    """`values` as an array of finite numbers, shape (components,). Raises InputError."""
+    array = finite(field, values)
+    if array.shape != (components,):
+        raise InputError(f"{field}: shape {array.shape}; give {components} numbers")
+    return array
+
+
 def finite(field: str, values: ArrayLike) -> Array:
-    """`values` as a contiguous array of floats. Raises InputError unless all are finite numbers."""
+    """`values` as a contiguous array of floats of at least one dimension. Raises InputError as `numbers`."""
+    return np.ascontiguousarray(numbers(field, values))
+
+
+def numbers(field: str, values: ArrayLike) -> Array:
+    """`values` as an array of floats. Raises InputError unless all are finite numbers."""
     try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        if values is None or np.iscomplexobj(values):
+            raise TypeError
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{field}: not an array of numbers ({type(values).__name__}); give real numbers") from None
     if not np.all(np.isfinite(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -52,6 +84,8 @@ def finite(field: str, values: ArrayLike) -> Array:
 
 def increasing(field: str, times: Array) -> Array:
     """`times`, shape (k,), [s]. Raises InputError unless they are strictly increasing."""
+    if times.ndim != 1:
+        raise InputError(f"{field}: shape {times.shape}; give times in one dimension")
     late = np.diff(times) < 1 / LARGEST
     if np.any(late):
         i = int(np.argmax(late))

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from msfp_gen.common.fields import require_type
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise, samples, waveforms
-from msfp_gen.motions.checks import positive
+from msfp_gen.motions.checks import number, positive
 from msfp_gen.motions.piecewise import Pieces
+from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.motions.time_grid import matched, snapped
 from msfp_gen.motions.trajectory import CHANNELS, Trajectory
 
 if TYPE_CHECKING:
     from os import PathLike
 
-    from msfp_gen.motions.prescribed import Rotation
     from msfp_gen.motions.records import Record, ScaleTo
 
 _BUILDERS = {"displacement": "from_arrays", "velocity": "from_velocity", "acceleration": "from_acceleration"}
@@ -48,6 +49,7 @@ class Motion(Trajectory):
 
         Raises InputError if the rotation ends with a nonzero rate before the motion ends.
         """
+        require_type(rotation, Rotation, "rotation")
         whole = rotation.until(self.duration)
         pieces = np.zeros((len(whole.knots) - 1, 6, piecewise.ORDER))
         pieces[:, 3:5] = whole.coefficients
@@ -61,6 +63,7 @@ class Motion(Trajectory):
 
         Raises InputError for a rocking base, whose Euler angles do not transform like a vector.
         """
+        angle = number("angle", angle)
         if np.any(self.coefficients[:, 3:5]):
             raise InputError(
                 f"rotated: angle {angle:g} on a motion that rocks the base (psi_1 or theta_1 not zero); "
@@ -196,7 +199,8 @@ class Motion(Trajectory):
         """
         period = 1 / positive("frequency", frequency)
         rise = period / 4 if lead_in is None else lead_in
-        sines = [(np.cos(direction), 1.0, 0.0), (np.sin(direction), 1.0, 0.0)]
+        azimuth = number("direction", direction)
+        sines = [(np.cos(azimuth), 1.0, 0.0), (np.sin(azimuth), 1.0, 0.0)]
         return cls._of(waveforms.enveloped_sines(amplitude, sines, period, cycles, rise), name)
 
     @classmethod
@@ -247,8 +251,8 @@ class Motion(Trajectory):
         """
         knots = np.array([0.0, positive("duration", duration)])
         pieces = np.zeros((1, 6, piecewise.ORDER))
-        half = positive("acceleration", acceleration) / 2
-        pieces[0, :2, 2] = half * np.cos(direction), half * np.sin(direction)
+        half, azimuth = positive("acceleration", acceleration) / 2, number("direction", direction)
+        pieces[0, :2, 2] = half * np.cos(azimuth), half * np.sin(azimuth)
         return cls(knots, pieces, name=name, metadata={"source": "ramp", "acceleration": acceleration})
 
     @classmethod

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
-from msfp_gen.motions.checks import finite, increasing, positive, storable
+from msfp_gen.motions.checks import finite, increasing, number, numbers, order, positive, storable, vector
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.samples import sampled_linear
 from msfp_gen.motions.time_grid import Resolution
@@ -100,14 +100,14 @@ class Prescribed:
 
     def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
         """All channels or a time derivative of them at `t` [s]: ndarray, shape (..., channels)."""
-        time = np.asarray(t, dtype=float)
+        time = numbers("time", t)
         inside = np.minimum(time, self.duration)
-        value = piecewise.evaluate(self.knots, self.coefficients, inside, derivative)
+        value = piecewise.evaluate(self.knots, self.coefficients, inside, order(derivative))
         return value if derivative == 0 else np.where((time < self.duration)[..., None], value, 0.0)
 
     def until(self, end: float) -> Self:
         """The history extended by a constant piece to `end` [s]; unchanged where it already reaches that time."""
-        if end <= self.duration:
+        if number("end", end) <= self.duration:
             return self
         rest = np.zeros((1, len(self.CHANNELS), ORDER))
         rest[0, :, 0] = self.evaluate(self.duration)
@@ -135,13 +135,13 @@ class Prescribed:
     @classmethod
     def _constant(cls, values: ArrayLike) -> Self:
         pieces = np.zeros((1, len(cls.CHANNELS), ORDER))
-        pieces[0, :, 0] = finite(cls.WORD, values)
+        pieces[0, :, 0] = vector(cls.WORD, values, len(cls.CHANNELS))
         return cls(np.array([0.0, 1.0]), pieces)
 
     @classmethod
     def _ramp(cls, values: ArrayLike, duration: float) -> Self:
         knots = np.linspace(0.0, positive(f"{cls.WORD}.duration", duration), 17)
-        rows = np.array(smoothstep(knots, float(knots[-1])))[:, :, None] * finite(cls.WORD, values)
+        rows = np.array(smoothstep(knots, float(knots[-1])))[:, :, None] * vector(cls.WORD, values, len(cls.CHANNELS))
         return cls(knots, piecewise.hermite5(knots, *rows))
 
     @classmethod
@@ -149,8 +149,9 @@ class Prescribed:
         period = 1 / positive(f"{cls.WORD}.frequency", frequency)
         rise = positive(f"{cls.WORD}.lead_in", period if lead_in is None else lead_in)
         knots = wave_knots(rise, rise + positive(f"{cls.WORD}.cycles", cycles) * period, period)
-        wave = np.array(product(smoothstep(knots, rise), sine(knots, 2 * np.pi * frequency, phase)))
-        return cls(knots, piecewise.hermite5(knots, *(wave[:, :, None] * finite(cls.WORD, values))))
+        shift = number(f"{cls.WORD}.phase", phase)
+        wave = np.array(product(smoothstep(knots, rise), sine(knots, 2 * np.pi * frequency, shift)))
+        return cls(knots, piecewise.hermite5(knots, *(wave[:, :, None] * vector(cls.WORD, values, len(cls.CHANNELS)))))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,12 +169,12 @@ class Load(Prescribed):
     @classmethod
     def constant(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0)) -> Load:
         """Constant load. force, moment: shape (3,), [N], [N m]."""
-        return cls._constant(np.concatenate([finite("load.force", force), finite("load.moment", moment)]))
+        return cls._constant(np.concatenate([vector("load.force", force), vector("load.moment", moment)]))
 
     @classmethod
     def ramp(cls, force: ArrayLike, moment: ArrayLike = (0.0, 0.0, 0.0), *, duration: float) -> Load:
         """Smooth increase from zero to force, moment: shape (3,), [N], [N m], in `duration` [s]."""
-        return cls._ramp(np.concatenate([finite("load.force", force), finite("load.moment", moment)]), duration)
+        return cls._ramp(np.concatenate([vector("load.force", force), vector("load.moment", moment)]), duration)
 
     @classmethod
     def harmonic(
@@ -196,7 +197,7 @@ class Load(Prescribed):
             phase: [rad].
             lead_in: duration of the smooth start [s]; None: one period.
         """
-        values = np.concatenate([finite("load.force", force), finite("load.moment", moment)])
+        values = np.concatenate([vector("load.force", force), vector("load.moment", moment)])
         return cls._harmonic(values, frequency, cycles, phase, lead_in)
 
     @classmethod

@@ -77,8 +77,13 @@ def sampled_linear(word: str, time: ArrayLike, values: Array) -> tuple[Array, Ar
     unless times begin at zero, do not decrease, and match the rows of `values`.
     """
     times = finite(f"{word}.time", time)
-    if times.ndim != 1 or len(times) < 2 or times[0] != 0 or np.any(np.diff(times) < 0):
-        raise InputError(f"{word}.time: give at least two times, from zero, none before the one above it")
+    if times.ndim != 1 or len(times) < 2 or times[0] != 0:
+        first = f"shape {times.shape}, first {times.flat[:1]}"
+        raise InputError(f"{word}.time: {first}; give at least two times, the first of them zero")
+    if np.any(earlier := np.diff(times) < 0):
+        i = int(np.argmax(earlier))
+        one, next_one = times[i : i + 2].tolist()
+        raise InputError(f"{word}.time[{i + 1}]: {next_one!r} s is before {one!r} s; sort the samples")
     if len(values) != len(times):
         raise InputError(f"{word}: {len(values)} rows for {len(times)} times; give one row for each time")
     if times[-1] == times[-2]:  # the value after a jump at the end is kept

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
-from msfp_gen.motions.checks import checked_pieces, positive, storable
+from msfp_gen.motions.checks import checked_pieces, numbers, order, positive, storable
 from msfp_gen.motions.piecewise import Metadata
 from msfp_gen.motions.time_grid import Resolution
 
@@ -96,16 +96,14 @@ class Trajectory:
         Raises:
             InputError: a time lies outside [0, duration], or the order is negative.
         """
-        time = np.asarray(t, dtype=float)
+        time = numbers("time", t)
         inside = (time >= 0) & (time <= self.knots[-1])
         if not np.all(inside):
             raise InputError(
                 f"time: {time[~inside].flat[0]:g} s lies outside the motion, which has [0, {self.duration:g}] s; "
                 "shorten the run or use motion.held(duration)"
             )
-        if derivative < 0:
-            raise InputError(f"derivative: {derivative}; give 0 (displacement), 1 (velocity) or 2 (acceleration)")
-        return piecewise.evaluate(self.knots, self.coefficients, time, derivative)
+        return piecewise.evaluate(self.knots, self.coefficients, time, order(derivative))
 
     def displacement(self, t: ArrayLike) -> Array:
         """Displacement (u_g1, u_g2, u_g3) at `t` [s]: ndarray, shape (..., 3), [m]."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from msfp_gen.results.history import History
 
 # Extreme -> field of `History`, and whether it is the magnitude of a vector, by axis or not.
-_SERIES = {
+SERIES = {
     "displacement": ("displacement", "axes"),
     "top_force": ("top_force", "axes"),
     "sliding": ("sliding", ""),
@@ -31,7 +31,7 @@ _SERIES = {
 def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extremes) -> dict[str, Array]:
     """Derivatives of `RunData.extremes` by name, each of shape (k, number of values)."""
     found = {}
-    for name in (f.name for f in fields(Extremes) if f.name in _SERIES):
+    for name in (f.name for f in fields(Extremes) if f.name in SERIES):
         values = getattr(recorded, name)
         if values is None:
             continue
@@ -47,7 +47,7 @@ def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extr
 
 def _series(name: str, gradients: Gradients, history: History) -> tuple[Array, Array]:
     """The values of which an extreme is taken, shape (T, m), and their derivatives, (k, T, m)."""
-    field, kind = _SERIES[name]
+    field, kind = SERIES[name]
     values, slopes = getattr(history, field), gradients.rows[field]
     if not kind:
         return values, slopes

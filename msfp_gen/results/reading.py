@@ -21,6 +21,7 @@ from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.gradient import Gradients
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.note import Note
+from msfp_gen.results.peaks import SERIES
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, stored_groups
 from msfp_gen.scene.scene import Scene
@@ -112,6 +113,9 @@ def _gradients(
     if stored_gradient.GROUP not in root:
         return None
     found, read = stored_gradient.from_group(root, len(history.time), history.surfaces, events)
+    needed = {field for field, _ in SERIES.values() if getattr(history, field) is not None}
+    if missing := sorted(needed - found.rows.keys()):
+        raise ValueError(f"the gradient has no {missing[0]}")
     for name, value in read.items():
         place: dict[str, Any] = arrays if isinstance(value, np.ndarray) else about
         place[f"{stored_gradient.GROUP}/{name}"] = value

@@ -286,6 +286,7 @@ typedef struct {
 typedef struct {
     double share; /* of the step, 0 to 1 */
     double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2], work[MSFP_WORKS];
+    double top_force[3]; /* of the stage; see extremes.c [N] */
 #if MSFP_HEAT
     double heat[MSFP_NB][MSFP_HEAT];
 #endif

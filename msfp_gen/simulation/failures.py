@@ -43,8 +43,9 @@ def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None
 
 def _pulled(scene: Scene, run: Run) -> bool:
     """Whether a run failed at once from a displaced state under a rig, whose springs are anchored above the base."""
-    state = scene.initial_state
-    return isinstance(scene.top, RigTop) and run.time < AT_ONCE and state is not None and bool(np.any(state.q))
+    state, top = scene.initial_state, scene.top
+    anchored = isinstance(top, RigTop) and top.stiffness > 0
+    return anchored and run.time < AT_ONCE and state is not None and bool(np.any(state.q))
 
 
 def _inertia_missing(scene: Scene, model: Model, status: str) -> bool:

@@ -1,7 +1,7 @@
 """Memory of runs: what their rows need, what there is, and the refusal of runs that cannot fit.
 
 All rows of a run lie in memory until its result is written, unless they are streamed to disk. Rows at even times are
-counted before a run; those of every step are watched while it runs.
+counted before a run, and the least number of steps where a longest step is given; rows are watched while a run goes on.
 """
 
 from __future__ import annotations
@@ -30,20 +30,19 @@ _PROC, _CGROUP = Path("/proc"), Path("/sys/fs/cgroup")
 def require_memory(scenes: Sequence[Scene]) -> None:
     """Raise InputError where the rows of all scenes, which are kept until the end, do not fit into memory.
 
-    Scenes without `output_step` are not counted: their steps are not known before.
+    Scenes without `output_step` count with their longest step, which gives the least number of rows. Without that they
+    are not counted: their steps are not known before.
     """
-    counted = [scene for scene in scenes if scene.output_step is not None]
+    counted = [scene for scene in scenes if _row_step(scene) < math.inf]
     needed, room = sum(map(_needed, counted)), available()
     if needed <= max(room, SMALL):
         return
     worst = max(counted, key=_needed)
-    step = worst.output_step
-    assert step is not None
+    step = _row_step(worst)
     runs = f"{len(scenes)} runs" if len(scenes) > 1 else f"{worst.end / step:.1e} rows"
-    enough = 1.05 * step * needed / max(room, SMALL)  # more than the rounding of the message
     raise InputError(
-        f"output_step = {step:g}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are "
-        f"available; give at least {enough:.2g} [s], a shorter duration, or stream the rows to disk"
+        f"{_named(worst)}: {runs} need {needed / GB:.3g} GB of memory and {max(room, 0.0) / GB:.3g} GB are available; "
+        f"{_remedy(worst, needed / max(room, SMALL))}, a shorter duration, or stream the rows to disk"
     )
 
 
@@ -54,8 +53,8 @@ def require_room(scene: Scene, stream: Path | None, copies: int = 1) -> None:
     """
     if stream is None:
         require_memory([scene] * copies)
-    elif scene.output_step is not None:
-        _require_disk(scene, scene.output_step, stream.parent)
+    elif _row_step(scene) < math.inf:
+        _require_disk(scene, stream.parent)
 
 
 def outgrown(rows: int, surfaces: int) -> bool:
@@ -80,22 +79,36 @@ def available() -> float:
     return min(_of_machine(), _of_group(), _of_process(), _of_variable())
 
 
-def _require_disk(scene: Scene, step: float, folder: Path) -> None:
+def _require_disk(scene: Scene, folder: Path) -> None:
     """Rows lie on the disk as they are until the result, which is smaller, is written beside them."""
-    count, room = 1 + scene.end / step, shutil.disk_usage(folder).free
+    count, room = 1 + scene.end / _row_step(scene), shutil.disk_usage(folder).free
     needed = count * row_size(scene.bearing.layout.surfaces)
     if needed > max(room, SMALL):
-        enough = 1.05 * step * needed / max(room, SMALL)
         raise InputError(
-            f"output_step = {step:g}: {count:.1e} rows need {needed / GB:.3g} GB on the disk of "
-            f"{str(folder)!r} and {room / GB:.3g} GB are free; give at least {enough:.2g} [s], or a shorter duration"
+            f"{_named(scene)}: {count:.1e} rows need {needed / GB:.3g} GB on the disk of {str(folder)!r} and "
+            f"{room / GB:.3g} GB are free; {_remedy(scene, needed / max(room, SMALL))}, or a shorter duration"
         )
 
 
 def _needed(scene: Scene) -> float:
-    """Memory for the rows of a scene at even times [bytes]."""
-    assert scene.output_step is not None
-    return COPIES * (1 + scene.end / scene.output_step) * row_size(scene.bearing.layout.surfaces)
+    """Memory for the rows of a scene that are known before [bytes]."""
+    return COPIES * (1 + scene.end / _row_step(scene)) * row_size(scene.bearing.layout.surfaces)
+
+
+def _row_step(scene: Scene) -> float:
+    """Longest time between two rows [s]; infinite where nothing limits it."""
+    return scene.output_step or scene.solver.max_step or math.inf
+
+
+def _named(scene: Scene) -> str:
+    name = "solver.max_step" if scene.output_step is None else "output_step"
+    return f"{name} = {_row_step(scene):g}"
+
+
+def _remedy(scene: Scene, excess: float) -> str:
+    """The remedy for rows that need `excess` times the room."""
+    enough = 1.05 * _row_step(scene) * excess  # more than the rounding of the message
+    return f"give {'an output_step of ' if scene.output_step is None else ''}at least {enough:.2g} [s]"
 
 
 def _of_machine() -> float:

@@ -22,6 +22,7 @@ ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above
 DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
 FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
 LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
+TOLERANCE_LIMIT = 0.05  # force of the top's spring at the tolerance of angles, over the peak force, likewise
 CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
 CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
 TEXTS = {
@@ -29,6 +30,8 @@ TEXTS = {
     "not converge; give vertical_stiffness",
     "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
     "give a smaller solver.rtol",
+    "tolerance": "the tolerance of angles is {value:.3g} N in the spring of the top, {share:.2g} of the peak force: "
+    "vibrations after a change of the load may be filtered; give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
     "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
@@ -45,7 +48,8 @@ def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Not
     doubts = tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(scene.bearing))
     physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
-    return doubts + energy_notes(scene, history) + damping_notes(scene, history) + physics
+    numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
+    return doubts + numerics + damping_notes(scene, history) + physics
 
 
 def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
@@ -60,6 +64,24 @@ def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
         return ()
     share = damped / lost
     return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where a lateral load excites vibrations through a spring so stiff that the tolerance hides their force.
+
+    An L-stable method filters vibrations that are smaller than its tolerance. Massless sliders do not vibrate.
+    """
+    filtered = scene.solver.method != "dopri5" and effects.sliders == "inertial"
+    if scene.load is None or not filtered or not scene.load.coefficients[:, :2].any():
+        return ()
+    radius = max(surface.radius for surface in scene.bearing.surfaces)
+    force = getattr(scene.top, "stiffness", 0.0) * scene.solver.angle_tolerance * radius
+    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    row = int(across.argmax())
+    if not force > TOLERANCE_LIMIT * across[row] > 0:
+        return ()
+    text = TEXTS["tolerance"].format(value=force, share=force / across[row])
+    return (Note(float(history.time[row]), "tolerance", 0, force, text),)
 
 
 def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:

@@ -45,7 +45,7 @@ class RowFile:
         self.path, self.count, self.checksum = path, 0, 0
         self.ended = False  # a row was not finite: those after it do not count
         self._size = size
-        self._named = str(path or folder)
+        self._named = str(path or folder.absolute())
         if path is None:
             self._file = tempfile.TemporaryFile("w+b", buffering=0, dir=folder)  # noqa: SIM115
         else:

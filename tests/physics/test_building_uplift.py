@@ -86,7 +86,7 @@ def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
     for seat, force, path in ((5e9, 0.1, 5e-4), (5e10, 0.01, 6e-5)):
         bearing = BEARING.replace(seat_stiffness=seat)
         opened, whole = (simulate(rocking(effects, bearing=bearing)) for effects in (None, LIFTING))
-        assert [each.transitions[0].action for each in opened.bearings if each.transitions] == 2 * ["uplift = True"]
+        assert [each.model_changes[0].action for each in opened.bearings if each.model_changes] == 2 * ["uplift = True"]
         assert np.abs(opened.axial_force - whole.axial_force).max() < force * LOAD
         assert np.abs(opened.bearing_displacement - whole.bearing_displacement).max() < path
         assert opened.dissipated[-1] == pytest.approx(whole.dissipated[-1], rel=2e-3)

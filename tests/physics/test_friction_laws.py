@@ -232,6 +232,11 @@ def test_planar_and_spatial_runs_agree() -> None:
     assert np.abs(flat.top_force[:, 0]).max() == pytest.approx(np.abs(full.top_force[:, 0]).max(), rel=1e-3)
 
 
+def test_temperatures_do_not_shorten_the_steps() -> None:
+    """Their error is of the order of the method: without its first stage the estimate asks for 14 times the steps."""
+    assert heated(dimension="planar").counters.steps < 12_000
+
+
 def test_all_methods_agree() -> None:
     scene = scene_of(
         "fenz-test2", {"dimension": "planar"}, motion=Motion.harmonic(0.02, 1.0, cycles=0.5), output_step=0.01

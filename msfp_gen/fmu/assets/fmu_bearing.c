@@ -42,11 +42,17 @@ fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int fo
 static void at_rest(const double *values, double *q)
 {
     const double *bodies = values + FMU_BODIES, *surfaces = values + FMU_SURFACE_VALUES;
-    double carried = FMU_MASS ? values[FMU_GRAVITY] * values[FMU_TOP_MASS] : values[FMU_AXIAL_LOAD];
+#if FMU_MASS
+    double mass = values[FMU_TOP_MASS];
+    const double load = 0.0;
+#else
+    double mass = 0.0;
+    const double load = values[FMU_AXIAL_LOAD];
+#endif
     memset(q, 0, NB * NQ * sizeof *q);
     for (int k = NB - 1; k >= 0; --k) {
-        carried += values[FMU_GRAVITY] * bodies[(k + 1) * FMU_BODY_SIZE + FMU_BODY_MASS];
-        q[k * NQ + NQ - 1] = -carried / surfaces[k * FMU_SURFACE_SIZE + FMU_SEAT_STIFFNESS];
+        mass += bodies[(k + 1) * FMU_BODY_SIZE + FMU_BODY_MASS];
+        q[k * NQ + NQ - 1] = -(load + values[FMU_GRAVITY] * mass) / surfaces[k * FMU_SURFACE_SIZE + FMU_SEAT_STIFFNESS];
     }
 }
 #endif

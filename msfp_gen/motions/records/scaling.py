@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.fields import Quantity, check_fields, ruled_fields
+from msfp_gen.common.fields import Quantity, check_fields, require_type, ruled_fields
 from msfp_gen.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, uncorrected
+from msfp_gen.motions.records.record import Record
 from msfp_gen.motions.records.spectrum import DAMPING, ContinuousMotion, Progress, measure_index, response_spectrum
-
-if TYPE_CHECKING:
-    from msfp_gen.motions.records.record import Record
 
 _ACCELERATION = Quantity("m/s^2", above=0.0)
 _PERIOD = Quantity("s", above=0.0)
@@ -160,6 +158,7 @@ def prepared(
 
     `progress` reports the spectrum that `scale_to` needs, as of `response_spectrum`. Raises InputError.
     """
+    require_type(record, Record, "record")
     if correct:
         corrected = baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
     else:

@@ -85,6 +85,21 @@ static double turning_share(const msfp_run *run)
     return before > 0.0 && after < 0.0 ? before / (before - after) : 1.0;
 }
 
+/* As take_nodes of extremes.c, at one node. Returns how many remain. */
+static int take_node(msfp_run *run, msfp_group *group, int node, int *changed)
+{
+    msfp_recording *s = &run->gradients->recording;
+    double value[EXTREMES], force[EXTREMES];
+    msfp_row row;
+    msfp_row_inside(run, run->node[node].share, &row);
+    msfp_row_between_columns(run, group, run->node[node].share, 0, s->row);
+    contributions(run, group, &row, (const msfp_columns *)s->row, 0, value, s->contributed);
+    for (int i = 0; i < EXTREMES; ++i)
+        force[i] = NAN;
+    memcpy(force + EXTREME(top_force), value + EXTREME(top_force), sizeof run->extremes.top_force);
+    return take(run, group, force, s->contributed, changed);
+}
+
 void msfp_extremes_of_step(msfp_run *run, msfp_group *group)
 {
     msfp_recording *s = &run->gradients->recording;
@@ -99,8 +114,11 @@ void msfp_extremes_of_step(msfp_run *run, msfp_group *group)
     msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &row);
     msfp_row_reached_columns(run, group);
     contributions(run, group, &row, (const msfp_columns *)group->end_row, 0, value, s->contributed);
+    int left = take(run, group, value, s->contributed, changed);
+    for (int i = 0; i < run->node_count && left; ++i)
+        left = take_node(run, group, i, changed);
     const double share = turning_share(run);
-    if (!take(run, group, value, s->contributed, changed) || share >= 1.0)
+    if (!left || share >= 1.0)
         return;
     if (run->node_count) {
         msfp_row_inside(run, share, &row);

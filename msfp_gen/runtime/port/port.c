@@ -90,6 +90,7 @@ void msfp_port_free(msfp_port *port)
     msfp_run_free(&port->committed);
     msfp_run_free(&port->run);
     free(port->times);
+    free(port->solved);
     free(port);
 }
 
@@ -171,7 +172,7 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
 {
     msfp_run *run = &port->run;
     memcpy(&port->to, to, sizeof port->to);
-    port->tried = port->ready = 0;
+    port->tried = port->ready = port->linearised = 0;
     port->step.stage = MSFP_NO_STEP;
     port->step.finished = 0;
     port->time_count = 0;

@@ -46,6 +46,12 @@ typedef struct {
     int tripped;       /* a monitor stops it */
 } msfp_port_step;
 
+/* A stage of a trial as it was solved: rates, friction force over -mu N, what is left of the residual, factored tangent. */
+typedef struct {
+    double v[MSFP_NB][MSFP_NQ], g[MSFP_NB][2], residual[MSFP_DOF], factors[MSFP_DOF * MSFP_DOF];
+    int pivots[MSFP_DOF];
+} msfp_solved;
+
 struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
@@ -61,6 +67,9 @@ struct msfp_port {
     double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
     size_t time_count, time_capacity;
+    msfp_solved *solved; /* [solved_capacity]: the stages of these steps, one after the other, if they are linearised */
+    size_t solved_capacity;
+    int linearised;
     int tried; /* a trial has succeeded since the last commit, revert or failure */
     int ready; /* it may be committed: the same, or a trial of no duration */
     msfp_port_step step;

@@ -98,6 +98,18 @@ void msfp_extremes_begin(msfp_run *run, const msfp_row *row)
 
 static const double near_extreme = 0.95; /* a turning point inside a step is looked at if its end is as near as this */
 
+/* A method of fourth order takes few steps in a period of a vibration: peaks of the force are also sought at the stages
+ * between which rows are interpolated. The steps of one of second order are short enough. */
+static void take_nodes(msfp_run *run)
+{
+    msfp_row row;
+    for (int i = 0; i < run->node_count && msfp_control_order(run->options.method) > 3.0; ++i)
+        if (length(run->node[i].top_force) > run->extremes.top_force[3]) {
+            msfp_row_inside(run, run->node[i].share, &row);
+            take_vector(run->extremes.top_force, row.top_force);
+        }
+}
+
 /* Where the bearing turns back inside the step, the positions there count too. */
 void msfp_extremes_step(msfp_run *run)
 {
@@ -108,6 +120,7 @@ void msfp_extremes_step(msfp_run *run)
     else
         msfp_record(&run->parameters, &run->reached, &run->work, &run->next.mechanical, &own);
     take_row(run, row);
+    take_nodes(run);
     const double before = run->outward_rate, after = outward_rate(run, &run->reached, row);
     run->outward_rate = after;
     if (before > 0.0 && after < 0.0 && across(run, row) > near_extreme * run->extremes.displacement[3]) {

@@ -161,6 +161,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
         memcpy(node->v, s->now.at.v, sizeof node->v);
         memcpy(node->f, s->now.f, sizeof node->f);
         memcpy(node->foot, run->work.foot, sizeof node->foot);
+        msfp_force_F_get(run->work.force[NB], node->top_force);
         integrals(run, s, i, s->h, node->work);
     }
     s->other = fmax(s->other, unit_disc_error(run, &s->now));

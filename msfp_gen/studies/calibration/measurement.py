@@ -13,6 +13,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.quantities import to_si
 from msfp_gen.errors import InputError
+from msfp_gen.motions.checks import finite
 from msfp_gen.motions.records.text import Lines, read_lines
 
 UNITS = {"time": "s", "displacement": "m", "force": "N"}
@@ -48,12 +49,9 @@ class Measurement:
 
     def __post_init__(self) -> None:
         for name in UNITS:
-            values = np.asarray(getattr(self, name), dtype=np.float64)
-            if values.ndim != 1 or len(values) != len(self.time):
+            values = finite(f"{self.name}: {name}", getattr(self, name))
+            if values.ndim != 1 or values.shape != np.shape(self.time):
                 raise InputError(f"{self.name}: {name} has shape {values.shape}; give one number for each time")
-            if not np.all(np.isfinite(values)):
-                row = int(np.flatnonzero(~np.isfinite(values))[0])
-                raise InputError(f"{self.name}, row {row + 1}: {name} is {values[row]}; repair or cut the data")
             object.__setattr__(self, name, values)
         for name in ("axial_load", "weight"):
             value = getattr(self, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -110,8 +110,9 @@ def parsed_shard(text: str) -> tuple[int, int]:
 
 
 def _check_shard(shard: tuple[int, int]) -> None:
-    if not 1 <= shard[0] <= shard[1]:
-        raise InputError(f"shard = {shard[0]}/{shard[1]}: give i/n with i from 1 to n")
+    numbers = tuple(shard) if isinstance(shard, Sequence) else ()
+    if len(numbers) != 2 or not all(isinstance(n, int) for n in numbers) or not 1 <= numbers[0] <= numbers[1]:
+        raise InputError(f"shard = {'/'.join(map(str, numbers)) or shard!r}: give i/n with i from 1 to n")
 
 
 def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progress | None) -> Outcome:

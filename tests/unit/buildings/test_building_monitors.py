@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.buildings import LOAD, rocking
+from support.buildings import BEARING, LOAD, rocking
 
 from msfp_gen import Auto, Effects, RunError, simulate
 from msfp_gen.buildings import effects as selection
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.switching import switch
+from msfp_gen.results.restart_state import RestartState
 
 
 @pytest.fixture
@@ -31,8 +33,8 @@ def same(one: BuildingResult, other: BuildingResult) -> bool:
 def test_a_run_is_resumed_bit_by_bit_before_and_after_a_switch(tmp_path):
     scene = rocking(None)
     whole = simulate(scene)
-    times = [note.time for each in whole.bearings for note in each.transitions]
-    assert [len(each.transitions) for each in whole.bearings] == [0, 1, 1, 0] and times[0] != times[1]
+    times = [note.time for each in whole.bearings for note in each.model_changes]
+    assert [len(each.model_changes) for each in whole.bearings] == [0, 1, 1, 0] and times[0] != times[1]
     for stop in (min(times) - 0.1, max(times) + 0.1):
         file = tmp_path / f"{stop}.ckpt"
 
@@ -47,7 +49,28 @@ def test_a_run_is_resumed_bit_by_bit_before_and_after_a_switch(tmp_path):
 
 
 @pytest.mark.usefixtures("unforeseen")
-def test_transitions_and_peaks_are_in_the_file(tmp_path):
+def test_no_axial_force_jumps_where_uplift_opens():
+    run = start_run(rocking(None))
+    while run.run.advance(1000):
+        pass
+    old, time = run.members[2], run.time
+    before, force = RestartState.of_port(old.port), old.model.unpack(old.port.row)["top_force"]
+    pressed = before.contact_force(BEARING)[:, 2]  # without the rims, which the contacts do not carry
+    assert run.run.status[:2] == ("guard", 3) and old.port.trips["uplift"][0] == time
+    assert switch(run) and run.run.status[0] == "ok"
+    after = RestartState.of_port(run.members[2].port)
+    assert np.array_equal(after.q[:, :3], before.q) and np.array_equal(after.f, before.f) and after.time == time
+    assert after.q[:, 5] == pytest.approx(-pressed / 5e9, rel=1e-9)
+    new = run.members[2]
+    jump = np.abs(new.model.unpack(new.port.row)["top_force"] - force)
+    assert jump[2] < 1e-6 * LOAD
+    assert jump[:2].max() < 1e-2 * np.hypot(*force[:2])  # the contacts yield sideways too, 3 um under 3 kN
+    run.run.advance(3)
+    assert run.time > time and run.run.status[0] in ("ok", "guard")  # the next bearing follows soon
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_changes_of_models_and_peaks_are_in_the_file(tmp_path):
     found = simulate(rocking(None))
     notes = [note for note in found.notes if note.kind == "uplift"]
     assert [note.text[:11] for note in notes] == ["bearing 3: ", "bearing 2: "]
@@ -66,7 +89,7 @@ def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fi
     notes = [note for note in found.notes if note.kind == "uplift"]
     assert caught.value.status == "uplift" and [note.text[:10] for note in notes] == ["bearing 3:", "bearing 2:"]
     assert all(0 < note.value < 0.05 * LOAD * 1.2 and not note.action for note in notes)
-    assert notes[0].time < found.time[-1] + 0.01 and not any(each.transitions for each in found.bearings)
+    assert notes[0].time < found.time[-1] + 0.01 and not any(each.model_changes for each in found.bearings)
 
 
 def test_a_damaged_change_of_models_is_refused():

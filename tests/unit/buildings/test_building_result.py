@@ -172,7 +172,7 @@ def test_notes_of_monitors_name_the_bearing():
         "t = 0.2 s: bearing 1 (A): it is hot; so do 2 other bearings",
         "t = 0.3 s: bearing 3: it is unloaded",
     ]
-    assert found.bearings[0].transitions == (uplift,) and found.bearings[2].transitions == ()
+    assert found.bearings[0].model_changes == (uplift,) and found.bearings[2].model_changes == ()
     assert "notes" in repr(found)
 
 

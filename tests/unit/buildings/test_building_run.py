@@ -126,7 +126,9 @@ def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
     """A result without rows would have no summary and no figure."""
 
     def failed(made: BuildingScene, threads: int | None) -> Any:
-        compiled = SimpleNamespace(rows=(), status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False)
+        compiled = SimpleNamespace(
+            rows=(), row_count=0, status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False
+        )
         return SimpleNamespace(scene=made, run=compiled)
 
     monkeypatch.setattr(run, "start_run", failed)

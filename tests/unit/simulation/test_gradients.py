@@ -95,6 +95,15 @@ def test_a_file_with_damaged_parameters_is_refused(parameters: str, tmp_path: Pa
         Result.from_netcdf(path)
 
 
+@pytest.mark.parametrize("name", ["gap", "slip_velocity"])
+def test_a_file_that_lacks_a_derivative_of_the_summary_is_refused(name: str, tmp_path: Path) -> None:
+    path = result().to_netcdf(tmp_path / "run.nc")
+    with h5py.File(path, "a") as file:
+        del file["gradient"][name], file.attrs["digest"]
+    with pytest.raises(InputError, match=f"the gradient has no {name}"):
+        Result.from_netcdf(path)
+
+
 def test_without_gradients_there_is_none() -> None:
     plain = simulate(triple(0.5))
     for name in ("gradient", "gradient_summary"):

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from support import preset_run
 
+from msfp_gen import Effects, Load, Solver
 from msfp_gen.results.history import History
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.notes import energy_notes
+from msfp_gen.simulation.notes import energy_notes, tolerance_notes
 
 SLID, NORMAL, WORK = 0.05, 2e5, 700.0
 
@@ -42,3 +43,23 @@ def test_the_energy_that_is_missing_is_measured_by_the_largest_term(work: float,
     _, history = given(0.0)
     assert note.time == history.time[len(history.time) // 2]
     assert energy_notes(*given(0.019 * scale, work, slid)) == ()
+
+
+def test_a_tolerance_above_the_force_of_a_stiff_spring_is_noted() -> None:
+    """A pulse of 10 kN into a rig of 1 GN/m gives 650 N, of which a run at rtol = 1e-4 shows a tenth (esdirk4)."""
+    result = preset_run("fenz-test2")
+    load = Load.from_arrays([0, 1], [[0, 0, 0], [1e3, 0, 0]])
+    scene = replace(result.scene, load=load, solver=Solver(rtol=1e-4))
+    radius = max(surface.radius for surface in scene.bearing.surfaces)
+    force = scene.top.stiffness * 1e-6 * radius  # type: ignore[attr-defined]
+    peak = np.hypot(*result.history.top_force[:, :2].T).max()
+
+    def noted(share: float, scene: Scene = scene, sliders: str = "inertial") -> tuple[float, ...]:
+        history = replace(result.history, top_force=result.history.top_force * force / (share * peak))
+        return tuple(note.value for note in tolerance_notes(scene, Effects(sliders=sliders), history))
+
+    assert noted(0.051) == (pytest.approx(force),) and noted(0.049) == ()
+    vertical = Load.constant((0.0, 0.0, 1e3), (1e3, 0.0, 0.0))
+    for other in ({"load": None}, {"load": vertical}, {"solver": Solver(method="dopri5")}):
+        assert noted(0.5, replace(scene, **other)) == ()
+    assert noted(0.5, sliders="massless") == ()

@@ -1,0 +1,65 @@
+"""The worked examples of docs/embedding.md and docs/opensees.md, one problem, run and print what the pages say.
+
+Those in C and Fortran are files of an exported library (tests/unit/embedding); that of docs/fmu.md is in
+tests/unit/fmu.
+"""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from support import ROOT
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def promised(page: str) -> str:
+    """What a page says that its example prints."""
+    found = re.search(r"It prints `(.*?)`", (ROOT / "docs" / page).read_text(encoding="utf-8"))
+    assert found
+    return found[1]
+
+
+def test_both_pages_promise_the_same() -> None:
+    assert promised("embedding.md") == promised("opensees.md")
+
+
+def test_the_examples_in_python_run(capsys: pytest.CaptureFixture[str]) -> None:
+    code = blocks("embedding.md", "python")
+    assert len(code) == 2
+    names: dict[str, object] = {}
+    for block in code:
+        exec(block, names)
+    assert capsys.readouterr().out.strip() == promised("embedding.md")
+
+
+@pytest.mark.skipif(not find_spec("openseespy"), reason="OpenSeesPy is not installed")
+def test_the_example_in_opensees_runs_with_the_command_that_serves(tmp_path: Path) -> None:
+    """At a free port in place of the one of the page."""
+    (tmp_path / "bearing.toml").write_text(blocks("opensees.md", "toml")[0], encoding="utf-8")
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    text = (ROOT / "docs" / "opensees.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^msfp-gen serve bearing.toml .*$", text, flags=re.MULTILINE)
+    arguments = command.replace("7000", str(port)).split()[1:]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "msfp_gen", *arguments],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    assert server.stdout
+    assert "serving bearing.toml" in server.stdout.readline()
+    (code,) = blocks("opensees.md", "python")
+    client = [sys.executable, "-c", code.replace("7000", str(port))]
+    done = subprocess.run(client, capture_output=True, text=True, timeout=500)
+    assert promised("opensees.md") in done.stdout.splitlines(), done.stdout + done.stderr
+    rest, _ = server.communicate(timeout=60)
+    assert server.returncode == 0 and "ended at t = 4 s" in rest
