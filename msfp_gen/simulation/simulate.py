@@ -1,7 +1,6 @@
 """`simulate`: runs a scene and returns its result. The time integration is compiled C.
 
-A run consists of one segment, or of several: where a monitor trips, the next segment continues with a model that
-includes the effect.
+A run is one segment, or several: where a monitor trips, the next one continues with a model that includes the effect.
 """
 
 from __future__ import annotations
