@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from msfp_gen.simulation.settling import needs_settling
 from msfp_gen.specification.layout import ModelSpec
 
 if TYPE_CHECKING:
+    from msfp_gen.results.history import Event
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.segment import Segment
     from msfp_gen.specification.layout import Effects
@@ -29,6 +31,11 @@ RINGING = (
     f"{DAMPING}, or longer steps (a larger solver.rtol)"
 )
 UNDAMPED = f"surface {{surface}} has no contact damping, and ringing of its slider disturbs the gradients; {DAMPING}"
+RINGS_AT_RIM = (
+    "surface {surface} met its rim, and sliders ring after it: contact_damping = {damping:.3g} s is below their "
+    "critical damping ({critical:.2g} s), so that gradients contain the phase of the ringing and may not converge as "
+    "solver.rtol falls; give contact_damping = 1e-3"
+)
 
 
 class RunParts(Protocol):
@@ -100,9 +107,18 @@ def undamped_surfaces(scene: Scene, effects: Effects) -> list[int]:
     return [i for i, surface in enumerate(scene.bearing.surfaces, 1) if surface.contact_damping == 0]
 
 
-def gradient_notes(sequence: RunParts) -> tuple[Note, ...]:
-    """A note where sliders of a run with gradients ring undamped."""
+def gradient_notes(sequence: RunParts, events: Sequence[Event]) -> tuple[Note, ...]:
+    """A note where sliders of a run with gradients ring undamped, or ring after a rim contact. events: of the run."""
     if not sequence.parameters:
         return ()
-    found = undamped_surfaces(sequence.given, sequence.segments[-1].model.effects)[:1]
-    return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in found)
+    effects = sequence.segments[-1].model.effects
+    found = undamped_surfaces(sequence.given, effects)[:1]
+    if found:
+        return tuple(Note(0.0, "ringing", surface, 0.0, UNDAMPED.format(surface=surface)) for surface in found)
+    contact = next((event for event in events if event.kind == "rim_contact"), None)
+    damping = min(surface.contact_damping for surface in sequence.given.bearing.surfaces)
+    critical = slider_period(sequence.given) / pi  # T omega/2 = 1
+    if contact is None or effects.sliders == "massless" or damping >= critical:
+        return ()
+    text = RINGS_AT_RIM.format(surface=contact.surface, damping=damping, critical=critical)
+    return (Note(contact.time, "ringing", contact.surface, damping, text),)

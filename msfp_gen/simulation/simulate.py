@@ -269,8 +269,7 @@ def _advance(
 
 
 def _result(sequence: RunSequence, history: History) -> Result:
-    scene, segments = sequence.given, sequence.segments
-    last = segments[-1]
+    scene, segments, last = sequence.given, sequence.segments, sequence.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
     provenance = {
@@ -294,7 +293,7 @@ def _result(sequence: RunSequence, history: History) -> Result:
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
         + landing_notes(events)
-        + gradient_notes(sequence),
+        + gradient_notes(sequence, events),
         recorded_extremes=extremes_of(segments),
         gradients=run_gradients(sequence, len(history.time)),
     )

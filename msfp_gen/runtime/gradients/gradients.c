@@ -164,12 +164,14 @@ static int factorise(msfp_run *run)
     return MSFP_OK;
 }
 
-/* Surface whose rim the slider meets or leaves at the end of the step, to which the step was shortened; -1: none. */
+/* Surface whose rim the slider meets or leaves at the end of the step, to which the step was shortened; -1: none. A
+ * fast slider may end beyond the tolerance, because no step to an event is shorter than a microsecond. */
 static int rim_at_end(const msfp_run *run, const double *before, const double *after)
 {
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
         const double tolerance = 1e-6 * run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_SC];
-        if (fabs(before[j]) > tolerance && fabs(after[j]) <= fmax(tolerance, 1e-3 * fabs(before[j])))
+        const int crosses = (before[j] > 0.0) != (after[j] > 0.0);
+        if (fabs(before[j]) > tolerance && (crosses || fabs(after[j]) <= fmax(tolerance, 1e-3 * fabs(before[j]))))
             return j;
     }
     return -1;
@@ -183,6 +185,17 @@ static int ends_at_fixed_time(const msfp_run *run)
     const double t = run->next.t;
     return t == o->duration || (run->stop < o->stop_count && t == o->stops[run->stop]) ||
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
+}
+
+/* The first stage with the damping force of a rim that the step only just meets; 0: none. This force begins at the end
+ * of the step and must not count as an acceleration of a longer step. */
+static int stage_in_new_contact(const msfp_run *run, int rim, const double *before)
+{
+    const int stages = rim >= 0 && before[rim] > 0.0 ? msfp_tableau_of(run->options.method)->stages : 0;
+    for (int i = 1; i < stages; ++i)
+        if (run->gradients->trail.work[i].rim_active[rim])
+            return i;
+    return 0;
 }
 
 void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt)
@@ -214,6 +227,7 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
     const int prescribed = g->step_count > 0 || msfp_is_quasistatic(run);
     const int fixed = prescribed || ends_at_fixed_time(run);
     const int rim = prescribed ? -1 : rim_at_end(run, before, after);
+    g->trail.meets_rim = stage_in_new_contact(run, rim, before);
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
         for (int c = 0; c < C; ++c)

@@ -109,6 +109,7 @@ typedef struct {
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
+    int meets_rim;  /* the first stage with the force of a rim that the step only just meets; 0: none */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;

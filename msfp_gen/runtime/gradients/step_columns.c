@@ -57,8 +57,11 @@ static const double *rates_v(const msfp_run *run, int j)
     return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
 }
 
+/* Its accelerations, by which the rates grow with the length of the step: those before a contact at its end. */
 static const double *rates_a(const msfp_run *run, int j)
 {
+    const int met = run->gradients->trail.meets_rim;
+    j = met && j >= met ? met - 1 : j;
     return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
 }
 
@@ -96,9 +99,9 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
     }
 }
 
-/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. */
-MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
-                        msfp_point_columns *dat)
+/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. longer: of rates_a. */
+MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp_columns Q[NB][NQ],
+                             msfp_columns V[NB][NQ], msfp_point_columns *dat)
 {
     const double beta = stage->beta, inverse = 1.0 / beta;
     for (int k = 0; k < NB; ++k) {
@@ -108,7 +111,7 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, msfp_columns Q[NB][NQ], ms
         for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
             for (int c = 0; c < C; ++c) {
                 const int d = unknown[i];
-                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * stage->at.a[k][d]) * inverse;
+                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * longer[k * NQ + d]) * inverse;
             }
     }
 }
@@ -119,19 +122,20 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
     msfp_point_columns *dat = &group->point;
+    const double *longer = rates_a(run, i);
     msfp_columns *x = group->work.residual;
     memcpy(dat->v, group->now.v, sizeof dat->v); /* of a locked spin */
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
-    stage_point(stage, Q, V, dat);
+    stage_point(stage, longer, Q, V, dat);
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
                            &trail->slopes[i], 0, &group->work);
     msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
-    stage_point(stage, Q, V, dat);
+    stage_point(stage, longer, Q, V, dat);
     group->complete = 0;
 }
 

@@ -171,5 +171,18 @@ def test_undamped_ringing_is_noted_and_refused_where_it_is_resolved() -> None:
         simulate(replace(scene, solver=replace(scene.solver, max_step=2e-4)), gradients=PATHS)
 
 
+def test_ringing_after_a_rim_contact_is_noted_unless_it_is_damped() -> None:
+    """The critical damping of the sliders is 0.64 ms."""
+    scene = scene_of("fenz-test2", duration=0.2, output_step=0.05, stop=None, motion_table=None)
+    scene = replace(scene, motion=Motion.harmonic(0.12, 1.0))
+    for damping, noted in ((1e-4, True), (1e-3, False)):
+        given = replace(scene, bearing=scene.bearing.replace(contact_damping=damping))
+        result = simulate(given, gradients=["motion.scale"])
+        found = [note for note in result.notes if note.kind == "ringing"]
+        assert [(note.surface, note.time) for note in found] == [(1, result.events[0].time)] * noted
+        assert all("give contact_damping = 1e-3" in note.text for note in found)
+        assert not any(note.kind == "ringing" for note in simulate(given).notes)
+
+
 def test_batches_are_as_before() -> None:
     assert simulate_batch([triple(0.2)])[0].gradients is None
