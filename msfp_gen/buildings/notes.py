@@ -38,7 +38,7 @@ def _gathered(notes: Sequence[tuple[int, Note]]) -> list[tuple[int, Note]]:
         alike = sorted((pair for pair in notes if pair[1].kind == kind and not pair[1].action), key=_time)
         for index, note in alike[:1]:
             others = len({i for i, _ in alike}) - 1
-            words = f"; so {'do' if others > 1 else 'does'} {others} other bearing{'s' * (others > 1)}"
+            words = f"; the same holds for {others} other bearing{'s' * (others > 1)}"
             found.append((index, replace(note, text=note.text + (words if others else ""))))
         found += [pair for pair in notes if pair[1].kind == kind and pair[1].action]
     return found

@@ -49,8 +49,9 @@ FLAGS: dict[str, tuple[str, ...]] = {
         "-ffp-contract=off",
     ),
     "user": user_flags(),
-    # Cython's output causes warnings and takes little of the run time: no warnings, little optimisation.
-    "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-Og"),
+    # Cython's output causes warnings and takes little of the run time: no warnings, no optimisation, which compiles in
+    # 1.2 s instead of 2.0 s and makes a derivative for SciPy's integrators slower by a tenth.
+    "wrapper": ("-w", "-fPIC", "-fvisibility=hidden", "-fno-strict-overflow", "-DNDEBUG", "-O0"),
     "libraries": ("-lm",),
 }
 

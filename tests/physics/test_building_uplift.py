@@ -65,7 +65,7 @@ def test_a_slender_frame_lifts_off_and_lands():
         assert np.abs(left).max() < 5e-4 * result.kinetic.max()
     assert coarse.axial_force.max() == pytest.approx(fine.axial_force.max(), rel=2e-3)
     displacements = [np.abs(each.bearing_displacement).max(axis=(0, 1)) for each in (coarse, fine)]
-    assert displacements[0] == pytest.approx(displacements[1], rel=2e-2)
+    assert np.abs(displacements[0] - displacements[1]).max() < 5e-4 * displacements[1].max()
     assert displacements[0][0] == pytest.approx(displacements[1][0], rel=2e-4)
 
 

@@ -47,7 +47,7 @@ struct msfp_building {
     int *piece;     /* [grounds] where the last search ended */
     double *ground; /* [grounds][MSFP_GROUND] in the present stage */
     pool pool;
-    /* Numbers of the state between two steps, written to snapshots from here on. */
+    /* State between two steps; pass_state (state.c) lists what a snapshot holds. */
     double t, h, previous_error, energy, energies[ENERGIES];
     double tangent_beta; /* of `tangent` [s]; 0: none */
     int stop, jump, span, next_row;

@@ -59,7 +59,7 @@ typedef struct {
 /* How a run stands. */
 typedef struct {
     int status, bearing, surface; /* bearing: that failed, counted from 1; 0: the building */
-    double value, time, step;
+    double value, time;
     size_t rows;
 } msfp_building_progress;
 

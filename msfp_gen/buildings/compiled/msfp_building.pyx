@@ -56,7 +56,7 @@ cdef extern from "msfp_building.h":
         msfp_lapack lapack
     ctypedef struct msfp_building_progress:
         int status, bearing, surface
-        double value, time, step
+        double value, time
         size_t rows
     ctypedef struct msfp_building:
         pass

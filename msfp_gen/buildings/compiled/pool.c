@@ -14,11 +14,11 @@ static void work(msfp_building *b, int thread)
 typedef struct {
     msfp_building *b;
     int thread;
-} seat;
+} worker;
 
 static void *serve(void *given)
 {
-    const seat at = *(seat *)given;
+    const worker at = *(worker *)given;
     pool *p = &at.b->pool;
     long seen = 0;
     free(given);
@@ -51,10 +51,10 @@ int pool_begin(msfp_building *b)
     if (!p->threads)
         return MSFP_E_MEMORY;
     while (p->count < wanted) { /* fewer where the system gives no more */
-        seat *at = malloc(sizeof *at);
+        worker *at = malloc(sizeof *at);
         if (!at)
             return MSFP_E_MEMORY;
-        *at = (seat){ b, p->count };
+        *at = (worker){ b, p->count };
         if (pthread_create(&p->threads[p->count - 1], NULL, serve, at)) {
             free(at);
             break;

@@ -6,7 +6,8 @@
 
 static const double smallest_step = 1e-9;     /* [s]; closer times count as equal */
 static const double shortest_to_event = 1e-6; /* [s]; a shorter step to an event would be lost in roundoff */
-static const double growth = 1.189207115002721; /* steps that end nowhere in particular have lengths in this ratio */
+/* 2^(1/4): free steps have lengths that are whole powers of it, so that few factorisations are needed. */
+static const double growth = 1.189207115002721;
 enum { RELOCATIONS = 4 };
 
 static double smallest(double t) { return smallest_step * fmax(1.0, t); }
@@ -249,14 +250,12 @@ static void accept(msfp_building *b, double h, double t, double error)
 }
 
 /* Shorten the step after a failure; the run ends where it is the shortest already. */
-static int shorten(msfp_building *b, double h, double factor, int status, int bearing)
+static void shorten(msfp_building *b, double h, double factor, int status, int bearing)
 {
     b->h = h * factor;
     ++b->counts[MSFP_BUILDING_REJECTED];
-    if (b->h >= smallest(b->t) && status != MSFP_E_MEMORY)
-        return 1;
-    end_run(b, status, bearing);
-    return 0;
+    if (b->h < smallest(b->t) || status == MSFP_E_MEMORY)
+        end_run(b, status, bearing);
 }
 
 /* The first bearing, from 1, of which a monitor stops the step; 0: none. */
@@ -269,28 +268,31 @@ static int tripped(msfp_building *b)
     return first;
 }
 
-/* One step, or the rejection of one. Returns 0 where the run ends. */
-static int one_step(msfp_building *b)
+/* One step, or the rejection of one. */
+static void one_step(msfp_building *b)
 {
     const double end = latest_end(b), left = end - b->t;
     double h = divided(allowed(b, b->h), left), error, share;
     int worst;
     for (int relocations = 0;; ++relocations) {
         const int status = try_step(b, h, &error, &share, &worst);
-        if (status)
-            return shorten(b, h, 0.25, status, b->bearing);
-        if (error > 1.0)
-            return shorten(b, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
+        if (status) {
+            shorten(b, h, 0.25, status, b->bearing);
+            return;
+        }
+        if (error > 1.0) {
+            shorten(b, h, fmax(0.1, 0.9 * msfp_pow(error, -1.0 / b->method.order)), MSFP_E_STEP, worst);
+            return;
+        }
         if (share >= 1.0 || relocations >= RELOCATIONS)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
     }
     if ((b->bearing = tripped(b))) {
         b->status = MSFP_E_GUARD;
-        return 0;
+        return;
     }
     accept(b, h, fabs(b->t + h - end) <= smallest(end) ? end : b->t + h, error);
-    return b->status == MSFP_OK;
 }
 
 /* ---- a bearing continues with another model ---- */
@@ -339,7 +341,7 @@ int msfp_building_advance(msfp_building *b, long steps)
 
 void msfp_building_state(const msfp_building *b, msfp_building_progress *progress)
 {
-    *progress = (msfp_building_progress){ b->status, b->status ? b->bearing : 0, b->surface, b->value, b->t, b->h,
+    *progress = (msfp_building_progress){ b->status, b->status ? b->bearing : 0, b->surface, b->value, b->t,
                                           b->row_count };
 }
 

@@ -11,7 +11,7 @@
 #include "building.h"
 
 enum { MOST_ITERATIONS = 30, HALVINGS = 5 };
-static const double contraction = 0.1; /* of the residual by an iteration: a slower one has the derivatives renewed */
+static const double contraction = 0.1; /* an iteration that reduces the residual by less has the derivatives renewed */
 static const double tolerance = 1e-3;  /* of the balance of a stage: share of rtol times the weight */
 
 /* ---- motions ---- */

@@ -103,7 +103,6 @@ static void refusals(const msfp_scene *scene, msfp_port *port, const double *las
     NEW(s.rtol = 0.0);
     NEW((s.motion = (msfp_piecewise){ 1, knots, coefficients }));
     NEW((s.jumps = jump, s.jump_count = 1));
-    NEW(s.monitors = 1);
     NEW(s.output_step = 0.1);
     NEW(s.v = q);
     NEW(q[3] = 0.1);

@@ -84,7 +84,7 @@ def test_shards_make_one_study(tmp_path: Path) -> None:
     assert msfp_gen.study(cheap_study(), shards, threads=True, shard=(2, 2)) == (4, 0, 4, 0)
     assert contents(shards) == contents(whole)
     pd.testing.assert_frame_equal(rows_of(shards), rows_of(whole))
-    with pytest.raises(InputError, match="shard = 3/2: give i/n"):
+    with pytest.raises(InputError, match="shard = '3/2': give i/n"):
         msfp_gen.study(cheap_study(), shards, shard=(3, 2))
 
 
