@@ -17,6 +17,7 @@ from dataclasses import replace
 from instructions import AVX2, instructions
 
 from msfp_gen import Scene, load_scene
+from msfp_gen.generator.gradients import COLUMNS
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.parameters import parameters_of
 from msfp_gen.simulation.gradient_inputs import start_gradients
@@ -85,8 +86,9 @@ def main() -> None:
             else:
                 shares, taken = shares_of_time(damped(name, rtol))
                 steps = str(taken)
-            group = shares[-1] - shares[-2]  # one more group of eight
-            parts = [shares[-2] - group, group, *(s / n for s, n in zip(shares, COUNTS, strict=True))]
+            one = (shares[-1] - shares[-2]) / (COUNTS[-1] - COUNTS[-2])  # parameter of a full group
+            each = [share / count for share, count in zip(shares, COUNTS, strict=True)]
+            parts = [shares[-2] - COUNTS[-2] * one, COLUMNS * one, *each]
             print(f"| {title}, rtol {rtol:g} | {steps} | {' | '.join(f'{100 * p:.0f} %' for p in parts)} |", flush=True)
 
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from .program import Program, Use
 
-COLUMNS = 8
-"""Parameters whose derivatives one call carries: as many numbers as the widest vectors hold."""
+COLUMNS = 4
+"""Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
 CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "mu")
 """Results of `contact`, beside its moment, whose derivatives are used."""
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")

@@ -1,4 +1,7 @@
 /* initial_columns.c: derivatives of base motion, load and initial state. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises loops over columns */
+#endif
 #include <math.h>
 #include <string.h>
 #include "gradients.h"
@@ -7,24 +10,21 @@
 enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, C = MSFP_COLUMNS };
 static const int unknown[ND] = MSFP_FREE;
 
-/* Derivatives of orders 1 to 3 of a history at its last search. */
-static void rates_at(const msfp_history *h, double t, double out[3][6])
+/* Third derivative of a history at its last search. */
+MSFP_INLINE void third_derivative(const msfp_history *h, double t, double out[6])
 {
     const double s = t - h->knots[h->last];
-    memset(out, 0, 3 * sizeof *out);
-    for (int order = 1; order <= 3; ++order)
+    memset(out, 0, 6 * sizeof *out);
+    for (int k = h->degree; k >= 3; --k) {
+        const double factor = (double)(k * (k - 1) * (k - 2));
         for (int i = 0; i < 6; ++i)
-            for (int k = h->degree; k >= order; --k) {
-                double factor = 1.0;
-                for (int m = 0; m < order; ++m)
-                    factor *= k - m;
-                out[order - 1][i] = out[order - 1][i] * s + factor * h->powers[k][i];
-            }
+            out[i] = out[i] * s + factor * h->powers[k][i];
+    }
 }
 
-void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat)
+MSFP_WIDE void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat)
 {
-    double found[3][6];
+    double found[3][6], third[6];
     if (run->next_jump < run->jump_count && t >= run->jumps[run->next_jump]) /* as msfp_point_at */
         t = nextafter(run->jumps[run->next_jump], -INFINITY);
     memset(dat->base, 0, sizeof dat->base);
@@ -45,12 +45,12 @@ void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const doubl
     if (!msfp_any_column(dt))
         return;
     msfp_history_at(&run->motion, t, 3, found);
-    rates_at(&run->motion, t, found);
-    for (int order = 0; order < 3; ++order)
-        msfp_add_scaled(dat->base[order], found[order], dt, 1.0, 6);
-    msfp_history_at(&run->load, t, 1, found);
-    rates_at(&run->load, t, found);
-    msfp_add_scaled(dat->load, found[0], dt, 1.0, 6);
+    third_derivative(&run->motion, t, third);
+    msfp_add_scaled(dat->base[0], found[1], dt, 1.0, 6);
+    msfp_add_scaled(dat->base[1], found[2], dt, 1.0, 6);
+    msfp_add_scaled(dat->base[2], third, dt, 1.0, 6);
+    msfp_history_at(&run->load, t, 2, found);
+    msfp_add_scaled(dat->load, found[1], dt, 1.0, 6);
 }
 
 /* Height of the foot at rest: the top plate less the settlement under the supported mass (msfp_foot_at_rest). */

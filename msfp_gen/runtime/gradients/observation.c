@@ -1,4 +1,7 @@
 /* observation.c: directional derivatives of what a run records. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises loops over columns */
+#endif
 #include <math.h>
 #include <string.h>
 #include "gradients.h"
