@@ -138,7 +138,7 @@ static double step_along(const msfp_port *port, const double direction[MSFP_ORDE
     const double step = perturbation(p, freedom, port->loaded && end) / path;
     if (!port->loaded || end)
         return step;
-    /* The mass feels the accelerations of the path. */
+    /* The accelerations of the path act on the mass. */
     const double most = 20.0 * fabs(direction[0]) + 8.0 * h * fabs(direction[1]) + h * h * fabs(direction[2]);
     const double radius = freedom < 3 ? 1.0 : p->surface[0][MSFP_SURFACE_PARAMETERS_R];
     return fmin(step, share * mild_acceleration * h * h / (most * radius));

@@ -8,11 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 from support.buildings import MOTION, PLACES, frame, scene
+from support.films import drawn_twice
 
 from msfp_gen import Building, BuildingScene, InputError, simulate
 from msfp_gen.buildings.data import at_times
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import animate, film, page
+from msfp_gen.figures import animate, film
 from msfp_gen.figures.building_movie import Elevation, building_film
 from msfp_gen.figures.frame import MovingFrame
 
@@ -71,25 +72,12 @@ def test_states_of_bearings():
 
 
 def test_a_frame_of_the_movie_is_what_a_complete_drawing_shows():
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     shown = building_film(result(), TIMES, None)
-    with page(film.WIDE, shown.height) as figure:
-        moved = list(film.pictures(figure, shown, None))
-    assert np.abs(moved[0].astype(int) - moved[2]).max() > 100
-    with page(film.WIDE, shown.height) as figure:
-        figure.set_dpi(film.DOTS)
-        canvas = FigureCanvasAgg(figure)
-        update, moving = shown.layout(figure)
-        canvas.draw()
-        figure.set_layout_engine("none")
-        for row, picture in enumerate(moved):
-            update(row)
-            canvas.draw()
-            whole = np.array(canvas.buffer_rgba(), dtype=int)
-            assert (np.abs(whole - picture).max(axis=-1) > 60).mean() < 2e-3
-        assert {artist.axes for artist in moving} == set(figure.axes)
-        assert "20 times as large" in figure.subfigs[0].get_suptitle()
+    drawn = drawn_twice(shown, film.WIDE, shown.height)
+    assert np.abs(drawn.pictures[0].astype(int) - drawn.pictures[2]).max() > 100
+    assert drawn.differs < 2e-3
+    assert {artist.axes for artist in drawn.moving} == set(drawn.figure.axes)
+    assert "20 times as large" in drawn.figure.subfigs[0].get_suptitle()
 
 
 def test_a_building_of_matrices_shows_nodes_and_links(tmp_path):
