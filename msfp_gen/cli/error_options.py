@@ -54,7 +54,7 @@ class ErrorTarget:
 
         others: values of the options that cannot be combined with --error.
         """
-        from msfp_gen.studies.accuracy.error_target import BUDGET
+        from msfp_gen.studies.accuracy.error_target import BUDGET, check_target
 
         if error is None:
             for name, given in (("--explain", explain), ("--budget", budget is not None)):
@@ -64,7 +64,9 @@ class ErrorTarget:
         for name, value in others.items():
             if value is not None:
                 raise InputError(f"--error = {error:g}: cannot be combined with {name}; give one of them")
-        return cls(error, explain, BUDGET if budget is None else budget)
+        found = cls(error, explain, BUDGET if budget is None else budget)
+        check_target(found.error, found.budget)
+        return found
 
     def simulate(self, scene: Scene) -> Within:
         """Run the scene to the requested error."""

@@ -92,6 +92,14 @@ class Within:
         }
 
 
+def check_target(error: float, budget: float) -> None:
+    """Raise InputError for a relative error [-] or a wall time of the search [s] out of range."""
+    if not 1e-8 <= error < 1:
+        raise InputError(f"error = {error:g}: give a share such as 0.5% or 0.005, from 1e-8 to below 1")
+    if not 0 < budget < float("inf"):
+        raise InputError(f"budget = {budget:g}: give seconds above zero")
+
+
 def simulate_within(
     scene: Scene, error: float, *, budget: float = BUDGET, explain: bool = False, progress: Progress | None = None
 ) -> Within:
@@ -109,10 +117,7 @@ def simulate_within(
         InputError: an error or a budget out of range.
         RunError: the error is not reached within the budget, or the runs fail.
     """
-    if not 1e-8 <= error < 1:
-        raise InputError(f"error = {error:g}: give a share such as 0.5% or 0.005, from 1e-8 to below 1")
-    if not 0 < budget < float("inf"):
-        raise InputError(f"budget = {budget:g}: give seconds above zero")
+    check_target(error, budget)
     begin = time.perf_counter()
     effects, effect_reasons = effects_for(scene, error)
     scene = replace(scene, effects=effects)

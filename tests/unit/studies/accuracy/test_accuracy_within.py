@@ -264,3 +264,10 @@ def test_a_bearing_without_rims_is_compared_without_them():
     bodies = [replace(body, rim_radius=0.0) for body in scene.bearing.bodies]
     bare = replace(scene, bearing=replace(scene.bearing, bodies=bodies), effects=Auto(rims=False))
     assert with_all_effects(bare).effects.rims is False and with_all_effects(scene) is scene
+
+
+def test_a_wrong_error_is_refused_before_a_model_is_built(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("MSFP_GEN_CACHE", str(tmp_path / "cache"))
+    assert main(["run", "fenz-test2", "--error", "0"]) == 2
+    assert capsys.readouterr().err == "error: error = 0: give a share such as 0.5% or 0.005, from 1e-8 to below 1\n"
+    assert not (tmp_path / "cache").exists()
