@@ -1,9 +1,8 @@
 """Run a scene to a requested error: find the cheapest tolerance that meets it on this scene.
 
-The error of a run at one tolerance is estimated by comparison with a reference run that does not share its mistakes: by
-a method of another family, at a tenth of the tolerance, with steps of at most half the mean step of the run, and where
-that is affordable with steps that resolve the ringing of stuck sliders. SAFETY covers the error of the reference run
-itself; docs/accuracy.md compares such estimates with true errors.
+The error is estimated by a reference run of a method of another family, at a tenth of the tolerance, with steps of at
+most half the mean step, and where affordable with steps that resolve the ringing of stuck sliders. SAFETY covers
+the error of the reference run; docs/accuracy.md compares such estimates with true errors.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ SAFETY = 1.5  # factor on the difference from the reference run, which has an er
 DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
-METHODS_BY_TARGET: tuple[tuple[float, str], ...] = ((0.0, "implicit"),)  # (least target, method); the first that fits
+METHOD = "implicit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ class Within:
 
 
 def check_target(error: float, budget: float) -> None:
-    """Raise InputError for a relative error [-] or a wall time of the search [s] out of range."""
+    """Raise InputError for an error [-] or a time of the search [s] out of range."""
     if not 1e-8 <= error < 1:
         raise InputError(f"error = {error:g}: give a share such as 0.5% or 0.005, from 1e-8 to below 1")
     if not 0 < budget < float("inf"):
@@ -121,19 +120,17 @@ def simulate_within(
     begin = time.perf_counter()
     effects, effect_reasons = effects_for(scene, error)
     scene = replace(scene, effects=effects)
-    method = next(name for least, name in METHODS_BY_TARGET if error >= least)
-    search = _Search(scene, method, error, begin + budget)
+    search = _Search(scene, METHOD, error, begin + budget)
     try:
         index = search.loosest()
     except _ModelErrorTooLargeError as failure:
         scene, effect_reasons = with_all_effects(scene), f"all effects: {effect_reasons}; but {failure}"
-        search = _Search(scene, method, error, begin + budget)
+        search = _Search(scene, METHOD, error, begin + budget)
         index = search.loosest()
     index = search.cheapest(index)
     result = simulate(replace(scene, solver=search.solver(index)), progress=progress)
     chosen = replace(search.attempt(index), seconds=result.counters.wall_time)
-    # Runs of the search write many rows, so their wall time is not that of a plain run: scale by iterations instead.
-    seconds_per_iteration = chosen.seconds / max(chosen.newton, 1)
+    seconds_per_iteration = chosen.seconds / max(chosen.newton, 1)  # runs of the search write more rows than this one
     tighter = search.next_step(index)
     reasons = (effect_reasons, *search.reasons(index), *(dopri5_cost(scene) if explain else ()))
     within = Within(
