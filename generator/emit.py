@@ -77,7 +77,9 @@ def jacobian(kernel: Kernel) -> tuple[tuple[str, ...], tuple[tuple[int, str], ..
 def arguments(kernel: Kernel) -> Iterator[Argument]:
     """The input arrays of a kernel, with what is loaded from each."""
     used = {s.name for st in (*kernel.values, *kernel.partials) for s in st.expression.free_symbols}
-    used |= {s.name for e in kernel.program.results.values() for s in e.free_symbols}
+    used |= {s.name for t in kernel.tangents for partial, _ in t.terms for s in partial.free_symbols}
+    if kernel.program.stored:
+        used |= {s.name for e in kernel.program.results.values() for s in e.free_symbols}
     sources = {s.name for t in kernel.tangents for _, s in t.terms}
     sources |= {s.name for n in kernel.program.tangents for s in kernel.program.results[n].free_symbols}
     for use in kernel.program.inputs:
@@ -129,7 +131,7 @@ def function(kernel: Kernel) -> Function:
         values=tuple(f"{s.target} = {to_c(s.expression)}" for s in kernel.values),
         partials=tuple(f"{s.target} = {to_c(s.expression)}" for s in kernel.partials),
         tangents=tuple(f"d_{t.target} = {tangent_sum(t.terms)}" for t in kernel.tangents),
-        stores=tuple((index[name], to_c(e), name) for name, e in program.results.items()),
+        stores=tuple((index[name], to_c(e), name) for name, e in program.results.items() if program.stored),
         tangent_stores=tuple(
             (index[n], linear(program.results[n], moving)) for n in program.results if n in program.tangents
         ),

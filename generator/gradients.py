@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from .program import Program, Use
+import sympy as sp
+
+from .program import Program, Statement, Use
 
 COLUMNS = 4
 """Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
@@ -19,31 +21,50 @@ CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "mu")
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
 friction and the coefficient of a friction law."""
-DIFFERENTIATED = (
-    "arms",
-    "forward",
-    "surface_local",
-    "moment_to_world",
-    "interface_force",
-    "angular_balance",
-    "body_energy",
-    "top_wrench",
-    "foot",
-    "top_energy",
-    "gap",
-    "rim",
-)
+DIFFERENTIATED = {
+    "forward": True,
+    "surface_local": True,
+    "moment_to_world": True,
+    "interface_force": True,
+    "angular_balance": False,
+    "body_energy": False,
+    "top_wrench": False,
+    "foot": True,
+    "top_energy": False,
+    "gap": True,
+    "rim": True,
+}
+"""Programs that are differentiated, and whether the block of their results is at hand where this is done."""
 
 
 def _with_all_inputs(use: Use) -> Use:
     return replace(use, active=frozenset(field.name for field in use.block.fields), moving=True)
 
 
-def directional(program: Program) -> Program:
-    """The program with all inputs active; the derivative of every result is emitted."""
+def directional(program: Program, at_hand: bool) -> Program:
+    """The program with all inputs active; the derivative of every result is emitted.
+
+    at_hand: the results themselves are read, as a block `out`, where the derivatives contain them.
+    """
+    assert program.output is not None
     inputs = [_with_all_inputs(use) for use in program.inputs]
-    name, results = f"{program.name}_direction", frozenset(program.results)
-    return replace(program, name=name, inputs=inputs, tangents=results, columns="MSFP_COLUMNS", lanes=False)
+    names: dict[sp.Expr, sp.Expr] = {}
+    if at_hand:
+        inputs.append(program.output)
+        for field, result in program.results.items():
+            if result.is_Symbol:
+                names.setdefault(result, sp.Symbol(f"{program.output.alias}_{field}", real=True))
+    return replace(
+        program,
+        name=f"{program.name}_direction",
+        inputs=inputs,
+        statements=[Statement(s.target.xreplace(names), s.expression.xreplace(names)) for s in program.statements],
+        results={field: result.xreplace(names) for field, result in program.results.items()},
+        tangents=frozenset(program.results),
+        columns="MSFP_COLUMNS",
+        lanes=False,
+        stored=False,
+    )
 
 
 def by_inputs(program: Program) -> Program:
@@ -78,6 +99,6 @@ def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:
     """The directional derivatives that a model with gradients uses, in the order of its programs."""
     for program in programs:
         if program.name in DIFFERENTIATED:
-            yield directional(program)
+            yield directional(program, DIFFERENTIATED[program.name])
         if program.name == "contact":
             yield by_inputs(program)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -108,9 +108,11 @@ def jacobian_column(kernel: Kernel, source: sp.Symbol) -> tuple[tuple[Statement,
 
 def lower(program: Program) -> Kernel:
     """Leave out statements that no result needs, and differentiate the others one by one."""
-    values = needed_statements(program.statements, {s for e in program.results.values() for s in e.free_symbols})
+    results = {s for e in program.results.values() for s in e.free_symbols}
+    values = needed_statements(program.statements, results)
     if not program.tangents:
         return Kernel(program, values, (), ())
+    functions = {s.expression: s.target for s in program.statements if s.expression.is_Function}
     targets = {s for name in program.tangents for s in program.results[name].free_symbols}
     active = active_inputs(program)  # symbols with a nonzero tangent
     partials: list[Statement] = []
@@ -118,7 +120,7 @@ def lower(program: Program) -> Kernel:
     for statement in needed_statements(program.statements, targets):
         terms = []
         for source in sorted(statement.expression.free_symbols & active, key=str):
-            partial = sp.diff(statement.expression, source)
+            partial = sp.diff(statement.expression, source).xreplace(functions)
             if partial == 0:
                 continue
             if not (partial.is_Number or partial.is_Symbol or (-partial).is_Symbol):
@@ -129,7 +131,17 @@ def lower(program: Program) -> Kernel:
         if terms:
             active.add(statement.target)
             tangents.append(Tangent(statement.target, tuple(terms)))
-    return Kernel(program, values, *needed_tangents(partials, tangents, targets))
+    kernel = Kernel(program, values, *needed_tangents(partials, tangents, targets))
+    return kernel if program.stored else replace(kernel, values=values_of_tangents(kernel))
+
+
+def values_of_tangents(kernel: Kernel) -> tuple[Statement, ...]:
+    """Statements on which the tangents depend, but for those whose target is an input."""
+    inputs = {sp.Symbol(f"{use.alias}_{f.name}", real=True) for use in kernel.program.inputs for f in use.block.fields}
+    partials = [partial for tangent in kernel.tangents for partial, _ in tangent.terms]
+    partials += [statement.expression for statement in kernel.partials]
+    computed = [statement for statement in kernel.program.statements if statement.target not in inputs]
+    return needed_statements(computed, {s for partial in partials for s in partial.free_symbols})
 
 
 def needed_tangents(

@@ -134,6 +134,8 @@ class Program:
     """C constant with the number of columns of the tangent."""
     lanes: bool = False
     """Whether C evaluates it for all surfaces at once (SIMD) and takes its Jacobian with respect to its inputs."""
+    stored: bool = True
+    """Whether the results are stored. Where only their tangents are, a statement whose target is an input is read."""
     rates: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _definitions: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     _count: int = 0

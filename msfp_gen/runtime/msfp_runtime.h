@@ -33,6 +33,12 @@ extern "C" {
 #define MSFP_INLINED
 #endif
 #define MSFP_INLINE MSFP_INLINED static inline
+/* Before a loop of constant length, whose constants the compiler then uses. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define MSFP_UNROLL _Pragma("GCC unroll 32")
+#else
+#define MSFP_UNROLL
+#endif
 
 /* As many numbers as the vector registers of most processors hold. */
 #ifdef __GNUC__

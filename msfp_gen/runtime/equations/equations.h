@@ -222,6 +222,9 @@ double msfp_prescribed_power(const msfp_parameters *p, const msfp_point *at, con
 /* Kinetic and potential energy and that of all springs but friction [J]. */
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical);
+/* Evaluate the equations at a state outside of a step; fills seed and g, the friction force over -mu N. */
+void msfp_evaluate_state(const msfp_parameters *p, const msfp_point *at, msfp_seed *seed, msfp_work *w,
+                         double g[MSFP_NB][2]);
 /* Fill a row from the evaluation in `w`. */
 void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,
                  msfp_row *row);

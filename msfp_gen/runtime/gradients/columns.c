@@ -40,46 +40,39 @@ MSFP_INLINE void put_coordinates(double *block, msfp_columns *const q, msfp_colu
 {
     msfp_columns *const orders[3] = { q, v, a };
     for (int order = 0; order < 3; ++order)
-        for (int i = 0; i < (MSFP_PLANAR ? 1 : 3); ++i)
-            memcpy(block + msfp_coordinate_field(order, i) * C, orders[order][MSFP_PLANAR ? 1 : i], sizeof *q);
+        memcpy(block + msfp_coordinate_field(order, 0) * C, orders[order] + (MSFP_PLANAR ? 1 : 0),
+               (MSFP_PLANAR ? 1 : 3) * sizeof *q);
 }
 
-/* Whether all of `count` numbers are zero. */
-MSFP_INLINE int all_zero(const double *values, int count)
-{
-    double sum = 0.0;
-    for (int i = 0; i < count; ++i)
-        sum += fabs(values[i]);
-    return sum == 0.0;
-}
+static const msfp_columns no_motion[3][6]; /* columns of a base that a parameter does not move */
 
-/* Columns of the base plate, which most parameters do not change. */
-MSFP_INLINE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+/* Columns of the base plate. */
+static MSFP_WIDE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
-    double below[MSFP_BODY_SIZE], dbelow[MSFP_BODY_SIZE * C] = { 0 }, out[MSFP_BODY_SIZE];
+    double below[MSFP_BODY_SIZE], dbelow[MSFP_BODY_SIZE * C] = { 0 };
     msfp_columns(*base)[6] = (msfp_columns(*)[6])dat->base;
-    put_coordinates(d->x[0], base[0] + 3, base[1] + 3, base[2] + 3);
-    if (all_zero(dat->base[0][0], 18 * C) && all_zero(dp->body[0], MSFP_BODY_PARAMETERS_SIZE * C)) {
-        memset(d->body[0], 0, sizeof d->body[0]);
-        return;
-    }
     msfp_inertial_frame(at, below);
     put_polar(dbelow + MSFP_BODY_CX * C, base[0]);
     put_polar(dbelow + MSFP_BODY_VX * C, base[1]);
     put_polar(dbelow + MSFP_BODY_AX * C, base[2]);
-    msfp_forward_direction(p->body[0], below, w->x[0], out, dp->body[0], dbelow, d->x[0], d->body[0]);
+    msfp_forward_direction(p->body[0], below, w->x[0], w->body[0], dp->body[0], dbelow, d->x[0],
+                           d->body[0]);
 }
 
 MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                        const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
-    double out[MSFP_BODY_SIZE];
-    base_plate(p, dp, at, dat, w, d);
+    put_coordinates(d->x[0], (msfp_columns *)dat->base[0] + 3, (msfp_columns *)dat->base[1] + 3,
+                    (msfp_columns *)dat->base[2] + 3);
+    if (memcmp(dat->base, no_motion, sizeof no_motion) || memcmp(dp->body[0], no_motion, sizeof dp->body[0]))
+        base_plate(p, dp, at, dat, w, d);
+    else /* most parameters do not change it */
+        memset(d->body[0], 0, sizeof d->body[0]);
     for (int k = 1; k <= NB; ++k) {
         put_coordinates(d->x[k], (msfp_columns *)dat->q[k - 1], (msfp_columns *)dat->v[k - 1],
                         (msfp_columns *)dat->a[k - 1]);
-        msfp_forward_direction(p->body[k], w->body[k - 1], w->x[k], out, dp->body[k], d->body[k - 1], d->x[k],
+        msfp_forward_direction(p->body[k], w->body[k - 1], w->x[k], w->body[k], dp->body[k], d->body[k - 1], d->x[k],
                                d->body[k]);
     }
 }
@@ -111,7 +104,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
 {
     double force[FORCE], moment[MOMENT], dforce[FORCE * C], dmoment[MOMENT * C];
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
-    double wrench[MSFP_TOP_WRENCH_SIZE], dwrench[MSFP_TOP_WRENCH_SIZE * C];
+    double dwrench[MSFP_TOP_WRENCH_SIZE * C];
     msfp_force_F_put(force, at->load);
     msfp_moment_M_put(moment, at->load + 3);
     put_polar(dforce, (msfp_columns *)dat->load);
@@ -122,8 +115,8 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
     double upright[MSFP_UPRIGHT_SIZE], dupright[MSFP_UPRIGHT_SIZE * C] = { 0 }; /* as prescribed */
     msfp_support_axis(at, upright);
 #endif
-    msfp_top_wrench_direction(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench,
-                              dp->top, dstage, d->body[NB], d->x[NB], dforce,
+    msfp_top_wrench_direction(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), dp->top,
+                              dstage, d->body[NB], d->x[NB], dforce,
                               dmoment MSFP_IF_TOP_ROTATION(dupright), dwrench);
     memcpy(d->force[NB], dwrench, sizeof d->force[NB]);
     memcpy(d->moment[NB], dwrench + FORCE * C, sizeof d->moment[NB]);
@@ -132,11 +125,11 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
 MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                  const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
-    double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C], foot[MSFP_FOOT_SIZE];
+    double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
     if (msfp_top_is_sprung(p)) {
         msfp_foot_stage(p, at, stage);
         foot_stage(p, dp, dat, stage, dstage);
-        msfp_foot_direction(p->top, w->body[NB], stage, foot, dp->top, d->body[NB], dstage, d->foot);
+        msfp_foot_direction(p->top, w->body[NB], stage, w->foot, dp->top, d->body[NB], dstage, d->foot);
     } else {
         memcpy(d->foot + MSFP_FOOT_Y * C, d->body[NB] + MSFP_BODY_CZ * C, C * sizeof(double));
         memcpy(d->foot + MSFP_FOOT_Y1 * C, d->body[NB] + MSFP_BODY_VZ * C, C * sizeof(double));
@@ -151,14 +144,14 @@ MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp,
 #if MSFP_RIMS
     if (!w->rim_active[j])
         return;
-    double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C], out[MSFP_RIM_SIZE];
+    double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < MSFP_PAIR; ++i) {
             const int field = msfp_coordinate_field(order, i), to = order * MSFP_PAIR + i;
             x[to] = w->x[j + 1][field];
             memcpy(dx + to * C, d->x[j + 1] + field * C, C * sizeof *dx);
         }
-    msfp_rim_direction(p->surface[j], x, out, dp->surface[j], dx, d->rim[j]);
+    msfp_rim_direction(p->surface[j], x, w->rim[j], dp->surface[j], dx, d->rim[j]);
 #else
     (void)p;
     (void)dp;
@@ -170,27 +163,27 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
                                       const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
                                       const msfp_slopes *slopes, int all, msfp_work_columns *d)
 {
-    double out[MSFP_BODY_SIZE], moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
+    double moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
     kinematics(p, dp, at, dat, w, d);
     top(p, dp, at, dat, w, d);
     msfp_foot_columns(p, dp, at, dat, w, d);
     for (int j = NB - 1; j >= 0; --j)
-        msfp_interface_force_direction(p->body[j + 1], w->body[j + 1], w->force[j + 1], out, dp->body[j + 1],
-                                       d->body[j + 1], d->force[j + 1], d->force[j]);
+        msfp_interface_force_direction(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j],
+                                       dp->body[j + 1], d->body[j + 1], d->force[j + 1], d->force[j]);
     for (int j = 0; j < NB; ++j) {
         rim(p, dp, w, j, d);
-        msfp_surface_local_direction(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], out,
-                                     d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], d->rim[j],
+        msfp_surface_local_direction(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j],
+                                     w->local[j], d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], d->rim[j],
                                      d->local[j]);
         msfp_contact_columns(p, dp, seed, dat, w, slopes, j, all, d);
         msfp_surface_moment(w, j, moment);
         for (int i = 0; i < MOMENT * C; ++i)
             dmoment[i] = d->contact[j][i] + d->rim[j][FORCE * C + i];
-        msfp_moment_to_world_direction(w->body[j], moment, out, d->body[j], dmoment, d->moment[j]);
+        msfp_moment_to_world_direction(w->body[j], moment, w->moment[j], d->body[j], dmoment, d->moment[j]);
     }
     for (int k = 1; k <= NB; ++k) {
         msfp_angular_balance_direction(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k],
-                                       w->moment[k], out, dp->body[k], d->body[k], d->force[k - 1], d->moment[k - 1],
+                                       w->moment[k], dp->body[k], d->body[k], d->force[k - 1], d->moment[k - 1],
                                        d->force[k], d->moment[k], dangular);
         memcpy(d->residual[(k - 1) * ND], dangular, NA * sizeof(msfp_columns));
         memset(d->lock[k - 1], 0, sizeof d->lock[k - 1]);

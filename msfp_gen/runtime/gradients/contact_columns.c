@@ -197,7 +197,7 @@ MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *se
 }
 
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent)
+                             double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent)
 {
     enum { SIZE = MSFP_LOCAL_SIZE * LANES };
     int closed_form = 0;
@@ -208,7 +208,7 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     const int status = closed_form ? msfp_surfaces(p, w, seed, g, &w->jacobians) : MSFP_OK;
     if (status)
         return status;
-    msfp_contact_slopes(p, seed, w, (const double(*)[2])g, 0, slopes);
+    msfp_contact_slopes(p, seed, w, (const double(*)[2])g, all, slopes);
     for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r) /* row MOMENT, that of N, does not enter the tangent */
         memcpy(w->jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
                SIZE * sizeof(double));
@@ -216,24 +216,49 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     return MSFP_OK;
 }
 
+/* Columns of the first `rows` results of the contact of surface j from those of `count` inputs. */
+MSFP_INLINE void results_columns(const msfp_slopes *slopes, const double *const *inputs, int count, int rows, int j,
+                                 double *contact)
+{
+    for (int r = 0; r < rows; ++r) {
+        double sum[C];
+        MSFP_UNROLL
+        for (int i = 0; i < count; ++i)
+            for (int c = 0; c < C; ++c)
+                sum[c] = (i ? sum[c] : 0.0) + slopes->of[r][i][j] * inputs[i][c];
+        memcpy(contact + result[r] * C, sum, sizeof sum);
+    }
+}
+
+/* The columns of surface j; inlined for each number of results. */
+MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
+                                 const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
+                                 int rows, msfp_work_columns *d)
+{
+    double dstage[MSFP_STAGE_SIZE * C], unknowns[UNKNOWNS * C] = { 0 };
+    const double *const blocks[] = { dp->surface[j], dstage, d->local[j], unknowns }, *inputs[INPUTS];
+    MSFP_UNROLL
+    for (int i = 0; i < INPUTS; ++i)
+        inputs[i] = blocks[input[i].block] + input[i].index * C;
+#if MSFP_CLOSED_FORM
+    if (seed->closed_form) {
+        closed_form(p, dp, seed, dat, w, d, j, dstage, unknowns);
+        results_columns(slopes, inputs, INPUTS, rows, j, d->contact[j]);
+        return;
+    }
+#endif
+    (void)w;
+    stage_columns(p, dp, seed, dat, j, dstage);
+    results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
+}
+
 MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
                                     const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
                                     int all, msfp_work_columns *d)
 {
-    double dstage[MSFP_STAGE_SIZE * C] = { 0 }, columns[INPUTS * C];
-    const double *blocks[] = { dp->surface[j], dstage, d->local[j] };
-    int count = GIVEN;
-#if MSFP_CLOSED_FORM
-    if (seed->closed_form) {
-        closed_form(p, dp, seed, dat, w, d, j, dstage, columns + GIVEN * C);
-        count = INPUTS;
-    } else
-#endif
-        stage_columns(p, dp, seed, dat, j, dstage);
-    (void)w;
-    for (int i = 0; i < GIVEN; ++i)
-        memcpy(columns + i * C, blocks[input[i].block] + input[i].index * C, C * sizeof *columns);
-    for (int r = 0; r < (all ? RESULTS : FEW); ++r)
-        msfp_combine_columns(&slopes->of[r][0][j], LANES, columns, count, d->contact[j] + result[r] * C);
+    if (all)
+        contact_columns(p, dp, seed, dat, w, slopes, j, RESULTS, d);
+    else
+        contact_columns(p, dp, seed, dat, w, slopes, j, FEW, d);
 }
 #endif

@@ -129,21 +129,32 @@ void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
     memcpy(&run->gradients->trail.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
 }
 
-void msfp_gradients_rows(msfp_run *run, const msfp_row *rows)
+void msfp_gradients_node(msfp_run *run, int index, const msfp_observation *o, const msfp_row *row)
 {
     if (!run->gradients)
         return;
-    memcpy(run->gradients->recording.value, rows, (size_t)(run->node_count + 2) * sizeof *rows);
-    run->gradients->recording.known = 1;
+    msfp_recording *r = &run->gradients->recording;
+    r->value[index] = *row;
+    memcpy(&r->node[index], o, offsetof(msfp_observation, work) + offsetof(msfp_work, dx)); /* without derivatives */
+    r->sloped[index] = 0;
+    r->known = index == run->node_count + 1;
 }
 
 void msfp_gradients_before_step(msfp_run *run)
 {
     if (!run->gradients)
         return;
-    run->gradients->recording.known = run->gradients->recording.observed = 0;
+    run->gradients->recording.known = 0;
     run->gradients->extremes = run->extremes;
     run->gradients->outward_rate = run->outward_rate;
+}
+
+/* Whether the row of the end of the step enters what is recorded. */
+static int end_is_recorded(const msfp_run *run)
+{
+    const struct msfp_gradients *g = run->gradients;
+    return msfp_is_quasistatic(run) || run->row_count > g->row_count ||
+           memcmp(&run->extremes, &g->extremes, sizeof g->extremes) != 0;
 }
 
 /* Factored tangents of the stages of the step, at the evaluations that solved them. */
@@ -151,11 +162,12 @@ static int factorise(msfp_run *run)
 {
     msfp_trail *trail = &run->gradients->trail;
     const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
-    trail->all_slopes = 0;
+    trail->all_slopes = end_is_recorded(run);
     for (int i = 1; i <= last; ++i) {
         msfp_stage *s = &trail->stage[i];
-        const int status = msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
-                                                    &trail->slopes[i], trail->factors[i]);
+        const int status =
+            msfp_tangent_with_slopes(&run->parameters, &s->at, &s->seed, &trail->work[i], s->g,
+                                     i == last && trail->all_slopes, &trail->slopes[i], trail->factors[i]);
         if (status)
             return status;
         if (msfp_lu(trail->factors[i], DOF, trail->pivots[i]) == 0)

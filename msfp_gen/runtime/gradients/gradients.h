@@ -59,9 +59,10 @@ void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_colum
 /* g: the friction force over -mu N; all: as of msfp_condensed_columns. */
 void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                          const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
-/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts. Returns a status. */
+/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts; all: as of
+ * msfp_condensed_columns. Returns a status. */
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
-                             double g[MSFP_NB][2], msfp_slopes *slopes, double *tangent);
+                             double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent);
 /* Columns of the contact of surface j, after those of its local block; all: as of msfp_condensed_columns. */
 void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
                           const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j, int all,
@@ -114,26 +115,18 @@ typedef struct {
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;
 
-/* The evaluation of a state that is observed; for all groups. */
-typedef struct {
-    msfp_point at;
-    msfp_seed seed;
-    msfp_work work;
-    msfp_slopes slopes;
-    double g[MSFP_NB][2];
-} msfp_observation;
-
-/* Rows at the ends of the last step and at its interpolation nodes, with the evaluations at these nodes; and columns of
- * one group. */
+/* Rows at the start of the last step, at its interpolation nodes and at its end, with the evaluations there; and columns
+ * of one group. */
 typedef struct {
     msfp_row value[MSFP_NODES + 2];
-    int known; /* whether `value` is */
-    msfp_observation node[MSFP_NODES];
-    int observed; /* whether `node` is */
+    msfp_observation node[MSFP_NODES + 2];
+    msfp_slopes slopes[MSFP_NODES + 2];
+    int known, sloped[MSFP_NODES + 2]; /* whether `value` and `node`, and one of `slopes`, are */
     msfp_row_columns d[MSFP_NODES + 2], row;
     int columns_known; /* whether `d` is */
     msfp_columns contributed[sizeof(msfp_extremes) / sizeof(double)]; /* of a row to the extremes */
     msfp_observation own;
+    msfp_slopes own_slopes;
     msfp_work_columns work;
 } msfp_recording;
 

@@ -20,14 +20,14 @@ MSFP_INLINE void get_polar(const double *block, msfp_columns *vector)
         memcpy(vector[MSFP_PLANAR ? 2 * i : i], block + i * C, sizeof *vector);
 }
 
-/* Sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the centre,
+/* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the centre,
  * where its columns are zero. */
 MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
-                        msfp_columns *gap)
+                             const double *sliding, msfp_columns *gap)
 {
-    double out[MSFP_GAP_SIZE], d[MSFP_GAP_SIZE * C];
-    msfp_gap_direction(par, above, out, dpar, dabove, d);
-    const int centred = out[MSFP_GAP_S] == 0.0;
+    double d[MSFP_GAP_SIZE * C];
+    msfp_gap_direction(par, above, sliding, dpar, dabove, d);
+    const int centred = sliding[MSFP_GAP_S] == 0.0;
     for (int c = 0; c < C; ++c) {
         gap[MSFP_GAP_S][c] = centred ? 0.0 : d[MSFP_GAP_S * C + c];
         gap[MSFP_GAP_G][c] = dpar[MSFP_SURFACE_PARAMETERS_SC * C + c] - gap[MSFP_GAP_S][c];
@@ -37,7 +37,7 @@ MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double
 MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
                        msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
+    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 }, sliding[MSFP_GAP_SIZE];
     for (int j = 0; j < NB; ++j) {
         body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
         body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
@@ -53,7 +53,8 @@ MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_
             d[MSFP_BODY_CP * C + c] = -body[MSFP_BODY_SP] * dq[j][0][c];
         }
 #endif
-        gap_columns(p->surface[j], dp->surface[j], body, d, gaps[j]);
+        msfp_gap(p->surface[j], body, sliding);
+        gap_columns(p->surface[j], dp->surface[j], body, d, sliding, gaps[j]);
     }
 }
 
@@ -62,7 +63,7 @@ MSFP_INLINE void mechanical(const msfp_parameters *p, const msfp_parameter_colum
                        const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                        msfp_columns *row)
 {
-    double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C], out[MSFP_ENERGY_SIZE];
+    double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C];
     double one[MSFP_ENERGY_SIZE * C];
     static const int first[3] = { MSFP_BASE_MOTION_OX, MSFP_BASE_MOTION_UX, MSFP_BASE_MOTION_BX };
     msfp_base_motion_O_put(base, at->base[0]);
@@ -75,9 +76,9 @@ MSFP_INLINE void mechanical(const msfp_parameters *p, const msfp_parameter_colum
     memset(row[MSFP_ROW_POTENTIAL], 0, sizeof *row);
     for (int k = 1; k <= NB + 1; ++k) {
         if (k <= NB)
-            msfp_body_energy_direction(p->body[k], w->body[k], base, out, dp->body[k], d->body[k], dbase, one);
+            msfp_body_energy_direction(p->body[k], w->body[k], base, dp->body[k], d->body[k], dbase, one);
         else
-            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, out, dp->top, d->body[NB], dbase, d->foot,
+            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, dp->top, d->body[NB], dbase, d->foot,
                                       one);
         for (int c = 0; c < C; ++c) {
             row[MSFP_ROW_KINETIC][c] += one[MSFP_ENERGY_KINETIC * C + c];
@@ -166,11 +167,11 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
         row[MSFP_ROW_MU + j][c] = dcontact[MSFP_CONTACT_MU * C + c];
 #endif
     }
-    gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], gap);
+    msfp_gap(p->surface[j], w->body[j + 1], sliding);
+    gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], sliding, gap);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
     get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
-    msfp_gap(p->surface[j], w->body[j + 1], sliding);
     if (MSFP_RIMS && sliding[MSFP_GAP_G] < 0.0)
         rim_energy(p->surface[j], dp->surface[j], sliding[MSFP_GAP_G], gap[MSFP_GAP_G], row[MSFP_ROW_RIM_STORED]);
 }

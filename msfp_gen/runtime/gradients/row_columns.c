@@ -9,24 +9,9 @@
 #if MSFP_GRADIENTS
 enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
 
-/* Evaluate the equations at a state, for its columns. */
-static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o)
-{
-    double residual[MSFP_DOF];
-    memset(&o->seed, 0, sizeof o->seed);
-    msfp_to_point(run, s, &o->at);
-    memcpy(o->seed.fp, o->at.f, sizeof o->seed.fp);
-    memcpy(o->g, o->at.f, sizeof o->g);
-#if MSFP_LAW
-    memset(o->work.coefficient, 0, sizeof o->work.coefficient);
-#endif
-    msfp_condensed(&run->parameters, &o->at, &o->seed, &o->work, o->g, residual, NULL);
-    msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &o->slopes);
-}
-
 /* Columns of the row of an observed state. */
-static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, double t,
-                             const msfp_state_columns *ds, msfp_row_columns d)
+static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, const msfp_slopes *slopes,
+                             double t, const msfp_state_columns *ds, msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
     msfp_work_columns *dw = &run->gradients->recording.work;
@@ -38,40 +23,45 @@ static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observ
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, &o->slopes, 1, dw);
+    msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, slopes, 1, dw);
     msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
 }
 
 void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
                           msfp_row_columns d)
 {
-    observe(run, s, &run->gradients->recording.own);
-    observed_columns(run, group, &run->gradients->recording.own, s->t, ds, d);
+    const msfp_parameters *p = &run->parameters;
+    msfp_observation *o = &run->gradients->recording.own;
+    msfp_slopes *slopes = &run->gradients->recording.own_slopes;
+    msfp_to_point(run, s, &o->at);
+    msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
+    msfp_contact_slopes(p, &o->seed, &o->work, (const double(*)[2])o->g, 1, slopes);
+    observed_columns(run, group, o, slopes, s->t, ds, d);
 }
 
-/* Rows at the ends and nodes of the step, and evaluations at its nodes, unless they are there. */
-static void observe_nodes(msfp_run *run, msfp_recording *r)
+/* Columns of row `index` of those at the start of the step and at its nodes, at the state with the columns ds. */
+static void node_columns(msfp_run *run, msfp_group *group, int index, double t, const msfp_state_columns *ds,
+                         msfp_row_columns d)
 {
-    msfp_state s;
-    msfp_row row;
-    if (!r->known)
-        msfp_row_inside(run, 1.0, &row); /* which gives them to msfp_gradients_rows */
-    for (int i = 0; i < run->node_count && !r->observed; ++i) {
-        msfp_interpolate(run, run->node[i].share, &s);
-        observe(run, &s, &r->node[i]);
-    }
-    r->observed = 1;
+    msfp_recording *r = &run->gradients->recording;
+    const msfp_observation *o = &r->node[index];
+    if (!r->sloped[index])
+        msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &r->slopes[index]);
+    r->sloped[index] = 1;
+    observed_columns(run, group, o, &r->slopes[index], t, ds, d);
 }
 
 void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
 {
     msfp_recording *r = &run->gradients->recording;
     const int last = run->node_count + 1;
+    msfp_row row;
     if (r->columns_known)
         return;
-    observe_nodes(run, r);
+    if (!r->known)
+        msfp_row_inside(run, 1.0, &row); /* which gives the rows to msfp_gradients_node */
     if (!group->start_known)
-        msfp_observe_columns(run, group, &run->now, &group->now, group->start_row);
+        node_columns(run, group, 0, run->now.t, &group->now, group->start_row);
     memcpy(r->d[0], group->start_row, sizeof group->start_row);
     for (int i = 1; i < last; ++i) {
         const double share = run->node[i - 1].share;
@@ -85,7 +75,7 @@ void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
             for (int d = 0; d < NQ; ++d)
                 for (int c = 0; c < C; ++c)
                     node->a[k][d][c] = (1.0 - share) * group->now.a[k][d][c] + share * group->next.a[k][d][c];
-        observed_columns(run, group, &r->node[i - 1], run->now.t + share * (run->next.t - run->now.t), node, r->d[i]);
+        node_columns(run, group, i, run->now.t + share * (run->next.t - run->now.t), node, r->d[i]);
     }
     msfp_row_reached_columns(run, group);
     memcpy(r->d[last], group->end_row, sizeof group->end_row);
@@ -118,6 +108,8 @@ static void limit_friction(const msfp_recording *rows, int count, const msfp_row
         double most = 1.0;
         const double size = msfp_hypot(row->f[j][0], row->f[j][1]);
         int at = -1;
+        if (size <= most)
+            continue;
         for (int r = 0; r < count; ++r)
             if (msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]) > most) {
                 most = msfp_hypot(rows->value[r].f[j][0], rows->value[r].f[j][1]);
@@ -162,6 +154,13 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
     }
 }
 
+/* sum += weight * numbers */
+MSFP_INLINE void weigh(const double *restrict numbers, double weight, int count, double *restrict sum)
+{
+    for (int i = 0; i < count; ++i)
+        sum[i] += weight * numbers[i];
+}
+
 MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
                                         msfp_row_columns d)
 {
@@ -169,24 +168,21 @@ MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double
     const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
-    double slopes[MSFP_NODES + 2], *value;
+    double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE] = { 0.0 };
+    msfp_columns moved; /* of the share */
     msfp_row blended;
     weight_slopes(run, share, slopes);
-    value = (double *)&blended;
-    for (int i = 0; i < MSFP_ROW_SIZE; ++i) {
-        double slope = 0.0;
-        value[i] = 0.0;
-        memset(d[i], 0, sizeof *d);
-        for (int r = 0; r < w.count; ++r) {
-            const double one = ((const double *)&rows->value[r])[i];
-            value[i] += w.of[r] * one;
-            slope += slopes[r] * one;
-            for (int c = 0; c < C; ++c)
-                d[i][c] += w.of[r] * rows->d[r][i][c];
-        }
-        for (int c = 0; c < C && moving; ++c)
-            d[i][c] -= slope * (group->now.t[c] + share * group->h[c]) / h;
+    memset(&blended, 0, sizeof blended);
+    memset(d, 0, sizeof(msfp_row_columns));
+    for (int r = 0; r < w.count; ++r) {
+        weigh((const double *)&rows->value[r], w.of[r], MSFP_ROW_SIZE, (double *)&blended);
+        weigh((const double *)&rows->value[r], slopes[r], MSFP_ROW_SIZE, slope);
+        weigh(rows->d[r][0], w.of[r], MSFP_ROW_SIZE * C, d[0]);
     }
+    for (int c = 0; c < C; ++c)
+        moved[c] = -(group->now.t[c] + share * group->h[c]) / h;
+    if (moving && msfp_any_column(moved))
+        msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     limit_friction(rows, w.count, &blended, d);
     restore_bounds(run, group, &blended, d);
 }

@@ -104,16 +104,18 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp
                              msfp_columns V[NB][NQ], msfp_point_columns *dat)
 {
     const double beta = stage->beta, inverse = 1.0 / beta;
-    for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < NQ; ++d)
-            for (int c = 0; c < C; ++c)
-                dat->q[k][d][c] = Q[k][d][c] + beta * dat->v[k][d][c] + dat->beta[c] * stage->at.v[k][d];
-        for (int i = 0; i < ND && stage->inertia > 0.0; ++i)
-            for (int c = 0; c < C; ++c) {
-                const int d = unknown[i];
-                dat->a[k][d][c] = (dat->v[k][d][c] - V[k][d][c] - dat->beta[c] * longer[k * NQ + d]) * inverse;
-            }
-    }
+    const int stretched = msfp_any_column(dat->beta);
+    memcpy(dat->q, Q, sizeof dat->q);
+    msfp_add_columns(dat->q[0], dat->v[0], beta, NB * NQ);
+    if (stretched)
+        msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);
+    memset(dat->a, 0, sizeof dat->a);
+    if (stage->inertia == 0.0)
+        return;
+    msfp_add_columns(dat->a[0], dat->v[0], inverse, NB * NQ);
+    msfp_add_columns(dat->a[0], V[0], -inverse, NB * NQ);
+    if (stretched)
+        msfp_add_scaled(dat->a[0], longer, dat->beta, -inverse, NB * NQ);
 }
 
 /* Solve stage i for the columns of its rates: group->point. group->work has the columns at constant rates. */
@@ -175,11 +177,12 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
     const msfp_columns *x = (const msfp_columns *)group->work.residual;
     msfp_friction_columns(&group->work, df, NULL);
     for (int j = 0; j < NB; ++j)
-        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d) {
+        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d)
             add_rates(w->dfriction[j][d], x, df[j][d]);
-            for (int c = 0; c < C; ++c)
-                f[j][d][c] = dat->f[j][d][c] + stage->beta * df[j][d][c] + dat->beta[c] * rates[j][d];
-        }
+    memcpy(f, dat->f, sizeof dat->f);
+    msfp_add_columns(f[0], df[0], stage->beta, 2 * NB);
+    if (msfp_any_column(dat->beta))
+        msfp_add_scaled(f[0], rates[0], dat->beta, 1.0, 2 * NB);
     const int sprung = msfp_top_is_sprung(&run->parameters);
     const int of_plate[3] = { MSFP_BODY_CZ, MSFP_BODY_VZ, MSFP_BODY_AZ };
     for (int i = 0; i < (sprung ? MSFP_BODY_SIZE : 3); ++i) {

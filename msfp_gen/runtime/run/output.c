@@ -6,14 +6,21 @@
 
 enum { NB = MSFP_NB };
 
-void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)
+static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o, msfp_row *row)
 {
-    msfp_point at;
-    msfp_work w;
-    msfp_to_point(run, s, &at);
-    msfp_observe(&run->parameters, &at, &w, row);
+    const msfp_parameters *p = &run->parameters;
+    msfp_to_point(run, s, &o->at);
+    msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
+    const msfp_mechanical mechanical = msfp_mechanical_energy(p, &o->at, &o->work);
+    msfp_record(p, &o->at, &o->work, &mechanical, row);
     row->time = s->t;
     memcpy(row->work, s->work, sizeof row->work);
+}
+
+void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row)
+{
+    msfp_observation o;
+    observe(run, s, &o, row);
 }
 
 /* The array with room for one more item; NULL where there is no memory. */
@@ -114,16 +121,16 @@ int msfp_write_now(msfp_run *run)
 /* Rows at the ends of the last step and at its interpolation nodes, where it has some. */
 static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
 {
-    msfp_state s;
-    if (!run->node_count)
-        return;
-    msfp_observe_state(run, &run->now, &rows[0]);
-    for (int i = 0; i < run->node_count; ++i) {
-        msfp_interpolate(run, run->node[i].share, &s);
-        msfp_observe_state(run, &s, &rows[i + 1]);
+    const int last = run->node_count + 1;
+    msfp_state inside;
+    msfp_observation o;
+    for (int i = 0; i <= last && run->node_count; ++i) {
+        const msfp_state *s = i == 0 ? &run->now : i == last ? &run->next : &inside;
+        if (s == &inside)
+            msfp_interpolate(run, run->node[i - 1].share, &inside);
+        observe(run, s, &o, &rows[i]);
+        MSFP_IF_GRADIENTS(msfp_gradients_node(run, i, &o, &rows[i]), (void)0);
     }
-    msfp_observe_state(run, &run->next, &rows[run->node_count + 1]);
-    MSFP_IF_GRADIENTS(msfp_gradients_rows(run, rows), (void)0);
 }
 
 /* The row at a share of the last step; rows: of its nodes. */

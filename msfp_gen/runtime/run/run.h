@@ -50,6 +50,13 @@ int msfp_classify_failure(msfp_run *run, int status);
 
 /* ---- output.c; writing returns MSFP_OK or MSFP_E_MEMORY ---- */
 
+/* The evaluation of a state outside of a step; g: the friction force over -mu N. */
+typedef struct {
+    msfp_point at;
+    msfp_seed seed;
+    double g[MSFP_NB][2];
+    msfp_work work;
+} msfp_observation;
 /* A row of a state. */
 void msfp_observe_state(msfp_run *run, const msfp_state *s, msfp_row *row);
 /* Displacement across the bearing less that at the start [3], [m]. */
@@ -83,8 +90,8 @@ double msfp_prescribed_step(const msfp_run *run);
 void msfp_gradients_before_step(msfp_run *run);
 int msfp_gradients_step(msfp_run *run, const double *before, const double *after);
 void msfp_gradients_accept(msfp_run *run);
-/* Rows at the ends of the last step and at its interpolation nodes. */
-void msfp_gradients_rows(msfp_run *run, const msfp_row *rows);
+/* Row `index` of those at the ends of the last step and at its interpolation nodes, with its evaluation. */
+void msfp_gradients_node(msfp_run *run, int index, const msfp_observation *o, const msfp_row *row);
 /* After a jump of the accelerations; after a last row of a run that was stopped. */
 int msfp_gradients_jump(msfp_run *run);
 int msfp_gradients_last_row(msfp_run *run);
