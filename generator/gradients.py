@@ -51,8 +51,9 @@ def directional(program: Program, at_hand: bool) -> Program:
     names: dict[sp.Expr, sp.Expr] = {}
     if at_hand:
         inputs.append(program.output)
+        computed = {statement.target for statement in program.statements}
         for field, result in program.results.items():
-            if result.is_Symbol:
+            if result in computed:
                 names.setdefault(result, sp.Symbol(f"{program.output.alias}_{field}", real=True))
     return replace(
         program,

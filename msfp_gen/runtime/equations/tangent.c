@@ -4,6 +4,9 @@
  * Columns are formed from the top down in body-fixed frames (generator/columns.py). A body above an unknown sees only
  * the variation of its angular velocity and acceleration, a body below only the variation of the interface force.
  */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* unrolls and vectorises the short loops over columns */
+#endif
 #include <string.h>
 #include "equations.h"
 #include "msfp_kernels.h"

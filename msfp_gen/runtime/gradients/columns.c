@@ -65,10 +65,13 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
 {
     put_coordinates(d->x[0], (msfp_columns *)dat->base[0] + 3, (msfp_columns *)dat->base[1] + 3,
                     (msfp_columns *)dat->base[2] + 3);
-    if (memcmp(dat->base, no_motion, sizeof no_motion) || memcmp(dp->body[0], no_motion, sizeof dp->body[0]))
+    const int moves =
+        memcmp(dat->base, no_motion, sizeof no_motion) || memcmp(dp->body[0], no_motion, sizeof dp->body[0]);
+    if (moves) /* with few parameters only */
         base_plate(p, dp, at, dat, w, d);
-    else /* most parameters do not change it */
+    else if (d->base_moves)
         memset(d->body[0], 0, sizeof d->body[0]);
+    d->base_moves = moves;
     for (int k = 1; k <= NB; ++k) {
         put_coordinates(d->x[k], (msfp_columns *)dat->q[k - 1], (msfp_columns *)dat->v[k - 1],
                         (msfp_columns *)dat->a[k - 1]);
@@ -137,13 +140,11 @@ MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_
     }
 }
 
+/* Columns of a rim that pushes. */
 MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
                 msfp_work_columns *d)
 {
-    memset(d->rim[j], 0, sizeof d->rim[j]);
 #if MSFP_RIMS
-    if (!w->rim_active[j])
-        return;
     double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < MSFP_PAIR; ++i) {
@@ -161,8 +162,9 @@ MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp,
 
 MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                       const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                                      const msfp_slopes *slopes, int all, msfp_work_columns *d)
+                                      const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
 {
+    static const double no_rim[MSFP_RIM_SIZE * C];
     double moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
     kinematics(p, dp, at, dat, w, d);
     top(p, dp, at, dat, w, d);
@@ -171,17 +173,20 @@ MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_param
         msfp_interface_force_direction(p->body[j + 1], w->body[j + 1], w->force[j + 1], w->force[j],
                                        dp->body[j + 1], d->body[j + 1], d->force[j + 1], d->force[j]);
     for (int j = 0; j < NB; ++j) {
-        rim(p, dp, w, j, d);
+        const double *drim = w->rim_active[j] ? d->rim[j] : no_rim;
+        if (w->rim_active[j])
+            rim(p, dp, w, j, d);
         msfp_surface_local_direction(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j],
-                                     w->local[j], d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], d->rim[j],
-                                     d->local[j]);
-        msfp_contact_columns(p, dp, seed, dat, w, slopes, j, all, d);
+                                     w->local[j], d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], drim, d->local[j]);
+        msfp_contact_columns(p, dp, seed, dat, w, slopes, j, wanted & MSFP_OF_ROW, d);
+        if (!(wanted & MSFP_OF_RESIDUAL))
+            continue;
         msfp_surface_moment(w, j, moment);
         for (int i = 0; i < MOMENT * C; ++i)
-            dmoment[i] = d->contact[j][i] + d->rim[j][FORCE * C + i];
+            dmoment[i] = d->contact[j][i] + drim[FORCE * C + i];
         msfp_moment_to_world_direction(w->body[j], moment, w->moment[j], d->body[j], dmoment, d->moment[j]);
     }
-    for (int k = 1; k <= NB; ++k) {
+    for (int k = 1; k <= NB && wanted & MSFP_OF_RESIDUAL; ++k) {
         msfp_angular_balance_direction(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k],
                                        w->moment[k], dp->body[k], d->body[k], d->force[k - 1], d->moment[k - 1],
                                        d->force[k], d->moment[k], dangular);

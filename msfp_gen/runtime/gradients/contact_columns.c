@@ -121,6 +121,7 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows,
 {
     double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
     for (int r = 0; r < UNKNOWNS; ++r)
+        MSFP_UNROLL
         for (int i = 0; i < INPUTS; ++i) {
             const int stage = r < FRICTION && input[i].block == STAGE, given = i < GIVEN;
             const double past = stage && input[i].index == MSFP_STAGE_Y + r, own = given ? past : -(i - GIVEN == r);
@@ -235,8 +236,9 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
                                  const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
                                  int rows, msfp_work_columns *d)
 {
-    double dstage[MSFP_STAGE_SIZE * C], unknowns[UNKNOWNS * C] = { 0 };
-    const double *const blocks[] = { dp->surface[j], dstage, d->local[j], unknowns }, *inputs[INPUTS];
+    double dstage[MSFP_STAGE_SIZE * C], unknowns[UNKNOWNS * C];
+    const double *const blocks[] = { dp->surface[j], dstage, d->local[j], unknowns, unknowns + FRICTION * C },
+                        *inputs[INPUTS];
     MSFP_UNROLL
     for (int i = 0; i < INPUTS; ++i)
         inputs[i] = blocks[input[i].block] + input[i].index * C;

@@ -36,6 +36,7 @@ typedef struct {
     double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
+    int base_moves; /* whether those of body 0 may differ from zero, as they do in a new work */
 } msfp_work_columns;
 
 /* Columns of the motion of the foot, after those of the top plate. */
@@ -48,22 +49,23 @@ typedef struct {
     double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
-/* Columns of the condensed equations at the evaluation in `w`. all: of all results of the contacts; otherwise only of
- * their moments and of the rates of Y, Z. */
+/* What an evaluation is for: the residual with the rates of Y, Z; a row, with all results of the contacts. */
+enum { MSFP_OF_RESIDUAL = 1, MSFP_OF_ROW = 2 };
+/* Columns of the condensed equations at the evaluation in `w`. */
 void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                            const msfp_slopes *slopes, int all, msfp_work_columns *d);
+                            const msfp_slopes *slopes, int wanted, msfp_work_columns *d);
 
 /* ---- contact_columns.c ---- */
 
-/* g: the friction force over -mu N; all: as of msfp_condensed_columns. */
+/* g: the friction force over -mu N; all: of all results, otherwise of the moments and of the rates of Y, Z. */
 void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                          const double g[MSFP_NB][2], int all, msfp_slopes *slopes);
-/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts; all: as of
- * msfp_condensed_columns. Returns a status. */
+/* Tangent of the condensed equations at the evaluation in `w`, with the derivatives of its contacts; all: as before.
+ * Returns a status. */
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                              double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent);
-/* Columns of the contact of surface j, after those of its local block; all: as of msfp_condensed_columns. */
+/* Columns of the contact of surface j, after those of its local block; all: as before. */
 void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
                           const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j, int all,
                           msfp_work_columns *d);

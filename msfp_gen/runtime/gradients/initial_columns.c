@@ -100,11 +100,11 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     memcpy(dat->f, now->f, sizeof dat->f);
     msfp_inputs_columns(run, group, run->now.t, now->t, dat);
     if (first) {
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, 0, &group->work);
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
         foot_at_rest(p, group, now->foot);
     }
     memcpy(dat->foot, now->foot, sizeof dat->foot);
-    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, 0, &group->work);
+    msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
     if (!MSFP_MASSLESS) {
         if (msfp_lu(trail->factors[0], DOF, trail->pivots[0]) == 0)
             return MSFP_E_IRREGULAR;
@@ -113,7 +113,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
             for (int i = 0; i < ND; ++i)
                 msfp_add_columns(&now->a[k][unknown[i]], &group->work.residual[k * ND + i], -1.0, 1);
         memcpy(dat->a, now->a, sizeof dat->a);
-        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, 0, &group->work);
+        msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
     }
     msfp_friction_columns(&group->work, now->df, NULL);
     memcpy(now->foot, group->work.foot, sizeof now->foot);

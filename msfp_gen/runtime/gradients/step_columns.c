@@ -132,7 +132,7 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
     stage_point(stage, longer, Q, V, dat);
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
-                           &trail->slopes[i], 0, &group->work);
+                           &trail->slopes[i], MSFP_OF_RESIDUAL, &group->work);
     msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
@@ -151,7 +151,7 @@ void msfp_complete_columns(msfp_run *run, msfp_group *group)
     trail->all_slopes = 1;
     if (!group->complete)
         msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
-                               &trail->work[last], &trail->slopes[last], 1, &group->work);
+                               &trail->work[last], &trail->slopes[last], MSFP_OF_ROW, &group->work);
     group->complete = 1;
 }
 
