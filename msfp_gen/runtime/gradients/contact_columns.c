@@ -221,14 +221,14 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
 MSFP_INLINE void results_columns(const msfp_slopes *slopes, const double *const *inputs, int count, int rows, int j,
                                  double *contact)
 {
-    for (int r = 0; r < rows; ++r) {
-        double sum[C];
-        MSFP_UNROLL
-        for (int i = 0; i < count; ++i)
-            for (int c = 0; c < C; ++c)
-                sum[c] = (i ? sum[c] : 0.0) + slopes->of[r][i][j] * inputs[i][c];
-        memcpy(contact + result[r] * C, sum, sizeof sum);
-    }
+    for (int r = 0; r < rows; ++r)
+        for (int c = 0; c < C; c += MSFP_PACK_SIZE) {
+            msfp_pack sum = slopes->of[r][0][j] * *(const msfp_pack *)(inputs[0] + c);
+            MSFP_UNROLL
+            for (int i = 1; i < count; ++i)
+                sum += slopes->of[r][i][j] * *(const msfp_pack *)(inputs[i] + c);
+            *(msfp_pack *)(contact + result[r] * C + c) = sum;
+        }
 }
 
 /* The columns of surface j; inlined for each number of results. */

@@ -129,13 +129,17 @@ void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
     memcpy(&run->gradients->trail.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
 }
 
-void msfp_gradients_node(msfp_run *run, int index, const msfp_observation *o, const msfp_row *row)
+msfp_observation *msfp_gradients_node(msfp_run *run, int index)
+{
+    return run->gradients ? &run->gradients->recording.node[index] : NULL;
+}
+
+void msfp_gradients_row(msfp_run *run, int index, const msfp_row *row)
 {
     if (!run->gradients)
         return;
     msfp_recording *r = &run->gradients->recording;
     r->value[index] = *row;
-    memcpy(&r->node[index], o, offsetof(msfp_observation, work) + offsetof(msfp_work, dx)); /* without derivatives */
     r->sloped[index] = 0;
     r->known = index == run->node_count + 1;
 }

@@ -171,18 +171,20 @@ MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double
     double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE] = { 0.0 };
     msfp_columns moved; /* of the share */
     msfp_row blended;
-    weight_slopes(run, share, slopes);
     memset(&blended, 0, sizeof blended);
     memset(d, 0, sizeof(msfp_row_columns));
     for (int r = 0; r < w.count; ++r) {
         weigh((const double *)&rows->value[r], w.of[r], MSFP_ROW_SIZE, (double *)&blended);
-        weigh((const double *)&rows->value[r], slopes[r], MSFP_ROW_SIZE, slope);
         weigh(rows->d[r][0], w.of[r], MSFP_ROW_SIZE * C, d[0]);
     }
     for (int c = 0; c < C; ++c)
         moved[c] = -(group->now.t[c] + share * group->h[c]) / h;
-    if (moving && msfp_any_column(moved))
+    if (moving && msfp_any_column(moved)) {
+        weight_slopes(run, share, slopes);
+        for (int r = 0; r < w.count; ++r)
+            weigh((const double *)&rows->value[r], slopes[r], MSFP_ROW_SIZE, slope);
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
+    }
     limit_friction(rows, w.count, &blended, d);
     restore_bounds(run, group, &blended, d);
 }

@@ -100,22 +100,20 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. longer: of rates_a. */
-MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp_columns Q[NB][NQ],
-                             msfp_columns V[NB][NQ], msfp_point_columns *dat)
+MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp_columns (*restrict Q)[NQ],
+                             msfp_columns (*restrict V)[NQ], msfp_point_columns *restrict dat)
 {
-    const double beta = stage->beta, inverse = 1.0 / beta;
-    const int stretched = msfp_any_column(dat->beta);
-    memcpy(dat->q, Q, sizeof dat->q);
-    msfp_add_columns(dat->q[0], dat->v[0], beta, NB * NQ);
-    if (stretched)
-        msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);
-    memset(dat->a, 0, sizeof dat->a);
-    if (stage->inertia == 0.0)
+    const double beta = stage->beta, rate = stage->inertia / beta;
+    for (int k = 0; k < NB; ++k)
+        for (int d = 0; d < NQ; ++d)
+            for (int c = 0; c < C; ++c) {
+                dat->q[k][d][c] = Q[k][d][c] + beta * dat->v[k][d][c];
+                dat->a[k][d][c] = rate * (dat->v[k][d][c] - V[k][d][c]);
+            }
+    if (!msfp_any_column(dat->beta))
         return;
-    msfp_add_columns(dat->a[0], dat->v[0], inverse, NB * NQ);
-    msfp_add_columns(dat->a[0], V[0], -inverse, NB * NQ);
-    if (stretched)
-        msfp_add_scaled(dat->a[0], longer, dat->beta, -inverse, NB * NQ);
+    msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);
+    msfp_add_scaled(dat->a[0], longer, dat->beta, -rate, NB * NQ);
 }
 
 /* Solve stage i for the columns of its rates: group->point. group->work has the columns at constant rates. */
@@ -203,8 +201,8 @@ static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
     msfp_columns Q[NB][NQ], V[NB][NQ], dt;
     stage_columns s;
     int node = 0;
-    memset(s.df, 0, sizeof s.df);
-    memset(s.rates, 0, sizeof s.rates);
+    if (MSFP_SHEAR_SIZE < 2)
+        memset(s.df, 0, sizeof s.df);
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);

@@ -123,13 +123,14 @@ static void observe_nodes(msfp_run *run, msfp_row rows[MSFP_NODES + 2])
 {
     const int last = run->node_count + 1;
     msfp_state inside;
-    msfp_observation o;
+    msfp_observation own;
     for (int i = 0; i <= last && run->node_count; ++i) {
         const msfp_state *s = i == 0 ? &run->now : i == last ? &run->next : &inside;
         if (s == &inside)
             msfp_interpolate(run, run->node[i - 1].share, &inside);
-        observe(run, s, &o, &rows[i]);
-        MSFP_IF_GRADIENTS(msfp_gradients_node(run, i, &o, &rows[i]), (void)0);
+        msfp_observation *o = MSFP_IF_GRADIENTS(msfp_gradients_node(run, i), NULL);
+        observe(run, s, o ? o : &own, &rows[i]);
+        MSFP_IF_GRADIENTS(msfp_gradients_row(run, i, &rows[i]), (void)0);
     }
 }
 

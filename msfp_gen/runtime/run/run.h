@@ -90,8 +90,10 @@ double msfp_prescribed_step(const msfp_run *run);
 void msfp_gradients_before_step(msfp_run *run);
 int msfp_gradients_step(msfp_run *run, const double *before, const double *after);
 void msfp_gradients_accept(msfp_run *run);
-/* Row `index` of those at the ends of the last step and at its interpolation nodes, with its evaluation. */
-void msfp_gradients_node(msfp_run *run, int index, const msfp_observation *o, const msfp_row *row);
+/* Where to evaluate row `index` of those at the ends of the last step and at its interpolation nodes, and then the row;
+ * NULL: anywhere. */
+msfp_observation *msfp_gradients_node(msfp_run *run, int index);
+void msfp_gradients_row(msfp_run *run, int index, const msfp_row *row);
 /* After a jump of the accelerations; after a last row of a run that was stopped. */
 int msfp_gradients_jump(msfp_run *run);
 int msfp_gradients_last_row(msfp_run *run);
