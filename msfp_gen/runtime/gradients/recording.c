@@ -1,4 +1,7 @@
 /* recording.c: the derivatives of rows and events that a run keeps. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3")
+#endif
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,11 +30,16 @@ static int reserve(const struct msfp_gradients *g, double **items, size_t wanted
 static void store(const struct msfp_gradients *g, double *items, size_t index, int group, int size,
                   const msfp_columns *d)
 {
-    for (int c = 0; c < C && group * C + c < g->count; ++c) {
-        double *to = items + (index * (size_t)g->count + (size_t)(group * C + c)) * (size_t)size;
-        for (int i = 0; i < size; ++i)
-            to[i] = d[i][c];
+    const int used = g->count - group * C; /* of the columns, where fewer than all */
+    double *const to = items + (index * (size_t)g->count + (size_t)(group * C)) * (size_t)size;
+    for (int i = 0; i < size && used >= C; ++i) {
+        MSFP_UNROLL
+        for (int c = 0; c < C; ++c)
+            to[c * size + i] = d[i][c];
     }
+    for (int c = 0; c < used && used < C; ++c)
+        for (int i = 0; i < size; ++i)
+            to[c * size + i] = d[i][c];
 }
 
 /* Columns of an event at the end of the step. In a quasi-static run the end of a step does not move with the

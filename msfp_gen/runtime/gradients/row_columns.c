@@ -154,11 +154,15 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
     }
 }
 
-/* sum += weight * numbers */
-MSFP_INLINE void weigh(const double *restrict numbers, double weight, int count, double *restrict sum)
+/* Sum of weights times `count` numbers of each of at least three rows. */
+MSFP_INLINE void weigh(const double *weights, int rows, const double *const *numbers, int count, double *restrict sum)
 {
+    const double *a = numbers[0], *b = numbers[1], *c = numbers[2];
     for (int i = 0; i < count; ++i)
-        sum[i] += weight * numbers[i];
+        sum[i] = weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i];
+    for (int r = 3; r < rows; ++r)
+        for (int i = 0; i < count; ++i)
+            sum[i] += weights[r] * numbers[r][i];
 }
 
 MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
@@ -168,21 +172,21 @@ MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double
     const msfp_recording *rows = &run->gradients->recording;
     const msfp_weights w = msfp_weights_at(run, share);
     const double h = run->next.t - run->now.t;
-    double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE] = { 0.0 };
+    const double *values[MSFP_NODES + 2], *columns[MSFP_NODES + 2];
     msfp_columns moved; /* of the share */
     msfp_row blended;
-    memset(&blended, 0, sizeof blended);
-    memset(d, 0, sizeof(msfp_row_columns));
     for (int r = 0; r < w.count; ++r) {
-        weigh((const double *)&rows->value[r], w.of[r], MSFP_ROW_SIZE, (double *)&blended);
-        weigh(rows->d[r][0], w.of[r], MSFP_ROW_SIZE * C, d[0]);
+        values[r] = (const double *)&rows->value[r];
+        columns[r] = rows->d[r][0];
     }
+    weigh(w.of, w.count, values, MSFP_ROW_SIZE, (double *)&blended);
+    weigh(w.of, w.count, columns, MSFP_ROW_SIZE * C, d[0]);
     for (int c = 0; c < C; ++c)
         moved[c] = -(group->now.t[c] + share * group->h[c]) / h;
     if (moving && msfp_any_column(moved)) {
+        double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE];
         weight_slopes(run, share, slopes);
-        for (int r = 0; r < w.count; ++r)
-            weigh((const double *)&rows->value[r], slopes[r], MSFP_ROW_SIZE, slope);
+        weigh(slopes, w.count, values, MSFP_ROW_SIZE, slope);
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     }
     limit_friction(rows, w.count, &blended, d);

@@ -16,22 +16,27 @@ static const int unknown[ND] = MSFP_FREE;
 MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
                                   msfp_columns *restrict columns)
 {
+    enum { PACKS = C / MSFP_PACK_SIZE };
+    msfp_pack *const x = (msfp_pack *)columns;
     for (int k = 0; k < DOF; ++k)
-        for (int c = 0; c < C; ++c) {
-            const double swap = columns[pivots[k]][c];
-            columns[pivots[k]][c] = columns[k][c];
-            columns[k][c] = swap;
+        for (int c = 0; c < PACKS; ++c) {
+            const msfp_pack swap = x[pivots[k] * PACKS + c];
+            x[pivots[k] * PACKS + c] = x[k * PACKS + c];
+            x[k * PACKS + c] = swap;
         }
-    for (int j = 0; j < DOF; ++j)
-        for (int i = j + 1; i < DOF; ++i)
-            for (int c = 0; c < C; ++c)
-                columns[i][c] -= factors[i * DOF + j] * columns[j][c];
-    for (int i = DOF - 1; i >= 0; --i) {
-        for (int j = i + 1; j < DOF; ++j)
-            for (int c = 0; c < C; ++c)
-                columns[i][c] -= factors[i * DOF + j] * columns[j][c];
-        for (int c = 0; c < C; ++c)
-            columns[i][c] *= factors[i * DOF + i];
+    for (int c = 0; c < PACKS; ++c) {
+        for (int i = 1; i < DOF; ++i) {
+            msfp_pack rest = x[i * PACKS + c];
+            for (int j = 0; j < i; ++j)
+                rest -= factors[i * DOF + j] * x[j * PACKS + c];
+            x[i * PACKS + c] = rest;
+        }
+        for (int i = DOF - 1; i >= 0; --i) {
+            msfp_pack rest = x[i * PACKS + c];
+            for (int j = i + 1; j < DOF; ++j)
+                rest -= factors[i * DOF + j] * x[j * PACKS + c];
+            x[i * PACKS + c] = rest * factors[i * DOF + i];
+        }
     }
 }
 
