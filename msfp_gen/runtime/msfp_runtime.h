@@ -21,10 +21,16 @@ extern "C" {
 #define MSFP_WIDE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #elif MSFP_X86_64_LEVEL >= 4
 #define MSFP_WIDE __attribute__((target("arch=x86-64-v4")))
+#define MSFP_COLUMNWISE __attribute__((target("arch=x86-64-v4,prefer-vector-width=256")))
 #elif MSFP_X86_64_LEVEL == 3
 #define MSFP_WIDE __attribute__((target("arch=x86-64-v3")))
 #else
 #define MSFP_WIDE
+#endif
+/* Functions on the columns of gradients, MSFP_COLUMNS of them: vectors of eight numbers would read what has just been
+ * written in vectors of four, which takes longer. */
+#ifndef MSFP_COLUMNWISE
+#define MSFP_COLUMNWISE MSFP_WIDE
 #endif
 /* A kernel is always inlined, so that it is compiled for the vectors of its caller. */
 #if defined(__GNUC__)

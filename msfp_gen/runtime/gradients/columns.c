@@ -47,7 +47,7 @@ MSFP_INLINE void put_coordinates(double *block, msfp_columns *const q, msfp_colu
 static const msfp_columns no_motion[3][6]; /* columns of a base that a parameter does not move */
 
 /* Columns of the base plate. */
-static MSFP_WIDE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+static MSFP_COLUMNWISE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double below[MSFP_BODY_SIZE], dbelow[MSFP_BODY_SIZE * C] = { 0 };
@@ -125,7 +125,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
     memcpy(d->moment[NB], dwrench + FORCE * C, sizeof d->moment[NB]);
 }
 
-MSFP_WIDE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                  const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
@@ -160,7 +160,7 @@ MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp,
 #endif
 }
 
-MSFP_WIDE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                                       const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
                                       const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
 {

@@ -188,7 +188,7 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
     eliminate(out + MSFP_CONTACT_DY * LANES, stage + MSFP_STAGE_TAU * LANES, rows, jacobian, slopes->of);
 }
 
-MSFP_WIDE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
+MSFP_COLUMNWISE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                                    const double g[MSFP_NB][2], int all, msfp_slopes *slopes)
 {
     if (all)
@@ -254,7 +254,7 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
     results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
 }
 
-MSFP_WIDE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
+MSFP_COLUMNWISE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
                                     const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
                                     int all, msfp_work_columns *d)
 {

@@ -34,7 +34,7 @@ MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double
     }
 }
 
-MSFP_WIDE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
+MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
                        msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
     double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 }, sliding[MSFP_GAP_SIZE];
@@ -176,7 +176,7 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
         rim_energy(p->surface[j], dp->surface[j], sliding[MSFP_GAP_G], gap[MSFP_GAP_G], row[MSFP_ROW_RIM_STORED]);
 }
 
-MSFP_WIDE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                          msfp_columns *row)
 {

@@ -165,7 +165,7 @@ MSFP_INLINE void weigh(const double *weights, int rows, const double *const *num
             sum[i] += weights[r] * numbers[r][i];
 }
 
-MSFP_WIDE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
+MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
                                         msfp_row_columns d)
 {
     msfp_observe_node_columns(run, group);

@@ -13,7 +13,7 @@ enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, C = MSFP_COLUMN
 static const int unknown[ND] = MSFP_FREE;
 
 /* As msfp_lu_solve for all columns at once. */
-MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
+MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
                                   msfp_columns *restrict columns)
 {
     enum { PACKS = C / MSFP_PACK_SIZE };
@@ -40,7 +40,7 @@ MSFP_WIDE void msfp_solve_columns(const double *restrict factors, const int *res
     }
 }
 
-MSFP_WIDE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
+MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[NB][2], msfp_columns f[NB][2])
 {
     for (int j = 0; j < NB; ++j)
         for (int i = 0; i < MSFP_SHEAR_SIZE; ++i) {
@@ -195,7 +195,7 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
     msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
 }
 
-static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
+static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
     const msfp_trail *trail = &run->gradients->trail;
@@ -239,7 +239,7 @@ static MSFP_WIDE void implicit_step(msfp_run *run, msfp_group *group)
 enum { ANGLE = 1 };
 
 /* A quasi-static step: the parabola through the last two states, at whose end forces balance (quasistatic.c). */
-static MSFP_WIDE void quasistatic_step(msfp_run *run, msfp_group *group)
+static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_group *group)
 {
     const msfp_stage *stage = &run->gradients->trail.stage[1];
     const msfp_state_columns *now = &group->now;
