@@ -1,7 +1,8 @@
 """Cost of gradients: `python benchmarks/gradients.py`, two minutes. The tables of docs/gradients.md.
 
 Plain runs and runs with gradients alternate, and the least processor time of each counts, so that the ratios do not
-depend on the load of the machine. With `--instructions` callgrind counts instead, with vectors of AVX2.
+depend on the load of the machine. With `--instructions` callgrind counts instead, with vectors of AVX2. With
+`--energies` the energies that are integrals over the run are differentiated too.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ COUNTS = (1, 4, 8, 16)
 SCENES = {"`fenz-test2`": "fenz-test2", "`fenz-test5`": "fenz-test5", "`becker-circle-88`": "becker-circle-88"}
 
 
-def seconds(scene: Scene, paths: Sequence[str]) -> tuple[float, int]:
-    """Processor time of the integration, and its steps."""
+def seconds(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple[float, int]:
+    """Processor time of the integration, and its steps. energies: differentiate the integrals over the run too."""
     model = build_model(scene.bearing.layout, scene.modelled, gradients=bool(paths))
     run, _ = RunSequence.of(scene).start_segment(model)
     if paths:
-        start_gradients(run, scene, model, parameters_of(scene, paths))
+        start_gradients(run, scene, model, parameters_of(scene, paths), energies=energies)
     start = time.process_time()
     while run.advance(100_000):
         pass
@@ -49,20 +50,21 @@ def damped(name: str, rtol: float) -> Scene:
     return replace(scene, bearing=bearing, solver=solver, output_step=scene.end / 200)
 
 
-def shares_of_time(scene: Scene) -> tuple[list[float], int]:
+def shares_of_time(scene: Scene, energies: bool) -> tuple[list[float], int]:
     """Cost of gradients over that of the run, for each number of parameters; and the steps of the run."""
     shares, steps = [], 0
     for count in COUNTS:
-        pairs = [(seconds(scene, ()), seconds(scene, PATHS[:count])) for _ in range(REPEATS)]
+        pairs = [(seconds(scene, ()), seconds(scene, PATHS[:count], energies)) for _ in range(REPEATS)]
         plain, full = (min(pair[i][0] for pair in pairs) for i in (0, 1))
         shares.append(full / plain - 1)
         steps = pairs[0][0][1]
     return shares, steps
 
 
-def counted(name: str, rtol: float, count: int) -> int:
+def counted(name: str, rtol: float, count: int, energies: bool) -> int:
     """Instructions of the integration with the first `count` parameters, in millions."""
-    text = f"import gradients; gradients.seconds(gradients.damped({name!r}, {rtol}), gradients.PATHS[:{count}])"
+    scene, paths = f"gradients.damped({name!r}, {rtol})", f"gradients.PATHS[:{count}]"
+    text = f"import gradients; gradients.seconds({scene}, {paths}, {energies and count > 0})"
     command = [sys.executable, "-c", text]
     subprocess.run(command, check=True)  # builds the model
     return instructions(command, "msfp_5_2_2_run_advance")
@@ -70,7 +72,7 @@ def counted(name: str, rtol: float, count: int) -> int:
 
 def main() -> None:
     """Print the table: fixed cost, cost of a group, and cost of one parameter over that of the run."""
-    counting = "--instructions" in sys.argv
+    counting, energies = "--instructions" in sys.argv, "--energies" in sys.argv
     if counting:
         if not shutil.which("valgrind"):
             raise SystemExit("valgrind is not installed")
@@ -81,10 +83,10 @@ def main() -> None:
     for title, name in SCENES.items():
         for rtol in (1e-4,) if counting else (1e-4, 1e-6):
             if counting:
-                plain, *full = (counted(name, rtol, count) for count in (0, *COUNTS))
+                plain, *full = (counted(name, rtol, count, energies) for count in (0, *COUNTS))
                 shares, steps = [each / plain - 1 for each in full], f"{plain / 1e6:.0f} million"
             else:
-                shares, taken = shares_of_time(damped(name, rtol))
+                shares, taken = shares_of_time(damped(name, rtol), energies)
                 steps = str(taken)
             one = (shares[-1] - shares[-2]) / (COUNTS[-1] - COUNTS[-2])  # parameter of a full group
             each = [share / count for share, count in zip(shares, COUNTS, strict=True)]

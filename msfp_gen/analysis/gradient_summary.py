@@ -9,6 +9,7 @@ import numpy as np
 from msfp_gen.analysis.summary import axial_load
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.results.gradient import ENERGIES
 from msfp_gen.results.gradient_dataset import gradients_of
 from msfp_gen.results.history import LABELS
 from msfp_gen.results.peaks import gradients_of_extremes
@@ -21,9 +22,9 @@ WITHOUT = {
     "rims_met": "it is a list of surfaces, which jumps where another rim is met",
     "transitions": "they are read from rows",
     "counters": "they count the work of the solver",
-    "energy": "its terms are integrals and ratios; result.gradient has the energies of the state",
+    "energy": "its terms are integrals over the run, which simulate(..., energy_gradients=True) differentiates",
 }
-"""Keys of the summary that have no derivative, with the reason."""
+"""Keys of the summary that have no derivative, or only where it was asked for, with the reason."""
 
 
 class SummaryGradient(dict[str, Any]):
@@ -38,26 +39,28 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
     Keys: peak_displacement, peak_top_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
-    maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary. Raises
-    InputError where the run computed no derivatives, and for a key whose value jumps (`WITHOUT`).
+    maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary; and of runs with
+    `energy_gradients` energy, those of the terms of `History.energy` at the end. Raises InputError where the run
+    computed no derivatives, and for a key whose value jumps (`WITHOUT`).
     """
     gradients = gradients_of(result)
     recorded = result.recorded_extremes
     assert recorded is not None  # a run that computed derivatives has recorded its extremes
     slopes = gradients_of_extremes(gradients, result.history, recorded)
     return {
-        parameter.path: _summary(result, parameter, {name: values[i] for name, values in slopes.items()})
+        parameter.path: _summary(result, i, {name: values[i] for name, values in slopes.items()})
         for i, parameter in enumerate(gradients.parameters)
     }
 
 
-def _summary(result: RunData, parameter: Parameter, slopes: dict[str, Array]) -> SummaryGradient:
+def _summary(result: RunData, index: int, slopes: dict[str, Array]) -> SummaryGradient:
+    gradients = gradients_of(result)
     names = (*LABELS["axis"], "radial")
     force = slopes["top_force"]
     found = SummaryGradient(
         peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
         peak_top_force=dict(zip(names, force.tolist(), strict=True)),
-        peak_force_ratio=_ratio_slope(result, parameter, float(force[3])),
+        peak_force_ratio=_ratio_slope(result, gradients.parameters[index], float(force[3])),
         peak_sliding=slopes["sliding"].tolist(),
         minimum_gap=slopes["gap"].tolist(),
         minimum_normal_force=slopes["least_normal"].tolist(),
@@ -66,6 +69,8 @@ def _summary(result: RunData, parameter: Parameter, slopes: dict[str, Array]) ->
     for name in ("least_friction", "most_friction"):
         if name in slopes:
             found[name] = slopes[name].tolist()
+    if set(gradients.energy) > set(ENERGIES):
+        found["energy"] = {name: float(values[index, -1]) for name, values in gradients.energy.items()}
     return found
 
 

@@ -113,7 +113,7 @@ class Run(Protocol):
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
-    def start_gradients(self, *, steps: Sequence[float] = (), **derivatives: Array) -> None:
+    def start_gradients(self, *, steps: Sequence[float] = (), energies: bool = False, **derivatives: Array) -> None:
         """Begin derivatives with respect to parameters; of everything that the run is given (the wrapper names it)."""
 
     def gradient_rows(self, count: int) -> Array:

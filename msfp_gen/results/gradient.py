@@ -10,6 +10,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.model.plane import out_of_plane
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.history import ENERGY
 from msfp_gen.results.row_unpacking import unpacked
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 CONSTANT = ("time", "lift", "separation", "temperature", "energy")  # fields of `History` that are treated apart
 ENERGIES = ("kinetic", "potential", "restraint", "rim_stored")  # terms of the state; the others are integrals
+WITH_INTEGRALS = tuple(name for name in ENERGY if not name.startswith("seat_"))  # which only models with uplift have
 EVENT = 7  # numbers of an event: time, displacement, top force
 
 
@@ -29,7 +31,7 @@ class Gradients:
     Attributes:
         parameters: k of them.
         rows: derivatives of the fields of `History`, each an ndarray, shape (k, T, ...), [unit of the field/unit].
-        energy: the same of energies that the state determines, shape (k, T).
+        energy: the same of energies, shape (k, T): of those that the state determines, or also of the integrals.
         event_time, event_displacement, event_top_force: shape (k, e), (k, e, 3), (k, e, 3).
         extremes: k of them, of `RunData.extremes`.
     """
@@ -44,9 +46,19 @@ class Gradients:
 
     @classmethod
     def of_run(
-        cls, parameters: tuple[Parameter, ...], model: Model, run: Run, count: int, azimuth: float, sprung: bool
+        cls,
+        parameters: tuple[Parameter, ...],
+        energies: tuple[str, ...],
+        model: Model,
+        run: Run,
+        count: int,
+        azimuth: float,
+        sprung: bool,
     ) -> Gradients:
-        """The derivatives of a compiled run that has ended. count: number of its rows that are kept."""
+        """The derivatives of a compiled run that has ended. count: number of its rows that are kept.
+
+        energies: `ENERGIES` or `WITH_INTEGRALS`.
+        """
         rows, events = run.gradient_rows(len(parameters))[:count], run.gradient_events(len(parameters))
         found = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
         names = [name for name, values in found[0].items() if name not in CONSTANT and values is not None]
@@ -55,7 +67,7 @@ class Gradients:
         return cls(
             parameters,
             {name: np.array([each[name] for each in found]) for name in names},
-            {name: np.array([each["energy"][name] for each in found]) for name in ENERGIES},
+            {name: np.array([each["energy"][name] for each in found]) for name in energies},
             events[:, :, 0].T,
             displacement,
             force,

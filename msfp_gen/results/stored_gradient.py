@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import ENERGIES, Gradients
+from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS, Gradients
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.parameters import Parameter
 
@@ -49,7 +49,8 @@ def from_group(root: StoredGroup, rows: int, surfaces: int, events: int) -> tupl
         dims = quantity.dims[:-1] if len(parts) > 1 else quantity.dims
         columns = [array(name, rows, *(sizes[dim] for dim in dims)) for name in parts if name in group]
         found[field] = columns[0] if len(parts) == 1 else np.stack(columns, axis=-1)
-    energy = {name: array(f"energy_{name}", rows) for name in ENERGIES}
+    energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
+    energy = {name: array(f"energy_{name}", rows) for name in energies}
     time, displacement, force = (
         array(name, events, *shape) for name, shape in zip(EVENT_ARRAYS, ((), (3,), (3,)), strict=True)
     )

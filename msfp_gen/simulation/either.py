@@ -50,6 +50,7 @@ def simulate(
     strict: bool = False,
     stream: str | Path | None = None,
     gradients: Sequence[str] = (),
+    energy_gradients: bool = False,
 ) -> Result: ...
 
 

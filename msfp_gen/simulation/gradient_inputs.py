@@ -30,12 +30,18 @@ _BASE_FIELDS = {"base_height": "height", "base_rim_radius": "rim_radius", "base_
 
 
 def start_gradients(
-    run: Run, scene: Scene, model: Model, parameters: Sequence[Parameter], steps: Sequence[float] = ()
+    run: Run,
+    scene: Scene,
+    model: Model,
+    parameters: Sequence[Parameter],
+    steps: Sequence[float] = (),
+    energies: bool = False,
 ) -> None:
     """Begin the derivatives of a run that has taken no step.
 
-    steps: ends of all steps [s], in place of the step control, for differences with the same steps. Raises InputError
-    where a parameter leads out of the plane of a planar model.
+    steps: ends of all steps [s], in place of the step control, for differences with the same steps. energies: also of
+    the energies that are integrals over the run. Raises InputError where a parameter leads out of the plane of a planar
+    model.
     """
     found = [_Inputs(scene, model, parameter).arrays for parameter in parameters]
     histories = {name: [each[name] for each in found if each[name] is not None] for name in ("motion", "load")}
@@ -47,7 +53,8 @@ def start_gradients(
         stacked[name] = np.where(given, np.cumsum(given) - 1.0, -1.0)
         stacked[f"{name}s"] = np.array(arrays) if arrays else np.zeros(0)
     stacked["f"] = stacked.pop("h")
-    run.start_gradients(**{name: np.ascontiguousarray(array, float) for name, array in stacked.items()}, steps=steps)
+    contiguous = {name: np.ascontiguousarray(array, float) for name, array in stacked.items()}
+    run.start_gradients(**contiguous, steps=steps, energies=energies)
 
 
 class _Inputs:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from msfp_gen.errors import InputError
-from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS, Gradients
 from msfp_gen.results.note import Note
-from msfp_gen.scene.effect_selection import slider_period
+from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.parameters import Parameter, parameters_of
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.settling import needs_settling
@@ -37,20 +37,31 @@ RINGS_AT_RIM = (
     "solver.rtol falls; give contact_damping = 1e-3"
 )
 
+CONTACT_IN_LONG_STEP = (
+    "energy_gradients = True: at {time:.4g} s surface {surface} meets its rim in quasi-static steps, and the error of "
+    "their energies there depends on the parameters more than the energies; give solver.method = 'esdirk4', or leave "
+    "out energy_gradients"
+)
+
 
 class RunParts(Protocol):
-    """What is needed of a run that has ended: its scene, parameters and segments."""
+    """What is needed of a run that has ended: its scene, the parameters of its derivatives and its segments."""
 
     given: Scene
     parameters: tuple[Parameter, ...]
+    energies: bool
     segments: list[Segment]
 
 
 def gradient_parameters(
-    scene: Scene, paths: Sequence[str], checkpoint: object = None, stream: object = None
+    scene: Scene, paths: Sequence[str], checkpoint: object = None, stream: object = None, energies: bool = False
 ) -> tuple[Parameter, ...]:
     """The parameters at some paths. Raises InputError for an unknown one, and for a run that has no gradients."""
     parameters = parameters_of(scene, paths)
+    if energies and not parameters:
+        raise InputError(
+            "energy_gradients = True: gradients names no parameter; give one, or leave energy_gradients out"
+        )
     if not parameters:
         return ()
     if scene.solver.method == "dopri5":
@@ -82,16 +93,20 @@ def switching_error(segment: Segment, notes: Sequence[Note]) -> InputError:
     )
 
 
-def run_gradients(sequence: RunParts, rows: int) -> Gradients | None:
+def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gradients | None:
     """The derivatives that a run computed; None without parameters. rows: number of its rows that are kept.
 
-    Raises InputError where undamped ringing was resolved: the response is chaotic, and a derivative has no meaning.
+    events: of the run. Raises InputError where undamped ringing was resolved: the response is chaotic, and a derivative
+    has no meaning; and for energies through a rim contact in quasi-static steps, see `CONTACT_IN_LONG_STEP`.
     """
     if not sequence.parameters:
         return None
     scene, segment = sequence.given, sequence.segments[-1]
     azimuth, sprung = segment.azimuth, is_sprung(scene.top)
-    found = Gradients.of_run(sequence.parameters, segment.model, segment.run, rows, azimuth, sprung)
+    if sequence.energies and events and quasistatic(scene, segment.model.effects):
+        raise InputError(CONTACT_IN_LONG_STEP.format(time=events[0].time, surface=events[0].surface))
+    energies = WITH_INTEGRALS if sequence.energies else ENERGIES
+    found = Gradients.of_run(sequence.parameters, energies, segment.model, segment.run, rows, azimuth, sprung)
     steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, segment.model.effects)
     resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
     for parameter, size in zip(found.parameters, found.largest_numbers(), strict=True):

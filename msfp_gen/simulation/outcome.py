@@ -1,15 +1,19 @@
-"""What the segments of a run that have ended state: the message of a failure, the extremes of all."""
+"""What the segments of a run that have ended state: the message of a failure, the extremes of all, versions."""
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.monitor_notes import monitor_notes
 from msfp_gen.simulation import failures
+from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -32,3 +36,16 @@ def extremes_of(segments: Sequence[Segment]) -> Extremes | None:
     counted = [s for s in started if s.run.counts["steps"]] or started[-1:]
     found = [Extremes.of_run(s.model.extension.EXTREMES, s.run.extremes, s.azimuth) for s in counted]
     return reduce(or_, found) if found else None
+
+
+def provenance_of(scene: Scene, segments: Sequence[Segment]) -> dict[str, str]:
+    """Versions, models and options of the solver with which the segments were computed."""
+    return {
+        "msfp_gen": __version__,
+        "model": ", then ".join(segment.model.spec.key for segment in segments),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "method": scene.solver.method,
+        "rtol": f"{scene.solver.rtol:g}",
+        "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
+    }

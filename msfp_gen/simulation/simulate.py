@@ -5,15 +5,12 @@ A run is one segment, or several: where a monitor trips, the next one continues 
 
 from __future__ import annotations
 
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from msfp_gen.common.output import DATASET_SUFFIXES, check_output
 from msfp_gen.errors import RunError
@@ -40,12 +37,11 @@ from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.gradients import gradient_notes, gradient_parameters, run_gradients, switching_error
 from msfp_gen.simulation.memory import outgrown, require_room
 from msfp_gen.simulation.notes import history_notes, landing_notes
-from msfp_gen.simulation.outcome import extremes_of, message_of
+from msfp_gen.simulation.outcome import extremes_of, message_of, provenance_of
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.simulation.streamed_rows import StreamedRows
-from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
@@ -70,6 +66,7 @@ def simulate(
     strict: bool = False,
     stream: str | Path | None = None,
     gradients: Sequence[str] = (),
+    energy_gradients: bool = False,
 ) -> Result:
     """Integrate a scene.
 
@@ -94,6 +91,8 @@ def simulate(
         on disk while it runs, so that its memory does not grow with their number.
     gradients
         Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
+    energy_gradients
+        Whether the energies that are integrals over the run are differentiated too, at up to two thirds more cost.
 
     Returns
     -------
@@ -116,9 +115,9 @@ def simulate(
     if checkpoint is not None and not resume:
         require_no_checkpoint(checkpoint)
     file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
-    parameters = gradient_parameters(scene, gradients, checkpoint, stream)
+    parameters = gradient_parameters(scene, gradients, checkpoint, stream, energy_gradients)
     require_room(scene, file, copies=1 + len(parameters))
-    sequence = replace(RunSequence.of(scene, strict), stream=file, parameters=parameters)
+    sequence = replace(RunSequence.of(scene, strict), stream=file, parameters=parameters, energies=energy_gradients)
     while sequence.effects is not None:
         segments = sequence.segments
         saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
@@ -137,7 +136,7 @@ class RunSequence:
 
     given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
     None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
-    parameters: of the derivatives.
+    parameters: of the derivatives; energies: whether these include energies that are integrals over the run.
     """
 
     given: Scene
@@ -148,6 +147,7 @@ class RunSequence:
     notes: list[Note]
     stream: Path | None = None
     parameters: tuple[Parameter, ...] = ()
+    energies: bool = False
 
     @classmethod
     def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
@@ -164,7 +164,7 @@ class RunSequence:
         stops = stopping_monitors(scene, model.effects, self.strict)
         run, azimuth = start_run(scene, model, selection, end, at, stops)
         if self.parameters:
-            start_gradients(run, scene, model, self.parameters)
+            start_gradients(run, scene, model, self.parameters, energies=self.energies)
         return run, azimuth
 
     def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
@@ -272,15 +272,6 @@ def _result(sequence: RunSequence, history: History) -> Result:
     scene, segments, last = sequence.given, sequence.segments, sequence.segments[-1]
     counts = [{k: int(n) for k, n in segment.run.counts.items()} for segment in segments]
     total = Counters(**{name: sum(count[name] for count in counts) for name in counts[0]})
-    provenance = {
-        "msfp_gen": __version__,
-        "model": ", then ".join(segment.model.spec.key for segment in segments),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "method": scene.solver.method,
-        "rtol": f"{scene.solver.rtol:g}",
-        "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
-    }
     events = tuple(event for s in segments for event in events_of(s.model, s.run, s.azimuth))
     return Result(
         scene=scene,
@@ -289,11 +280,11 @@ def _result(sequence: RunSequence, history: History) -> Result:
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
         message="" if last.status in ("ok", "stopped") else message_of(scene, last),
-        provenance=provenance,
+        provenance=provenance_of(scene, segments),
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
         + landing_notes(events)
         + gradient_notes(sequence, events),
         recorded_extremes=extremes_of(segments),
-        gradients=run_gradients(sequence, len(history.time)),
+        gradients=run_gradients(sequence, len(history.time), events),
     )

@@ -252,13 +252,15 @@ typedef struct {
 /* Derivatives of everything that a run is given, [parameter] first: of gravity, of the values that bearing_new takes, of
  * q, v [nb][nq], f [nb][2]; of the coefficients of motion and load, those with the index motion[i], load[i] of
  * `motions`, `loads` [index][pieces][6][degree + 1], -1: zero. All arrays are given. steps [step_count]: ends of all
- * steps [s], in place of the step control, for checks. Histories and steps must outlive the run. */
+ * steps [s], in place of the step control, for checks. Histories and steps must outlive the run. energies: whether the
+ * derivatives of the works, integrals over the run, are computed too; else those of a row are zero. */
 typedef struct {
     int count;
     const double *gravity, *bodies, *surfaces, *top, *q, *v, *f, *motion, *load;
     const double *motions, *loads;
     const double *steps;
     int step_count;
+    int energies;
 } msfp_gradient_inputs;
 
 /* A stiffly accurate ESDIRK method, for a program that takes its own steps. Stage 0 is the start of

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from support import Array
-from support.gradients import derivative, double, single, step_of, triple, values_around
+from support import Array, scene_of
+from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
 
-from msfp_gen import Load, Scene, simulate
+from msfp_gen import Load, Motion, Scene, simulate
 from msfp_gen.model.model import Model, build_model
-from msfp_gen.results.gradient import ENERGIES
+from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS
 from msfp_gen.results.row_unpacking import unpacked
+from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.simulate import RunSequence
@@ -34,22 +36,28 @@ STATE = ("initial_state.q[0][0]", "initial_state.q[1][1]", "initial_state.v[1][1
 WEAK = ("contact_damping", "mass", "centroid", "gravity", "stiffness", "damping", "rotational_stiffness",
         "rotational_damping")  # fmt: skip
 CHECKED = ("tilt_angles", "tilt_rates", "friction_state", "normal_force", "top_force", "top_moment", "displacement",
-           *ENERGIES)  # fmt: skip
+           *WITH_INTEGRALS)  # fmt: skip
+# A term may be small beside the others: the energies of a state, and the closing error, which all of them determine.
+TOGETHER = dict.fromkeys(ENERGIES, ENERGIES) | {"numerical": WITH_INTEGRALS}
+ROUNDING = {"top_dissipated": 4e-10}
+"""Over the quantity, where it is more than 1e-11: velocities across a stiff spring are differences of larger ones."""
 
 
 class FrozenSteps:
-    """Runs of a scene with the steps that it takes at its tolerance, and with Newton's method converged further."""
+    """Runs of a scene with the steps that it takes at its tolerance, and with Newton's method converged further.
 
-    def __init__(self, scene: Scene) -> None:
-        first = simulate(scene)
-        self.steps = first.history.time[1:]
-        self.scene = replace(scene, solver=replace(scene.solver, rtol=1e-10))
+    steps: ends of other steps [s].
+    """
+
+    def __init__(self, scene: Scene, steps: Array | None = None) -> None:
+        self.steps = simulate(scene).history.time[1:] if steps is None else steps
+        self.scene = replace(scene, solver=replace(scene.solver, rtol=1e-10), output_step=None)
         self.model: Model = build_model(scene.bearing.layout, scene.modelled, gradients=True)
 
     def run(self, scene: Scene, parameters: Sequence[Parameter]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         """Rows by field, and their derivatives with respect to each parameter."""
         run, azimuth = RunSequence.of(scene).start_segment(self.model)
-        start_gradients(run, scene, self.model, parameters, list(self.steps))
+        start_gradients(run, scene, self.model, parameters, list(self.steps), energies=True)
         while run.advance():
             pass
         assert run.status[0] == "ok"
@@ -66,13 +74,16 @@ class FrozenSteps:
         return {name: derivative([run[name] for run in runs], step)[0] for name in CHECKED}
 
 
-def check_frozen(scene: Scene, paths: Sequence[str], size: float = 1e-4, weak: float = 100.0) -> None:
-    """Every derivative agrees to 1e-6 of its largest value, but for the rounding of the differences.
+def check_frozen(
+    scene: Scene, paths: Sequence[str], size: float = 1e-4, weak: float = 100.0, steps: Array | None = None
+) -> dict[str, Any]:
+    """Every derivative agrees to 1e-6 of its largest value, but for the rounding of the differences; returns the rows.
 
     Newton's method stops at 1e-10 of the friction, and mostly far below; a difference divides that by its step.
-    size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly.
+    size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly. steps: of
+    `FrozenSteps`.
     """
-    frozen = FrozenSteps(scene)
+    frozen = FrozenSteps(scene, steps)
     parameters = parameters_of(scene, paths)
     values, slopes = frozen.run(frozen.scene, parameters)
     for parameter, slope in zip(parameters, slopes, strict=True):
@@ -81,11 +92,12 @@ def check_frozen(scene: Scene, paths: Sequence[str], size: float = 1e-4, weak: f
         step = step_of(parameter, weak * size if parameter.field in WEAK else size)
         found = frozen.differences(parameter, step)
         for name in CHECKED:
-            together = ENERGIES if name in ENERGIES else (name,)  # a term of the energy may be small beside the others
+            together = TOGETHER.get(name, (name,))
             largest, value = (max(np.abs(each[other]).max() for other in together) for each in (found, values))
-            rounding = 1e-11 * value / step
+            rounding = ROUNDING.get(name, 1e-11) * value / step
             error = np.abs(slope[name] - found[name]).max()
             assert error <= 1e-6 * largest + rounding, (parameter.path, name, error / largest)
+    return values
 
 
 def test_differences_with_the_same_steps_in_a_triple_pendulum() -> None:
@@ -120,6 +132,101 @@ def test_differences_with_the_same_steps_in_quasi_static_runs(hysteresis: str) -
     without_effect = ("mass", "centroid", "inertia[0]", "rim_radius", "base_height", "damping", "rotational_damping")
     paths = [path for path in (*STACK, *RIG) if path.rpartition(".")[2] not in without_effect]
     check_frozen(single(hysteresis), [*paths, "initial_state.h[0][0]"], weak=10.0)
+
+
+def test_works_where_no_rate_rings() -> None:
+    """Third-order weights integrate the works where the error is below the tolerance.
+
+    Here it is in most steps, although the tolerance of Newton's method is small: the slider slides, so that Y has
+    hardly an error, and that of angles does not count.
+    """
+    scene = single()
+    solver = replace(scene.solver, atol_angle=1e3)
+    scene = replace(scene, motion=Motion.harmonic(0.1, 0.5, cycles=1.0), duration=0.45, solver=solver)
+    scene = replace(scene, top=replace(scene.top, damping=1e6))
+    assert not quasistatic(scene, scene.modelled)
+    times = simulate(replace(scene, solver=replace(solver, atol_angle=None, rtol=1e-6))).history.time
+    steps = np.concatenate([times[(times > 0) & (times < 0.1)], np.linspace(0.1, 0.45, 46)])
+    paths = ["bearing.surfaces[0].friction", "bearing.surfaces[0].radius", "top.axial_load", "motion.scale"]
+    check_frozen(scene, paths, steps=steps)
+
+
+@pytest.mark.parametrize("spin", ["locked", pytest.param("patch", marks=pytest.mark.slow)])
+def test_works_of_spin_under_a_motion_in_two_directions(spin: str) -> None:
+    """Of the moments that lock it, and of the drilling moment of contact patches."""
+    time = np.linspace(0.0, 2.0, 401)
+    wave = np.sin(np.pi * time)
+    motion = Motion.from_arrays(time, np.column_stack([0.05 * wave, 0.035 * wave**2, 0.0 * wave]))
+    scene = replace(triple(0.6), motion=motion, motion_table=None)
+    scene = replace(scene, effects=replace(scene.modelled, spin=spin))
+    check_frozen(scene, ["bearing.surfaces[0].friction", "bearing.surfaces[0].radius", "motion.scale"], 1e-5)
+
+
+@pytest.mark.parametrize(("method", "damping", "count"), [("implicit", 8000.0, 600), ("esdirk4", 2000.0, 900)])
+def test_works_through_a_rim_contact_with_the_same_steps(method: str, damping: float, count: int) -> None:
+    """Even steps, of which no stage meets or leaves a rim because of a difference; after some the damper would pull."""
+    scene = scene_of("fenz-test2", solver={"method": method}, duration=0.3, stop=None, motion_table=None)
+    scene = replace(scene, motion=Motion.harmonic(0.12, 2.0))
+    scene = replace(scene, bearing=scene.bearing.replace(rim_damping=damping, **DAMPED))
+    paths, steps = ["rim_stiffness", "rim_damping", "radius"], np.linspace(0.0, 0.3, count + 1)[1:]
+    check_frozen(scene, ["bearing.surfaces[0].capacity"], 2e-7, steps=steps)
+    values = check_frozen(scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], 1e-6, 1.0, steps)
+    gap, force = values["gap"][:, 0], values["rim_force"][:, 0]
+    assert np.any((gap < 0) & (force == 0))
+    assert values["rim_dissipated"][-1] > 0.3
+
+
+def test_the_closing_error_of_the_energy_balance_hardly_depends_on_parameters() -> None:
+    """Input less all other terms is the error of the integration, and so is its derivative."""
+    paths = ["bearing.surfaces[*].friction", "bearing.surfaces[0].radius", "top.axial_load", "motion.scale"]
+    for rtol, limit in ((1e-6, 1e-4), (1e-8, 1e-6)):
+        scene = replace(triple(rtol=rtol, method="esdirk4"), output_step=0.1)
+        found = simulate(scene, gradients=paths, energy_gradients=True).gradient
+        for index in range(len(found.parameter)):
+            largest = np.abs(found.energy_input.values[index]).max()
+            assert np.abs(found.energy_numerical.values[index]).max() <= limit * largest
+
+
+def normal_force(load: float, tilt: float, mu: float, arms: float) -> float:
+    """N of `test_a_single_pendulum_in_closed_form`, by iteration. arms: R/a with the sign of the slip."""
+    normal = load
+    for _ in range(50):
+        force = (load * np.sin(tilt) + arms * mu * normal) / np.cos(tilt)
+        normal = np.sqrt((force**2 + load**2) / (1 + mu**2))
+    return normal
+
+
+def dissipated(tilts: Array, load: float, mu: float, radius: float, arm: float, depth: float) -> float:
+    """mu N times the path of a single pendulum between tilts, less what friction does not dissipate after a reversal.
+
+    Friction then goes from -Y to zero over the slip d_y, without loss, and by dY/ds = 1 - Y^2 to 1, which dissipates
+    less than at Y = 1 by the slip d_y (1/2 + ln 2); at the start only that.
+    """
+    points, weights = np.polynomial.legendre.leggauss(20)
+    total = 0.0
+    for index, (begin, end) in enumerate(pairwise(tilts)):
+        middle, half, sign = (begin + end) / 2, abs(end - begin) / 2, np.sign(end - begin)
+        forces = [normal_force(load, middle + half * x, mu, sign * radius / arm) for x in points]
+        missing = depth * ((1.5 if index else 0.5) + np.log(2)) * normal_force(load, begin, mu, 0.0)
+        total += mu * (radius * half * float(weights @ forces) - missing)
+    return total
+
+
+def test_energy_dissipated_by_a_single_pendulum_in_closed_form() -> None:
+    """Two cycles at constant friction: mu N times the path, and its derivative."""
+    scene = single()
+    solver = replace(scene.solver, rtol=1e-9, max_step=5e-3)
+    scene = replace(scene, top=replace(scene.top, stiffness=1e12), solver=solver)
+    result = simulate(scene, gradients=["bearing.surfaces[0].friction"], energy_gradients=True)
+    surface, tilt, load = scene.bearing.surfaces[0], result.history.tilt_angles[:, 0, 1], scene.top.axial_load
+    direction = np.sign(np.diff(tilt))
+    turns = [0, *(1 + np.flatnonzero(direction[1:] * direction[:-1] < 0)), len(tilt) - 1]
+    rest = (surface.radius, surface.radius - scene.bearing.bodies[0].height, surface.yield_displacement)
+    mu, step = surface.friction, 1e-4
+    below, at, above = (dissipated(tilt[turns], load, mu + shift, *rest) for shift in (-step, 0.0, step))
+    assert result.history.energy["friction_dissipated"][-1] == pytest.approx(at, rel=2e-5)
+    found = float(result.gradient.energy_friction_dissipated.values[0, -1])
+    assert found == pytest.approx((above - below) / (2 * step), rel=2e-5)
 
 
 def test_a_single_pendulum_in_closed_form() -> None:

@@ -48,7 +48,7 @@ static const msfp_columns no_motion[3][6]; /* columns of a base that a parameter
 
 /* Columns of the base plate. */
 static MSFP_COLUMNWISE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                            const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+                                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double below[MSFP_BODY_SIZE], dbelow[MSFP_BODY_SIZE * C] = { 0 };
     msfp_columns(*base)[6] = (msfp_columns(*)[6])dat->base;
@@ -61,7 +61,7 @@ static MSFP_COLUMNWISE void base_plate(const msfp_parameters *p, const msfp_para
 }
 
 MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+                            const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     put_coordinates(d->x[0], (msfp_columns *)dat->base[0] + 3, (msfp_columns *)dat->base[1] + 3,
                     (msfp_columns *)dat->base[2] + 3);
@@ -82,7 +82,7 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
 
 /* Columns of the block `foot_stage`, which msfp_foot_stage fills. */
 MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point_columns *dat,
-                       const double *stage, double *d)
+                            const double *stage, double *d)
 {
     const double *top = p->top, *dtop = dp->top, beta = stage[MSFP_FOOT_STAGE_BETA];
     const double mobility = stage[MSFP_FOOT_STAGE_MOBILITY], mass = msfp_sprung_mass(p);
@@ -103,7 +103,7 @@ MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_colum
 }
 
 MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+                     const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double force[FORCE], moment[MOMENT], dforce[FORCE * C], dmoment[MOMENT * C];
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
@@ -126,7 +126,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
 }
 
 MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                 const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+                                       const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
     if (msfp_top_is_sprung(p)) {
@@ -140,11 +140,10 @@ MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_para
     }
 }
 
-/* Columns of a rim that pushes. */
-MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
-                msfp_work_columns *d)
-{
 #if MSFP_RIMS
+MSFP_COLUMNWISE void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                      int j, const msfp_work_columns *d, double *columns)
+{
     double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < MSFP_PAIR; ++i) {
@@ -152,17 +151,14 @@ MSFP_INLINE void rim(const msfp_parameters *p, const msfp_parameter_columns *dp,
             x[to] = w->x[j + 1][field];
             memcpy(dx + to * C, d->x[j + 1] + field * C, C * sizeof *dx);
         }
-    msfp_rim_direction(p->surface[j], x, w->rim[j], dp->surface[j], dx, d->rim[j]);
-#else
-    (void)p;
-    (void)dp;
-    (void)w;
-#endif
+    msfp_rim_direction(p->surface[j], x, dp->surface[j], dx, columns);
 }
+#endif
 
-MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                                      const msfp_point_columns *dat, const msfp_seed *seed, const msfp_work *w,
-                                      const msfp_slopes *slopes, int wanted, msfp_work_columns *d)
+MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                            const msfp_point *at, const msfp_point_columns *dat, const msfp_seed *seed,
+                                            const msfp_work *w, const msfp_slopes *slopes, int wanted,
+                                            msfp_work_columns *d)
 {
     static const double no_rim[MSFP_RIM_SIZE * C];
     double moment[MOMENT], dmoment[MOMENT * C], dangular[MSFP_ANGULAR_SIZE * C];
@@ -174,10 +170,13 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
                                        dp->body[j + 1], d->body[j + 1], d->force[j + 1], d->force[j]);
     for (int j = 0; j < NB; ++j) {
         const double *drim = w->rim_active[j] ? d->rim[j] : no_rim;
+#if MSFP_RIMS
         if (w->rim_active[j])
-            rim(p, dp, w, j, d);
+            msfp_rim_columns(p, dp, w, j, d, d->rim[j]);
+#endif
         msfp_surface_local_direction(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j],
-                                     w->local[j], d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], drim, d->local[j]);
+                                     w->local[j], d->body[j], d->body[j + 1], d->x[j + 1], d->x[j], d->force[j], drim,
+                                     d->local[j]);
         msfp_contact_columns(p, dp, seed, dat, w, slopes, j, wanted & MSFP_OF_ROW, d);
         if (!(wanted & MSFP_OF_RESIDUAL))
             continue;

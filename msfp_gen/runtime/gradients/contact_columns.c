@@ -116,8 +116,8 @@ MSFP_INLINE void stage_columns(const msfp_parameters *p, const msfp_parameter_co
 
 /* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law; their matrix is near
  * the identity, so that elimination needs no pivots. rates: df/dt; rates and tau by lanes. */
-MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows,
-                           double (*restrict jacobian)[INPUTS][LANES], double (*restrict slopes)[INPUTS][LANES])
+MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, double (*restrict jacobian)[INPUTS][LANES],
+                           double (*restrict slopes)[INPUTS][LANES])
 {
     double a[UNKNOWNS][INPUTS][LANES]; /* of the unknowns by the given inputs, then their matrix */
     for (int r = 0; r < UNKNOWNS; ++r)
@@ -189,7 +189,7 @@ MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed,
 }
 
 MSFP_COLUMNWISE void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
-                                   const double g[MSFP_NB][2], int all, msfp_slopes *slopes)
+                                         const double g[MSFP_NB][2], int all, msfp_slopes *slopes)
 {
     if (all)
         contact_slopes(p, seed, w, g, RESULTS, slopes);
@@ -254,9 +254,9 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
     results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
 }
 
-MSFP_COLUMNWISE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                                    const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
-                                    int all, msfp_work_columns *d)
+MSFP_COLUMNWISE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                          const msfp_seed *seed, const msfp_point_columns *dat, const msfp_work *w,
+                                          const msfp_slopes *slopes, int j, int all, msfp_work_columns *d)
 {
     if (all)
         contact_columns(p, dp, seed, dat, w, slopes, j, RESULTS, d);

@@ -49,6 +49,10 @@ typedef struct {
     double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
+/* Columns of the rim of surface j [MSFP_RIM_SIZE][MSFP_COLUMNS], whether it pushes or not. */
+void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
+                      const msfp_work_columns *d, double *columns);
+
 /* What an evaluation is for: the residual with the rates of Y, Z; a row, with all results of the contacts. */
 enum { MSFP_OF_RESIDUAL = 1, MSFP_OF_ROW = 2 };
 /* Columns of the condensed equations at the evaluation in `w`. */
@@ -76,6 +80,10 @@ void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns
 void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                          msfp_columns *row);
+/* Columns of the energies of all masses and of the power of the base acceleration [MSFP_ENERGY_SIZE]. */
+void msfp_mechanical_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
+                             msfp_columns *energy);
 /* Columns of the sliding displacements and gaps at given coordinates. */
 void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
                        msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE]);
@@ -84,11 +92,25 @@ void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *d
 
 typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
 
-/* Columns of a state, and of its time. */
+/* Columns of the powers of one evaluation [W]; prescribed, load: parts of the input. */
+typedef struct {
+    msfp_columns of[MSFP_WORKS], prescribed, load;
+} msfp_power_columns;
+
+/* Columns of a state, and of its time; of works and powers where they are computed, else zero. */
 typedef struct {
     msfp_columns t, q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
-    msfp_columns foot[MSFP_FOOT_SIZE];
+    msfp_columns foot[MSFP_FOOT_SIZE], work[MSFP_WORKS];
+    msfp_power_columns power;
 } msfp_state_columns;
+
+#if MSFP_CLOSED_FORM
+/* Of what the work of a quasi-static step follows from (msfp_step_history): powers before it, and at its end. */
+typedef struct {
+    msfp_power_columns power;
+    msfp_columns load[6], top[3], tilt, normal[MSFP_NB];
+} msfp_history_columns;
+#endif
 
 /* MSFP_COLUMNS parameters of a run. */
 typedef struct {
@@ -104,6 +126,10 @@ typedef struct {
     msfp_row_columns start_row, end_row; /* of the rows at the ends of the step, where they are known */
     int start_known, end_known;
     msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
+    msfp_power_columns power[MSFP_STAGES]; /* of the stages, where works are computed */
+#if MSFP_CLOSED_FORM
+    msfp_history_columns history;
+#endif
 } msfp_group;
 
 /* The stages of a step as the method solved them, and their factored tangents. */
@@ -113,6 +139,8 @@ typedef struct {
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
     int meets_rim;  /* the first stage with the force of a rim that the step only just meets; 0: none */
+    double power[MSFP_STAGES][MSFP_WORKS], prescribed[MSFP_STAGES];
+    int ringing; /* whether the step integrates its works as where rates ring (refine_integrals of implicit.c) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
 } msfp_trail;
@@ -134,6 +162,7 @@ typedef struct {
 
 struct msfp_gradients {
     int count, groups; /* parameters, and groups of MSFP_COLUMNS of them */
+    int energies;      /* whether columns of the works are computed */
     msfp_group *group;
     msfp_trail trail;
     msfp_recording recording;
@@ -147,7 +176,7 @@ struct msfp_gradients {
     double outward_rate;    /* likewise */
 };
 
-/* ---- gradients.c ---- */
+/* ---- accepted_step.c ---- */
 
 /* Columns of the time at which the gap of surface j is zero, from those of the state at the end of the step: minus the
  * columns of the gap before contact, over its rate. Where the gap does not change they are zero. */
@@ -193,6 +222,33 @@ MSFP_INLINE int msfp_any_column(const double *columns)
     return 0;
 }
 
+/* The columns of a polar vector of a block along E1, E2, E3. */
+MSFP_INLINE void msfp_get_polar(const double *block, msfp_columns *vector)
+{
+    if (MSFP_PLANAR)
+        memset(vector[1], 0, sizeof *vector);
+    for (int i = 0; i < MSFP_FORCE_SIZE; ++i)
+        memcpy(vector[MSFP_PLANAR ? 2 * i : i], block + i * MSFP_COLUMNS, sizeof *vector);
+}
+/* The same of an axial vector, which in the plane has E2 only. */
+MSFP_INLINE void msfp_get_axial(const double *block, msfp_columns *vector)
+{
+    memset(vector, 0, 3 * sizeof *vector);
+    for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
+        memcpy(vector[MSFP_PLANAR ? 1 : i], block + i * MSFP_COLUMNS, sizeof *vector);
+}
+
+MSFP_INLINE int msfp_last_stage(const msfp_run *run)
+{
+    return msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+}
+/* Stage whose rates and powers count where those of stage j are discontinuous at a rim and the step becomes longer: one
+ * before a contact at its end. */
+MSFP_INLINE int msfp_stage_before_contact(const msfp_trail *trail, int j)
+{
+    return trail->meets_rim > 0 && j >= trail->meets_rim ? trail->meets_rim - 1 : j;
+}
+
 /* Columns of base motion and load at time t [s], whose columns are dt, into `dat`. */
 void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat);
 /* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
@@ -202,10 +258,27 @@ void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][
 /* Columns of accelerations and rates that are consistent with the present state, after those of q, v, f and the foot;
  * first: at the start of the run, where the columns of the foot follow too. Returns a status. */
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
+/* Rates of the bodies [MSFP_NB][MSFP_NQ] at stage j, by which the state grows with the length of the step. Those of
+ * massless bodies jump at a rim: they are those before a contact at the end of the step. */
+const double *msfp_rates_of_stage(const msfp_run *run, int j);
 /* Columns of the accepted step, whose stages are in the trail; group->h is given. */
 void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
 void msfp_complete_columns(msfp_run *run, msfp_group *group);
+
+/* ---- power_columns.c, work_columns.c: works of the energy balance, where they are asked for ---- */
+
+/* Columns of the powers at the evaluation in `w`, with all results of its contacts. */
+void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                            const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
+                            msfp_power_columns *power);
+/* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
+void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
+                        const double g[MSFP_NB][2]);
+/* Columns of the works up to stage i, which is solved, into group->next; after the last stage of the step. */
+void msfp_stage_works(msfp_run *run, msfp_group *group, int i);
+/* Columns of the works of a quasi-static step, whose evaluation is complete. */
+void msfp_quasistatic_works(msfp_run *run, msfp_group *group);
 
 /* ---- row_columns.c ---- */
 

@@ -22,7 +22,8 @@ MSFP_INLINE void third_derivative(const msfp_history *h, double t, double out[6]
     }
 }
 
-MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat)
+MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt,
+                                         msfp_point_columns *dat)
 {
     double found[3][6], third[6];
     if (run->next_jump < run->jump_count && t >= run->jumps[run->next_jump]) /* as msfp_point_at */
@@ -117,6 +118,8 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     }
     msfp_friction_columns(&group->work, now->df, NULL);
     memcpy(now->foot, group->work.foot, sizeof now->foot);
+    if (run->gradients->energies)
+        msfp_initial_works(run, group, &at, &seed, (const double(*)[2])g);
     return MSFP_OK;
 }
 #endif

@@ -11,16 +11,8 @@
 
 enum { NB = MSFP_NB, C = MSFP_COLUMNS, FORCE = MSFP_FORCE_SIZE };
 
-/* The columns of a polar vector of a block along E1, E2, E3. */
-MSFP_INLINE void get_polar(const double *block, msfp_columns *vector)
-{
-    if (MSFP_PLANAR)
-        memset(vector[1], 0, sizeof *vector);
-    for (int i = 0; i < FORCE; ++i)
-        memcpy(vector[MSFP_PLANAR ? 2 * i : i], block + i * C, sizeof *vector);
-}
-
-/* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the centre,
+/* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
+ * centre,
  * where its columns are zero. */
 MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
                              const double *sliding, msfp_columns *gap)
@@ -34,8 +26,9 @@ MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double
     }
 }
 
-MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
-                       msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
+MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                       const double q[MSFP_NB][MSFP_NQ], msfp_columns dq[MSFP_NB][MSFP_NQ],
+                                       msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
     double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 }, sliding[MSFP_GAP_SIZE];
     for (int j = 0; j < NB; ++j) {
@@ -58,13 +51,12 @@ MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_para
     }
 }
 
-/* Kinetic and potential energy of all masses. */
-MSFP_INLINE void mechanical(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                       const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                       msfp_columns *row)
+MSFP_COLUMNWISE void msfp_mechanical_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                             const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
+                                             const msfp_work_columns *d, msfp_columns *energy)
 {
     double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C];
-    double one[MSFP_ENERGY_SIZE * C];
+    msfp_columns one[MSFP_ENERGY_SIZE];
     static const int first[3] = { MSFP_BASE_MOTION_OX, MSFP_BASE_MOTION_UX, MSFP_BASE_MOTION_BX };
     msfp_base_motion_O_put(base, at->base[0]);
     msfp_base_motion_U_put(base, at->base[1]);
@@ -72,24 +64,19 @@ MSFP_INLINE void mechanical(const msfp_parameters *p, const msfp_parameter_colum
     for (int order = 0; order < 3; ++order)
         for (int i = 0; i < FORCE; ++i)
             memcpy(dbase + (first[order] + i) * C, dat->base[order][MSFP_PLANAR ? 2 * i : i], C * sizeof *dbase);
-    memset(row[MSFP_ROW_KINETIC], 0, sizeof *row);
-    memset(row[MSFP_ROW_POTENTIAL], 0, sizeof *row);
+    memset(energy, 0, MSFP_ENERGY_SIZE * sizeof *energy);
     for (int k = 1; k <= NB + 1; ++k) {
         if (k <= NB)
-            msfp_body_energy_direction(p->body[k], w->body[k], base, dp->body[k], d->body[k], dbase, one);
+            msfp_body_energy_direction(p->body[k], w->body[k], base, dp->body[k], d->body[k], dbase, one[0]);
         else
-            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, dp->top, d->body[NB], dbase, d->foot,
-                                      one);
-        for (int c = 0; c < C; ++c) {
-            row[MSFP_ROW_KINETIC][c] += one[MSFP_ENERGY_KINETIC * C + c];
-            row[MSFP_ROW_POTENTIAL][c] += one[MSFP_ENERGY_POTENTIAL * C + c];
-        }
+            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, dp->top, d->body[NB], dbase, d->foot, one[0]);
+        msfp_add_columns(energy, (const msfp_columns *)one, 1.0, MSFP_ENERGY_SIZE);
     }
 }
 
 /* Settlement of the top and energy of its springs (restraint_energy of observe.c). */
 MSFP_INLINE void restraint(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                      const msfp_work *w, const msfp_work_columns *d, msfp_columns *row)
+                           const msfp_work *w, const msfp_work_columns *d, msfp_columns *row)
 {
     const double *t = p->top, *dt = dp->top;
     double C0[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, settlement[2];
@@ -97,9 +84,9 @@ MSFP_INLINE void restraint(const msfp_parameters *p, const msfp_parameter_column
     msfp_body_C_get(w->body[NB], C0);
     msfp_body_t3_get(w->body[NB], axis);
     msfp_top_parameters_x0_get(t, anchor);
-    get_polar(d->body[NB] + MSFP_BODY_CX * C, dC);
-    get_polar(d->body[NB] + MSFP_BODY_T3X * C, daxis);
-    get_polar(dt + MSFP_TOP_PARAMETERS_X0X * C, danchor);
+    msfp_get_polar(d->body[NB] + MSFP_BODY_CX * C, dC);
+    msfp_get_polar(d->body[NB] + MSFP_BODY_T3X * C, daxis);
+    msfp_get_polar(dt + MSFP_TOP_PARAMETERS_X0X * C, danchor);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
     msfp_support_axis(at, upright);
@@ -145,7 +132,7 @@ MSFP_INLINE void rim_energy(const double *par, const double *dpar, double gap, c
 
 /* Quantities of surface j. */
 MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                    const msfp_work_columns *d, int j, msfp_columns *row)
+                         const msfp_work_columns *d, int j, msfp_columns *row)
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
@@ -171,15 +158,16 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
     gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], sliding, gap);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
-    get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
+    msfp_get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
     if (MSFP_RIMS && sliding[MSFP_GAP_G] < 0.0)
         rim_energy(p->surface[j], dp->surface[j], sliding[MSFP_GAP_G], gap[MSFP_GAP_G], row[MSFP_ROW_RIM_STORED]);
 }
 
-MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                         const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                         msfp_columns *row)
+MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                         const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
+                                         const msfp_work_columns *d, msfp_columns *row)
 {
+    msfp_columns energy[MSFP_ENERGY_SIZE];
     memset(row, 0, MSFP_ROW_SIZE * sizeof *row);
     memcpy(row + MSFP_ROW_Q, dat->q, sizeof dat->q);
     memcpy(row + MSFP_ROW_V, dat->v, sizeof dat->v);
@@ -192,13 +180,15 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
         surface(p, dp, w, d, j, row);
     }
     memcpy(row + MSFP_ROW_BASE, dat->base[0], 3 * sizeof *row);
-    get_polar(d->body[NB] + MSFP_BODY_CX * C, row + MSFP_ROW_TOP);
+    msfp_get_polar(d->body[NB] + MSFP_BODY_CX * C, row + MSFP_ROW_TOP);
     if (MSFP_PLANAR)
         memcpy(row[MSFP_ROW_TOP + 1], dat->base[0][1], sizeof *row);
-    get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
+    msfp_get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
         memcpy(row[MSFP_ROW_TOP_MOMENT + (MSFP_PLANAR ? 1 : i)], d->moment[NB] + i * C, sizeof *row);
     restraint(p, dp, at, w, d, row);
-    mechanical(p, dp, at, dat, w, d, row);
+    msfp_mechanical_columns(p, dp, at, dat, w, d, energy);
+    memcpy(row[MSFP_ROW_KINETIC], energy[MSFP_ENERGY_KINETIC], sizeof *row);
+    memcpy(row[MSFP_ROW_POTENTIAL], energy[MSFP_ENERGY_POTENTIAL], sizeof *row);
 }
 #endif

@@ -25,6 +25,7 @@ static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observ
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
     msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
+    memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
 }
 
 void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s, const msfp_state_columns *ds,
@@ -166,7 +167,7 @@ MSFP_INLINE void weigh(const double *weights, int rows, const double *const *num
 }
 
 MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
-                                        msfp_row_columns d)
+                                              msfp_row_columns d)
 {
     msfp_observe_node_columns(run, group);
     const msfp_recording *rows = &run->gradients->recording;
@@ -196,12 +197,13 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, 
 void msfp_row_reached_columns(msfp_run *run, msfp_group *group)
 {
     const msfp_trail *trail = &run->gradients->trail;
-    const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    const int last = msfp_last_stage(run);
     if (group->end_known)
         return;
     msfp_complete_columns(run, group);
     msfp_record_columns(&run->parameters, &group->parameters, &trail->stage[last].at, &group->point,
                         &trail->work[last], &group->work, group->end_row);
+    memcpy(group->end_row[MSFP_ROW_WORK], group->next.work, sizeof group->next.work);
     group->end_known = 1;
 }
 

@@ -14,7 +14,7 @@ static const int unknown[ND] = MSFP_FREE;
 
 /* As msfp_lu_solve for all columns at once. */
 MSFP_COLUMNWISE void msfp_solve_columns(const double *restrict factors, const int *restrict pivots,
-                                  msfp_columns *restrict columns)
+                                        msfp_columns *restrict columns)
 {
     enum { PACKS = C / MSFP_PACK_SIZE };
     msfp_pack *const x = (msfp_pack *)columns;
@@ -56,17 +56,16 @@ typedef struct {
     double rates[STAGES][NB][2]; /* of Y, Z */
 } stage_columns;
 
-/* Values of the rates of stage j. */
-static const double *rates_v(const msfp_run *run, int j)
+const double *msfp_rates_of_stage(const msfp_run *run, int j)
 {
+    j = MSFP_MASSLESS ? msfp_stage_before_contact(&run->gradients->trail, j) : j;
     return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
 }
 
-/* Its accelerations, by which the rates grow with the length of the step: those before a contact at its end. */
+/* Its accelerations, by which the rates grow: those before a contact. */
 static const double *rates_a(const msfp_run *run, int j)
 {
-    const int met = run->gradients->trail.meets_rim;
-    j = met && j >= met ? met - 1 : j;
+    j = msfp_stage_before_contact(&run->gradients->trail, j);
     return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
 }
 
@@ -76,8 +75,9 @@ static const double *rates_foot(const msfp_run *run, int j)
 }
 
 /* Columns of Q, V, fp and the foot of stage i, as `prepare` of implicit.c forms them. */
-MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const stage_columns *s, const msfp_tableau *method,
-                    int i, double h, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ], msfp_point_columns *dat)
+MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const stage_columns *s,
+                         const msfp_tableau *method, int i, double h, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
+                         msfp_point_columns *dat)
 {
     const msfp_state_columns *now = &group->now;
     const msfp_stage *stage = &run->gradients->trail.stage[i];
@@ -92,7 +92,7 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
         msfp_add_columns(&dat->f[0][0], &s->df[j][0][0], h * weight, 2 * NB);
         msfp_add_columns(dat->foot, s->foot[j], h * weight, 2);
         if (msfp_any_column(group->h)) {
-            msfp_add_scaled(&Q[0][0], rates_v(run, j), group->h, weight, NB * NQ);
+            msfp_add_scaled(&Q[0][0], msfp_rates_of_stage(run, j), group->h, weight, NB * NQ);
             msfp_add_scaled(&V[0][0], rates_a(run, j), group->h, weight, NB * NQ);
             msfp_add_scaled(&dat->f[0][0], &s->rates[j][0][0], group->h, weight, 2 * NB);
             msfp_add_scaled(dat->foot, rates_foot(run, j), group->h, weight, 2);
@@ -104,10 +104,11 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
     }
 }
 
-/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta. longer: of rates_a. */
-MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp_columns (*restrict Q)[NQ],
-                             msfp_columns (*restrict V)[NQ], msfp_point_columns *restrict dat)
+/* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
+MSFP_INLINE void stage_point(const msfp_run *run, int i, msfp_columns (*restrict Q)[NQ], msfp_columns (*restrict V)[NQ],
+                             msfp_point_columns *restrict dat)
 {
+    const msfp_stage *stage = &run->gradients->trail.stage[i];
     const double beta = stage->beta, rate = stage->inertia / beta;
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < NQ; ++d)
@@ -117,8 +118,8 @@ MSFP_INLINE void stage_point(const msfp_stage *stage, const double *longer, msfp
             }
     if (!msfp_any_column(dat->beta))
         return;
-    msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);
-    msfp_add_scaled(dat->a[0], longer, dat->beta, -rate, NB * NQ);
+    msfp_add_scaled(dat->q[0], msfp_rates_of_stage(run, i), dat->beta, 1.0, NB * NQ);
+    msfp_add_scaled(dat->a[0], rates_a(run, i), dat->beta, -rate, NB * NQ);
 }
 
 /* Solve stage i for the columns of its rates: group->point. group->work has the columns at constant rates. */
@@ -127,34 +128,33 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
     msfp_point_columns *dat = &group->point;
-    const double *longer = rates_a(run, i);
     msfp_columns *x = group->work.residual;
     memcpy(dat->v, group->now.v, sizeof dat->v); /* of a locked spin */
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
-    stage_point(stage, longer, Q, V, dat);
+    stage_point(run, i, Q, V, dat);
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
                            &trail->slopes[i], MSFP_OF_RESIDUAL, &group->work);
     msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
-    stage_point(stage, longer, Q, V, dat);
+    stage_point(run, i, Q, V, dat);
     group->complete = 0;
 }
 
 void msfp_complete_columns(msfp_run *run, msfp_group *group)
 {
     msfp_trail *trail = &run->gradients->trail;
-    const int last = msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
+    const int last = msfp_last_stage(run), wanted = MSFP_OF_ROW | (run->gradients->energies ? MSFP_OF_RESIDUAL : 0);
     const msfp_stage *stage = &trail->stage[last];
     if (!trail->all_slopes)
         msfp_contact_slopes(&run->parameters, &stage->seed, &trail->work[last], stage->g, 1, &trail->slopes[last]);
     trail->all_slopes = 1;
     if (!group->complete)
         msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
-                               &trail->work[last], &trail->slopes[last], MSFP_OF_ROW, &group->work);
+                               &trail->work[last], &trail->slopes[last], wanted, &group->work);
     group->complete = 1;
 }
 
@@ -215,7 +215,11 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
     memcpy(s.rates[0], run->now.df, sizeof s.rates[0]);
     memset(dat, 0, sizeof *dat);
     for (int i = 1; i < method->stages; ++i) {
-        msfp_friction_rates(&trail->work[i], s.rates[i]);
+        const int smooth = MSFP_MASSLESS ? msfp_stage_before_contact(trail, i) : i;
+        if (smooth == i)
+            msfp_friction_rates(&trail->work[i], s.rates[i]);
+        else
+            memcpy(s.rates[i], s.rates[smooth], sizeof s.rates[i]);
         prepare(run, group, &s, method, i, h, Q, V, dat);
         for (int c = 0; c < C; ++c)
             dt[c] = now->t[c] + method->c[i] * group->h[c];
@@ -230,6 +234,8 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
         memcpy(next->a, dat->a, sizeof next->a);
         memcpy(next->df, s.df[i], sizeof next->df);
         memcpy(next->foot, group->work.foot, sizeof next->foot);
+        if (run->gradients->energies)
+            msfp_stage_works(run, group, i);
         if (node < run->node_count && i == method->nodes[node])
             group->node[node++] = *next;
     }
@@ -241,7 +247,6 @@ enum { ANGLE = 1 };
 /* A quasi-static step: the parabola through the last two states, at whose end forces balance (quasistatic.c). */
 static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_group *group)
 {
-    const msfp_stage *stage = &run->gradients->trail.stage[1];
     const msfp_state_columns *now = &group->now;
     msfp_state_columns *next = &group->next;
     msfp_point_columns *dat = &group->point;
@@ -269,6 +274,8 @@ static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_group *group)
         for (int c = 0; c < C; ++c)
             next->a[k][ANGLE][c] =
                 2.0 * (next->v[k][ANGLE][c] - (next->q[k][ANGLE][c] - now->q[k][ANGLE][c]) / h) / h;
+    if (run->gradients->energies)
+        msfp_quasistatic_works(run, group);
 }
 #endif
 

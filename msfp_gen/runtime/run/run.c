@@ -265,7 +265,7 @@ static int one_step(msfp_run *run)
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
             run->retry_after_newton |= status == MSFP_E_NEWTON;
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];
-            return !shorten_step(run, h, 0.25, status);
+            return !shorten_step(run, h, prescribed > 0.0 ? 0.0 : 0.25, status); /* a prescribed step stays as it is */
         }
         if (error > 1.0 && !(prescribed > 0.0)) {
             ++run->counts[MSFP_COUNT_REJECTED_STEPS];

@@ -262,6 +262,9 @@ void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
     other = fmax(other, msfp_heat_error(run, method->e, last + 1, h, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     refine_integrals(s, h, *error > 1.0, next->work);
+#if MSFP_GRADIENTS
+    msfp_gradients_powers(run, s, *error > 1.0);
+#endif
     if (*error > 1.0) {
         filter(run, s, &estimate);
         *error = fmax(other, msfp_error_norm(run, &estimate, 0));

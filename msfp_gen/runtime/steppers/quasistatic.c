@@ -220,8 +220,7 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
     msfp_gradients_stage(run, 1, &s);
 #endif
     *error = fmax(msfp_friction_jump_error(&run->now, &run->next), reversal_error(run, h));
-    if (*error <= 1.0)
-        count_work(run, &s, h);
+    count_work(run, &s, h);
     return MSFP_OK;
 }
 #else

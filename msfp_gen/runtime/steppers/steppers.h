@@ -115,5 +115,7 @@ void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
 
 /* Stage i of the step in progress, solved. */
 void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage);
+/* Powers of its stages; ringing: whether its works are integrated as where rates ring. */
+void msfp_gradients_powers(msfp_run *run, const msfp_stages *s, int ringing);
 
 #endif

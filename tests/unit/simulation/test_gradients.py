@@ -12,7 +12,19 @@ import numpy as np
 import pytest
 from support import scene_of
 
-from msfp_gen import Auto, InputError, Motion, Result, Rotation, Scene, Stop, simulate, simulate_batch
+from msfp_gen import (
+    Auto,
+    Effects,
+    InputError,
+    Motion,
+    Result,
+    Rotation,
+    Scene,
+    Stop,
+    load_scene,
+    simulate,
+    simulate_batch,
+)
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
@@ -25,6 +37,11 @@ def triple(duration: float = 2.0) -> Scene:
 @cache
 def result() -> Result:
     return simulate(triple(), gradients=PATHS)
+
+
+@cache
+def with_energies() -> Result:
+    return simulate(triple(), gradients=PATHS, energy_gradients=True)
 
 
 def test_a_run_with_gradients_is_the_same_run() -> None:
@@ -48,6 +65,31 @@ def test_the_dataset_has_the_variables_that_vary_by_parameter() -> None:
     assert left_out == {"separation", "lift", "event_surface", "event_kind"} | {f"energy_{name}" for name in works}
 
 
+def test_energies_are_added_and_change_nothing_else() -> None:
+    gradient, rows = with_energies().gradient, result().gradient
+    for name in rows.data_vars:
+        assert np.array_equal(gradient[name].values, rows[name].values), name
+    energies = {f"energy_{name}" for name in with_energies().history.energy if not name.startswith("seat_")}
+    assert energies == {name for name in gradient.data_vars if str(name).startswith("energy_")}
+    assert set(gradient.data_vars) == set(rows.data_vars) | energies
+    for name in energies:
+        assert gradient[name].dims == ("parameter", "time")
+        assert gradient[name].attrs["units"] == "J/parameter_unit"
+    terms = [gradient[name] for name in energies - {"energy_input", "energy_numerical"}]
+    assert np.allclose(gradient.energy_numerical, gradient.energy_input - sum(terms), rtol=0, atol=1e-9)
+    assert np.abs(gradient.energy_friction_dissipated).max() > 1.0
+    plain = simulate(triple())
+    assert np.array_equal(plain.dataset.energy_input.values, with_energies().dataset.energy_input.values)
+
+
+def test_the_summary_has_the_energies_at_the_end() -> None:
+    gradient = with_energies().gradient
+    for parameter, summary in with_energies().gradient_summary.items():
+        last = gradient.sel(parameter=parameter).isel(time=-1)
+        assert "seat_stored" not in summary["energy"]
+        assert summary["energy"] == {name: float(last[f"energy_{name}"]) for name in summary["energy"]}
+
+
 def test_the_top_support_carries_the_load() -> None:
     assert np.allclose(result().gradient.top_force.sel(parameter="top.axial_load", axis="E3"), 1.0, rtol=1e-6)
 
@@ -63,13 +105,17 @@ def test_the_summary_has_derivatives_by_parameter() -> None:
     for key in ("rims_met", "counters", "energy"):
         with pytest.raises(InputError, match=f"gradient_summary: '{key}' has no derivative: .*; give one of peak_"):
             load[key]
+    with pytest.raises(InputError, match=r"simulate\(..., energy_gradients=True\)"):
+        load["energy"]
 
 
-def test_a_file_holds_the_gradients(tmp_path: Path) -> None:
-    path = result().to_netcdf(tmp_path / "run.nc")
+@pytest.mark.parametrize("energies", [False, True])
+def test_a_file_holds_the_gradients(energies: bool, tmp_path: Path) -> None:
+    given = with_energies() if energies else result()
+    path = given.to_netcdf(tmp_path / "run.nc")
     read = Result.from_netcdf(path)
-    assert read.gradient.identical(result().gradient)
-    for parameter, expected in result().gradient_summary.items():
+    assert read.gradient.identical(given.gradient)
+    for parameter, expected in given.gradient_summary.items():
         found = read.gradient_summary[parameter]
         assert list(found) == list(expected)
         for name, value in expected.items():  # of two equal peaks rounding selects one
@@ -101,6 +147,14 @@ def test_a_file_that_lacks_a_derivative_of_the_summary_is_refused(name: str, tmp
     with h5py.File(path, "a") as file:
         del file["gradient"][name], file.attrs["digest"]
     with pytest.raises(InputError, match=f"the gradient has no {name}"):
+        Result.from_netcdf(path)
+
+
+def test_a_file_that_lacks_one_of_the_energies_is_refused(tmp_path: Path) -> None:
+    path = with_energies().to_netcdf(tmp_path / "run.nc")
+    with h5py.File(path, "a") as file:
+        del file["gradient"]["energy_numerical"], file.attrs["digest"]
+    with pytest.raises(InputError, match="energy_numerical is missing"):
         Result.from_netcdf(path)
 
 
@@ -137,6 +191,25 @@ def test_runs_without_gradients_are_refused_before_they_start(scene: Scene, path
     with pytest.raises(InputError, match=part) as error:
         simulate(scene, gradients=paths)
     assert "\n" not in str(error.value)
+
+
+def test_energy_gradients_need_a_parameter() -> None:
+    with pytest.raises(InputError, match=r"energy_gradients = True: gradients names no parameter; give one") as error:
+        simulate(triple(), energy_gradients=True)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.slow
+def test_energies_through_a_rim_contact_in_quasi_static_steps_are_refused() -> None:
+    """Steps are as long as rows; their energies depend on the time of the contact more than the work itself does."""
+    scene = load_scene("single-push")
+    effects = Effects(dimension="planar", sliders="massless")
+    bearing, top = scene.bearing.replace(rim_damping=0.0), replace(scene.top, damping=0.0)
+    scene = replace(scene, bearing=bearing, top=top, effects=effects, stop=None, motion_table=None, output_step=0.05)
+    scene = replace(scene, motion=Motion.harmonic(0.4, 0.5, cycles=2.0), duration=0.5)
+    assert simulate(scene, gradients=["motion.scale"]).events[0].kind == "rim_contact"
+    with pytest.raises(InputError, match=r"at 0\.4286 s surface 1 meets its rim .*give solver.method = 'esdirk4'"):
+        simulate(scene, gradients=["motion.scale"], energy_gradients=True)
 
 
 def test_a_checkpoint_holds_no_gradients(tmp_path: Any) -> None:

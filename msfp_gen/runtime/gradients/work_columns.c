@@ -1,0 +1,194 @@
+/* work_columns.c: derivatives of the works of the energy balance, integrated as the methods integrate them
+ * (implicit.c, quasistatic.c).
+ */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* vectorises loops over columns */
+#endif
+#include <math.h>
+#include <string.h>
+#include "gradients.h"
+
+#if MSFP_GRADIENTS
+enum { NB = MSFP_NB, C = MSFP_COLUMNS, WORKS = MSFP_WORKS };
+
+/* work += columns of h weight power */
+MSFP_INLINE void add_product(const msfp_group *group, double h, double weight, double power, const double *dpower,
+                             double *work)
+{
+    for (int c = 0; c < C; ++c)
+        work[c] += weight * (h * dpower[c] + group->h[c] * power);
+}
+
+/* As refine_integrals of implicit.c. */
+static void refine(const msfp_run *run, const msfp_group *group, const msfp_tableau *method, double h,
+                   msfp_columns work[WORKS])
+{
+    const msfp_trail *trail = &run->gradients->trail;
+    for (int j = 0; j < method->stages && method->order <= 3.0; ++j) {
+        const int before = msfp_stage_before_contact(trail, j);
+        if (trail->ringing)
+            add_product(group, h, -method->e[j], trail->prescribed[before], group->power[j].prescribed,
+                        work[MSFP_WORK_INPUT]);
+        for (int e = 0; e < WORKS && !trail->ringing; ++e)
+            if (e != MSFP_WORK_FRICTION_STORED)
+                add_product(group, h, -method->e[j], trail->power[before][e], group->power[j].of[e], work[e]);
+    }
+}
+
+MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i)
+{
+    const msfp_tableau *method = msfp_tableau_of(run->options.method);
+    const msfp_trail *trail = &run->gradients->trail;
+    const msfp_stage *stage = &trail->stage[i];
+    const double h = stage->beta / method->gamma;
+    msfp_columns *work = group->next.work;
+    if (i == 1)
+        group->power[0] = group->now.power;
+    msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
+                           &trail->work[i], &trail->slopes[i], MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
+    msfp_columns_of_powers(&run->parameters, &group->parameters, &stage->at, &group->point, &trail->work[i],
+                           &group->work, &group->power[i]);
+    memcpy(work, group->now.work, sizeof group->now.work);
+    for (int j = 0; j <= i; ++j) {
+        const double weight = j == i ? method->gamma : method->a[i][j];
+        const double *power = trail->power[msfp_stage_before_contact(trail, j)];
+        for (int e = 0; e < WORKS; ++e)
+            add_product(group, h, weight, power[e], group->power[j].of[e], work[e]);
+    }
+    if (i < method->stages - 1)
+        return;
+    refine(run, group, method, h, work);
+    group->next.power = group->power[i];
+    group->complete = 1;
+}
+
+#if MSFP_CLOSED_FORM
+enum { ANGLE = 1 };
+
+/* What the work of the next step uses of the end of this one, at the point and evaluation of the group. */
+static void ends(const msfp_group *group, const msfp_power_columns *before, msfp_history_columns *to)
+{
+    const msfp_point_columns *dat = &group->point;
+    to->power = *before;
+    memcpy(to->load, dat->load, sizeof to->load);
+    memcpy(to->tilt, dat->base[0][3 + ANGLE], sizeof to->tilt);
+    msfp_get_polar(group->work.body[NB] + MSFP_BODY_CX * C, to->top);
+    msfp_add_columns(to->top, dat->base[0], -1.0, 3);
+    for (int k = 0; k < NB; ++k) {
+        msfp_add_columns(&to->tilt, &dat->q[k][ANGLE], 1.0, 1);
+        memcpy(to->normal[k], group->work.contact[k] + MSFP_CONTACT_N * C, sizeof to->normal[k]);
+    }
+}
+
+/* Derivatives of msfp_friction_loss with respect to Y before the slip, and to the slip. */
+static void loss_slopes(double Y, double slip, double slopes[2])
+{
+    const double sign = slip < 0.0 ? -1.0 : 1.0, y0 = sign * Y;
+    double y = y0, rest = fabs(slip);
+    slopes[0] = slopes[1] = 0.0;
+    if (MSFP_PLASTIC) {
+        slopes[0] = slopes[1] = sign * (y + rest > 1.0);
+        return;
+    }
+    if (!msfp_unload_to_zero(&y, &rest))
+        return;
+    const double decay = msfp_exp(-2.0 * rest), left = (1.0 - y) * decay, sum = 1.0 + y + left;
+    const double end = (1.0 + y - left) / sum;
+    slopes[1] = sign * end * end * end;
+    /* (end^3 - y^3)/(1 - y^2) without cancellation; after unloading a function of y + rest */
+    slopes[0] = y0 < 0.0 ? slopes[1]
+                         : sign * (1.0 - 2.0 * decay / sum) * (end * end + end * y + y * y) / (1.0 + y);
+}
+
+/* As friction_work of quasistatic.c. */
+static void friction_work(const msfp_run *run, const msfp_group *group, const msfp_history_columns *to,
+                          msfp_columns work[WORKS])
+{
+    const msfp_history_columns *from = &group->history;
+    for (int k = 0; k < NB; ++k) {
+        const double *par = run->parameters.surface[k], *dpar = group->parameters.surface[k];
+        const double mu = par[MSFP_SURFACE_PARAMETERS_MU], dy = par[MSFP_SURFACE_PARAMETERS_DY];
+        const double Y = run->now.f[k][0], end = run->next.f[k][0], per_turn = msfp_slip_per_turn(par);
+        const double turn = run->next.q[k][ANGLE] - run->now.q[k][ANGLE];
+        const double N = 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k]);
+        const double loss = msfp_friction_loss(Y, per_turn * turn), stored = 0.5 * (end * end - Y * Y);
+        double slopes[2];
+        loss_slopes(Y, per_turn * turn, slopes);
+        for (int c = 0; c < C; ++c) {
+            const double dmu = dpar[MSFP_SURFACE_PARAMETERS_MU * C + c], ddy = dpar[MSFP_SURFACE_PARAMETERS_DY * C + c];
+            const double dR = dpar[MSFP_SURFACE_PARAMETERS_R * C + c], dY = group->now.f[k][0][c];
+            const double dN = 0.5 * (from->normal[k][c] + to->normal[k][c]);
+            const double dscale = dN * mu * dy + N * (dmu * dy + mu * ddy), scale = N * mu * dy;
+            const double dper = per_turn * (dR / par[MSFP_SURFACE_PARAMETERS_R] - ddy / dy);
+            const double dslip =
+                dper * turn + per_turn * (group->next.q[k][ANGLE][c] - group->now.q[k][ANGLE][c]);
+            work[MSFP_WORK_FRICTION_STORED][c] +=
+                dscale * stored + scale * (end * group->next.f[k][0][c] - Y * dY);
+            work[MSFP_WORK_FRICTION_DISSIPATED][c] +=
+                dscale * loss + scale * (slopes[0] * dY + slopes[1] * dslip);
+        }
+    }
+}
+
+/* sum += columns of mean force times distance, from the values a and b of both at the ends of the step. */
+MSFP_INLINE void add_mean(double force_a, const double *dforce_a, double force_b, const double *dforce_b, double way_a,
+                          const double *dway_a, double way_b, const double *dway_b, double *sum)
+{
+    for (int c = 0; c < C; ++c)
+        sum[c] += 0.5 * ((dforce_a[c] + dforce_b[c]) * (way_b - way_a) + (force_a + force_b) * (dway_b[c] - dway_a[c]));
+}
+
+/* As load_work of quasistatic.c. */
+static void load_work(const msfp_run *run, const msfp_group *group, const msfp_history_columns *db, double *input)
+{
+    const msfp_step_history *a = &run->step_history, *b = &run->next_step_history;
+    const msfp_history_columns *da = &group->history;
+    enum { TURN = 3 + ANGLE };
+    add_mean(a->load[TURN], da->load[TURN], b->load[TURN], db->load[TURN], a->tilt, da->tilt, b->tilt, db->tilt, input);
+    for (int i = 0; i < 3; ++i)
+        add_mean(a->load[i], da->load[i], b->load[i], db->load[i], a->top[i], da->top[i], b->top[i], db->top[i], input);
+}
+
+/* As count_work of quasistatic.c: lengths of these steps do not depend on the parameters. */
+void msfp_quasistatic_works(msfp_run *run, msfp_group *group)
+{
+    const msfp_trail *trail = &run->gradients->trail;
+    const double h = run->next.t - run->now.t, last = run->step_history.h, curved = h * h * h / 6.0;
+    const msfp_power_columns *now = &group->now.power, *before = &group->history.power;
+    msfp_power_columns *next = &group->next.power;
+    msfp_columns *work = group->next.work;
+    msfp_history_columns reached;
+    msfp_columns_of_powers(&run->parameters, &group->parameters, &trail->stage[1].at, &group->point, &trail->work[1],
+                           &group->work, next);
+    msfp_add_columns(&next->of[MSFP_WORK_INPUT], (const msfp_columns *)&next->load, -1.0, 1);
+    for (int e = 0; e < WORKS; ++e)
+        for (int c = 0; c < C && e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED; ++c) {
+            const double a = now->of[e][c], b = next->of[e][c];
+            const double bend = last > 0.0 ? ((b - a) / h - (a - before->of[e][c]) / last) / (h + last) : 0.0;
+            work[e][c] += 0.5 * h * (a + b) - bend * curved;
+        }
+    ends(group, now, &reached);
+    friction_work(run, group, &reached, work);
+    load_work(run, group, &reached, work[MSFP_WORK_INPUT]);
+    group->history = reached;
+}
+#endif
+
+void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
+                        const double g[NB][2])
+{
+    msfp_trail *trail = &run->gradients->trail;
+    const msfp_work *w = &trail->work[0];
+    msfp_power_columns *power = &group->now.power;
+    msfp_contact_slopes(&run->parameters, seed, w, g, 1, &trail->slopes[0]);
+    msfp_condensed_columns(&run->parameters, &group->parameters, at, &group->point, seed, w, &trail->slopes[0],
+                           MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
+    msfp_columns_of_powers(&run->parameters, &group->parameters, at, &group->point, w, &group->work, power);
+#if MSFP_CLOSED_FORM
+    if (!msfp_is_quasistatic(run))
+        return;
+    msfp_add_columns(&power->of[MSFP_WORK_INPUT], (const msfp_columns *)&power->load, -1.0, 1);
+    ends(group, power, &group->history);
+#endif
+}
+#endif
