@@ -168,3 +168,19 @@ def test_what_friction_loses_is_the_integral_of_its_law() -> None:
             slip = abs(surface.radius * (theta[i + 1] - theta[i]))
             by_slip += 0.25 * (force[i] + force[i + 1]) * slip * (abs(Y[i]) ** 3 + abs(Y[i + 1]) ** 3)
     assert lost[k + 9] - lost[k] == pytest.approx(by_slip, rel=0.02)
+
+
+def test_times_of_rim_events_depend_on_neither_method_nor_tolerance_nor_rows() -> None:
+    """A single pendulum under two cycles that meets its rim and leaves it twice."""
+    scene = scene_of("single-push", {"dimension": "planar", "sliders": "massless"}, stop=None, duration=1.8)
+    bearing = scene.bearing.replace(rim_damping=0.0)
+    top = replace(scene.top, damping=0.0, stiffness=1e9)
+    motion = Motion.harmonic(0.4, 0.5, cycles=2.0)
+    scene = replace(scene, bearing=bearing, top=top, motion=motion, motion_table=None)
+    found = []
+    for method, rtol, rows in (("implicit", 1e-3, 0.05), ("implicit", 1e-6, None), ("esdirk4", 1e-4, 0.05),
+                               ("esdirk4", 1e-8, None)):  # fmt: skip
+        events = solved(replace(scene, output_step=rows), method=method, rtol=rtol).events
+        assert [event.kind for event in events] == 2 * ["rim_contact", "rim_release"]
+        found.append([event.time for event in events])
+    assert np.ptp(found, axis=0).max() < 1e-5

@@ -1,4 +1,5 @@
 /* events.c: rim contact and release, lift-off and landing, the stop displacement. */
+#include <float.h>
 #include <math.h>
 #include "run.h"
 
@@ -46,7 +47,8 @@ double msfp_first_event(msfp_run *run, const double *before, const double *after
     double first = 1.0, g[MSFP_EVENTS];
     for (int i = 0; i < MSFP_EVENTS; ++i) {
         const double tolerance = event_tolerance(run, i);
-        const int falls = before[i] > tolerance && after[i] < -tolerance;
+        /* A stiff rim holds the gap within the tolerance, at the end of a long quasi-static step too. */
+        const int falls = before[i] > tolerance && after[i] < (msfp_is_quasistatic(run) ? 0.0 : -tolerance);
         const int rises = i != STOP && before[i] < -tolerance && after[i] > tolerance;
         if (!(falls || rises) || (i < NB && !MSFP_RIMS))
             continue;
@@ -71,14 +73,26 @@ static int all_rims_in_contact(const double *g)
     return 1;
 }
 
-int msfp_record_events(msfp_run *run, const double *before, const double *after)
+/* Whether rim j is in contact at the end of the step. A step that has been shortened to the event ends within the
+ * tolerance, on either side. */
+static int in_contact(const msfp_run *run, int j, double before, double after)
+{
+    const double tolerance = event_tolerance(run, j);
+    if (before <= 0.0)
+        return after <= tolerance && !(before < -tolerance && after >= -tolerance);
+    return after < -tolerance || (before > tolerance && after <= tolerance);
+}
+
+int msfp_record_events(msfp_run *run, const double *before, double *after)
 {
     int stop = 0;
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
-        if (before[j] > 0.0 && after[j] <= 0.0)
-            msfp_write_event(run, &run->next, j + 1, MSFP_EVENT_RIM_CONTACT);
-        else if (before[j] <= 0.0 && after[j] > 0.0)
-            msfp_write_event(run, &run->next, j + 1, MSFP_EVENT_RIM_RELEASE);
+        const int contact = in_contact(run, j, before[j], after[j]);
+        if (contact != (before[j] <= 0.0)) {
+            msfp_write_event(run, &run->next, j + 1, contact ? MSFP_EVENT_RIM_CONTACT : MSFP_EVENT_RIM_RELEASE);
+            msfp_quasistatic_restart(run);
+        }
+        after[j] = contact ? fmin(after[j], 0.0) : fmax(after[j], DBL_MIN); /* its sign is remembered */
     }
     for (int j = 0, i = FIRST_CONTACT; i < MSFP_EVENTS; ++i, ++j)
         if ((before[i] > 0.0) != (after[i] > 0.0))

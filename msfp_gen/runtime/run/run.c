@@ -204,7 +204,7 @@ static int shorten_step(msfp_run *run, double h, double factor, int status)
 }
 
 /* Accept the step: record it and make its end the present state. */
-static int accept(msfp_run *run, const double *before, const double *after, double error, double h)
+static int accept(msfp_run *run, const double *before, double *after, double error, double h)
 {
     ++run->counts[MSFP_COUNT_STEPS];
     MSFP_IF_GRADIENTS(msfp_gradients_before_step(run), (void)0);

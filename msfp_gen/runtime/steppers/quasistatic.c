@@ -130,6 +130,14 @@ double msfp_limit_step(const msfp_run *run, double h)
     return h;
 }
 
+void msfp_quasistatic_restart(msfp_run *run)
+{
+    if (!msfp_is_quasistatic(run))
+        return;
+    run->next_step_history.h = run->next_step_history.span = 0.0;
+    run->h *= 0.1;
+}
+
 /* Second divided difference of the last three values of power e, for the integral of the parabola through them. */
 static double second_difference(const msfp_run *run, double h, const double *power, int e)
 {
@@ -235,6 +243,8 @@ double msfp_limit_step(const msfp_run *run, double h)
     (void)run;
     return h;
 }
+
+void msfp_quasistatic_restart(msfp_run *run) { (void)run; }
 
 int msfp_step_quasistatic(msfp_run *run, double h, double *error)
 {

@@ -108,6 +108,9 @@ int msfp_is_quasistatic(const msfp_run *run);
 /* The step h, shortened so that no Y changes by more than 0.4 and no surface reverses, as far as can be
  * extrapolated. */
 double msfp_limit_step(const msfp_run *run, double h);
+/* After a quasi-static step to a rim contact or release, where rates and powers have a kink: the next step is short and
+ * takes nothing from the steps before. */
+void msfp_quasistatic_restart(msfp_run *run);
 /* Prepare quasi-static steps from a state without a step before it. */
 void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
 
