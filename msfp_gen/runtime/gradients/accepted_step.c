@@ -71,13 +71,14 @@ void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, doub
 {
     static const msfp_parameter_columns constant;
     msfp_columns gaps[NB][MSFP_GAP_SIZE], rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
+    double sliding[NB][MSFP_GAP_SIZE];
     const double *now = msfp_rates_of_stage(run, msfp_last_stage(run));
     memset(v, 0, sizeof v);
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < NQ; ++i)
             v[k][i][0] = now[k * NQ + i];
-    msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, gaps);
-    msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, rates);
+    msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, sliding, gaps);
+    msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, sliding, rates);
     const double rate = rates[j][MSFP_GAP_G][0];
     for (int c = 0; c < C; ++c)
         dt[c] = rate != 0.0 ? -gaps[j][MSFP_GAP_G][c] / rate : 0.0;

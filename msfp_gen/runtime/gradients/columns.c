@@ -44,7 +44,7 @@ MSFP_INLINE void put_coordinates(double *block, msfp_columns *const q, msfp_colu
                (MSFP_PLANAR ? 1 : 3) * sizeof *q);
 }
 
-static const msfp_columns no_motion[3][6]; /* columns of a base that a parameter does not move */
+static const double constant[MSFP_BODY_PARAMETERS_SIZE * C]; /* columns of a body that no parameter changes */
 
 /* Columns of the base plate. */
 static MSFP_COLUMNWISE void base_plate(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
@@ -65,8 +65,7 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
 {
     put_coordinates(d->x[0], (msfp_columns *)dat->base[0] + 3, (msfp_columns *)dat->base[1] + 3,
                     (msfp_columns *)dat->base[2] + 3);
-    const int moves =
-        memcmp(dat->base, no_motion, sizeof no_motion) || memcmp(dp->body[0], no_motion, sizeof dp->body[0]);
+    const int moves = dat->base_moves || memcmp(dp->body[0], constant, sizeof constant);
     if (moves) /* with few parameters only */
         base_plate(p, dp, at, dat, w, d);
     else if (d->base_moves)

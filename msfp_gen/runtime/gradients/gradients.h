@@ -24,6 +24,7 @@ typedef struct {
 /* Of a state and its inputs, and of the stage formula of Y, Z: f is fp of msfp_seed. */
 typedef struct {
     msfp_columns base[3][6], load[6];
+    int base_moves; /* whether those of the base may differ from zero */
     msfp_columns q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
     msfp_columns foot[2], foot_beta, beta;
     msfp_columns turn[MSFP_NB]; /* of a quasi-static step */
@@ -84,9 +85,10 @@ void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns 
 void msfp_mechanical_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                              const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                              msfp_columns *energy);
-/* Columns of the sliding displacements and gaps at given coordinates. */
+/* Sliding displacements and gaps at given coordinates, and their columns. */
 void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
-                       msfp_columns dq[MSFP_NB][MSFP_NQ], msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE]);
+                       msfp_columns dq[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE],
+                       msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE]);
 
 /* ---- a run ---- */
 

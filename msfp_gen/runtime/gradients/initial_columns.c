@@ -30,8 +30,10 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
         t = nextafter(run->jumps[run->next_jump], -INFINITY);
     memset(dat->base, 0, sizeof dat->base);
     memset(dat->load, 0, sizeof dat->load);
+    dat->base_moves = msfp_any_column(dt);
     for (int c = 0; c < C; ++c) {
         if (group->motion[c].pieces) {
+            dat->base_moves = 1;
             msfp_history_at(&group->motion[c], t, 3, found);
             for (int order = 0; order < 3; ++order)
                 for (int i = 0; i < 6; ++i)

@@ -28,9 +28,10 @@ MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double
 
 MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                        const double q[MSFP_NB][MSFP_NQ], msfp_columns dq[MSFP_NB][MSFP_NQ],
+                                       double sliding[MSFP_NB][MSFP_GAP_SIZE],
                                        msfp_columns gaps[MSFP_NB][MSFP_GAP_SIZE])
 {
-    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 }, sliding[MSFP_GAP_SIZE];
+    double body[MSFP_BODY_SIZE] = { 0 }, d[MSFP_BODY_SIZE * C] = { 0 };
     for (int j = 0; j < NB; ++j) {
         body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
         body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
@@ -46,8 +47,8 @@ MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_para
             d[MSFP_BODY_CP * C + c] = -body[MSFP_BODY_SP] * dq[j][0][c];
         }
 #endif
-        msfp_gap(p->surface[j], body, sliding);
-        gap_columns(p->surface[j], dp->surface[j], body, d, sliding, gaps[j]);
+        msfp_gap(p->surface[j], body, sliding[j]);
+        gap_columns(p->surface[j], dp->surface[j], body, d, sliding[j], gaps[j]);
     }
 }
 
@@ -168,7 +169,7 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
                                          const msfp_work_columns *d, msfp_columns *row)
 {
     msfp_columns energy[MSFP_ENERGY_SIZE];
-    memset(row, 0, MSFP_ROW_SIZE * sizeof *row);
+    memset(row[MSFP_ROW_RIM_STORED], 0, sizeof *row); /* a sum; fields that the model lacks are zero from the start */
     memcpy(row + MSFP_ROW_Q, dat->q, sizeof dat->q);
     memcpy(row + MSFP_ROW_V, dat->v, sizeof dat->v);
     memcpy(row + MSFP_ROW_A, dat->a, sizeof dat->a);

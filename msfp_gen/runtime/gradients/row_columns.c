@@ -137,8 +137,8 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
 {
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
-    msfp_gaps(&run->parameters, row->q, sliding);
-    msfp_gaps_columns(&run->parameters, &group->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), gaps);
+    msfp_gaps_columns(&run->parameters, &group->parameters, row->q, (msfp_columns(*)[NQ])(d + MSFP_ROW_Q), sliding,
+                      gaps);
     if (row->kinetic < 0.0)
         clear(&d[MSFP_ROW_KINETIC], 1);
     if (row->rim_stored < 0.0)
