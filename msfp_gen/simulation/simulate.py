@@ -92,7 +92,7 @@ def simulate(
     gradients
         Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
     energy_gradients
-        Whether the energies that are integrals over the run are differentiated too, at up to two thirds more cost.
+        Whether the energies that are integrals over the run are differentiated too, at up to four fifths more cost.
 
     Returns
     -------

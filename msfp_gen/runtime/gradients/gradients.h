@@ -37,7 +37,7 @@ typedef struct {
     double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
-    int base_moves; /* whether those of body 0 may differ from zero, as they do in a new work */
+    int base_moves; /* whether those of body 0 may differ from zero; 0 in a new work, which is zero */
 } msfp_work_columns;
 
 /* Columns of the motion of the foot, after those of the top plate. */

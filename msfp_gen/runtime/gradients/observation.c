@@ -12,8 +12,7 @@
 enum { NB = MSFP_NB, C = MSFP_COLUMNS, FORCE = MSFP_FORCE_SIZE };
 
 /* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
- * centre,
- * where its columns are zero. */
+ * centre, where its columns are zero. */
 MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
                              const double *sliding, msfp_columns *gap)
 {

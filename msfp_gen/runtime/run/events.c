@@ -47,8 +47,10 @@ double msfp_first_event(msfp_run *run, const double *before, const double *after
     double first = 1.0, g[MSFP_EVENTS];
     for (int i = 0; i < MSFP_EVENTS; ++i) {
         const double tolerance = event_tolerance(run, i);
-        /* A stiff rim holds the gap within the tolerance, at the end of a long quasi-static step too. */
-        const int falls = before[i] > tolerance && after[i] < (msfp_is_quasistatic(run) ? 0.0 : -tolerance);
+        /* A stiff rim holds the gap within the tolerance, at the end of a long quasi-static step too; the step to the
+         * contact must end before it, where rates are still those of the approach. */
+        const double passed = i < NB && msfp_is_quasistatic(run) ? 0.0 : tolerance;
+        const int falls = before[i] > tolerance && after[i] < -passed;
         const int rises = i != STOP && before[i] < -tolerance && after[i] > tolerance;
         if (!(falls || rises) || (i < NB && !MSFP_RIMS))
             continue;
@@ -73,27 +75,33 @@ static int all_rims_in_contact(const double *g)
     return 1;
 }
 
-/* Whether rim j is in contact at the end of the step. A step that has been shortened to the event ends within the
- * tolerance, on either side. */
-static int in_contact(const msfp_run *run, int j, double before, double after)
+/* Whether rim j is in contact at the end of the step. located: the step was shortened to an event, and ends within the
+ * tolerance on either side of it. A gap there has the sign of its state, and DBL_MIN as its size: a state that was set
+ * before the gap had its sign changes beyond the tolerance only. */
+static int in_contact(const msfp_run *run, int j, double before, double after, int located)
 {
     const double tolerance = event_tolerance(run, j);
-    if (before <= 0.0)
-        return after <= tolerance && !(before < -tolerance && after >= -tolerance);
-    return after < -tolerance || (before > tolerance && after <= tolerance);
+    if (before <= 0.0) {
+        const int released = after > 0.0 && before < -DBL_MIN;
+        return !(after > tolerance || released || (located && before < -tolerance && after >= -tolerance));
+    }
+    const int met = after <= 0.0 && before > DBL_MIN;
+    return after < -tolerance || met || (located && before > tolerance && after <= tolerance);
 }
 
-int msfp_record_events(msfp_run *run, const double *before, double *after)
+int msfp_record_events(msfp_run *run, const double *before, double *after, int located)
 {
-    int stop = 0;
+    int stop = 0, rims = 0;
     for (int j = 0; j < NB && MSFP_RIMS; ++j) {
-        const int contact = in_contact(run, j, before[j], after[j]);
+        const int contact = in_contact(run, j, before[j], after[j], located);
         if (contact != (before[j] <= 0.0)) {
             msfp_write_event(run, &run->next, j + 1, contact ? MSFP_EVENT_RIM_CONTACT : MSFP_EVENT_RIM_RELEASE);
-            msfp_quasistatic_restart(run);
+            rims = 1;
         }
-        after[j] = contact ? fmin(after[j], 0.0) : fmax(after[j], DBL_MIN); /* its sign is remembered */
+        after[j] = contact ? fmin(after[j], -DBL_MIN) : fmax(after[j], DBL_MIN);
     }
+    if (rims)
+        msfp_quasistatic_restart(run);
     for (int j = 0, i = FIRST_CONTACT; i < MSFP_EVENTS; ++i, ++j)
         if ((before[i] > 0.0) != (after[i] > 0.0))
             msfp_write_event(run, &run->next, j + 1, after[i] > 0.0 ? MSFP_EVENT_LANDING : MSFP_EVENT_LIFT_OFF);

@@ -204,7 +204,7 @@ static int shorten_step(msfp_run *run, double h, double factor, int status)
 }
 
 /* Accept the step: record it and make its end the present state. */
-static int accept(msfp_run *run, const double *before, double *after, double error, double h)
+static int accept(msfp_run *run, const double *before, double *after, int located, double error, double h)
 {
     ++run->counts[MSFP_COUNT_STEPS];
     MSFP_IF_GRADIENTS(msfp_gradients_before_step(run), (void)0);
@@ -215,7 +215,7 @@ static int accept(msfp_run *run, const double *before, double *after, double err
     run->restart = run->retry_after_newton = 0;
     if (run->stability_limit_steps >= STABILITY_LIMIT_STEPS)
         run->status = msfp_classify_failure(run, MSFP_E_STIFF);
-    const int stop = msfp_record_events(run, before, after);
+    const int stop = msfp_record_events(run, before, after, located);
     if (run->status == MSFP_OK)
         run->status = msfp_write_step(run);
     if (run->status)
@@ -259,7 +259,8 @@ static int one_step(msfp_run *run)
     const double prescribed = MSFP_IF_GRADIENTS(msfp_prescribed_step(run), 0.0);
     if (prescribed > 0.0)
         h = prescribed;
-    for (int relocations = 0;; ++relocations) {
+    int located = 0;
+    for (;; ++located) {
         const int status = try_step(run, h, &error);
         if (status) {
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
@@ -274,7 +275,7 @@ static int one_step(msfp_run *run)
         }
         memcpy(before, run->events_now, sizeof before);
         msfp_event_values(run, &run->next, after);
-        const double share = relocations < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
+        const double share = located < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
@@ -285,7 +286,7 @@ static int one_step(msfp_run *run)
         run->status = MSFP_E_GUARD;
         return 0;
     }
-    return accept(run, before, after, error, h);
+    return accept(run, before, after, located, error, h);
 }
 
 static int finished(const msfp_run *run)

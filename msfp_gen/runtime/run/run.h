@@ -18,9 +18,9 @@ int msfp_consistent_initial_state(msfp_run *run);
 void msfp_event_values(msfp_run *run, const msfp_state *s, double *g);
 /* Share of the last step at which the first event lies; 1: none. before, after: event functions at its ends. */
 double msfp_first_event(msfp_run *run, const double *before, const double *after);
-/* Record the events of the accepted step; after: a gap that is zero but for the tolerance gets the sign of its state.
- * Returns 1 where the run is to stop. */
-int msfp_record_events(msfp_run *run, const double *before, double *after);
+/* Record the events of the accepted step. after: a gap that is zero but for the tolerance gets the sign of its state;
+ * located: whether the step was shortened to an event. Returns 1 where the run is to stop. */
+int msfp_record_events(msfp_run *run, const double *before, double *after, int located);
 
 /* ---- monitors.c ---- */
 

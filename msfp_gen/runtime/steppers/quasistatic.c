@@ -135,6 +135,7 @@ void msfp_quasistatic_restart(msfp_run *run)
     if (!msfp_is_quasistatic(run))
         return;
     run->next_step_history.h = run->next_step_history.span = 0.0;
+    memset(run->next_step_history.jerk, 0, sizeof run->next_step_history.jerk);
     run->h *= 0.1;
 }
 
