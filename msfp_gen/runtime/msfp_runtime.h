@@ -39,7 +39,7 @@ extern "C" {
 #define MSFP_INLINED
 #endif
 #define MSFP_INLINE MSFP_INLINED static inline
-/* Before a loop of constant length, whose constants the compiler then uses. */
+/* Before a short loop of constant length, so that the tables it reads are constants when it is compiled. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define MSFP_UNROLL _Pragma("GCC unroll 32")
 #else

@@ -38,9 +38,9 @@ RINGS_AT_RIM = (
 )
 
 CONTACT_IN_LONG_STEP = (
-    "energy_gradients = True: at {time:.4g} s surface {surface} meets its rim in quasi-static steps, and the error of "
-    "their energies there depends on the parameters more than the energies; give solver.method = 'esdirk4', or leave "
-    "out energy_gradients"
+    "energy_gradients = True: at {time:.4g} s surface {surface} meets or leaves its rim in quasi-static steps, whose "
+    "input work is then too inaccurate to be differentiated; give solver.method = 'esdirk4', or leave out "
+    "energy_gradients"
 )
 
 

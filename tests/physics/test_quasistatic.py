@@ -170,17 +170,34 @@ def test_what_friction_loses_is_the_integral_of_its_law() -> None:
     assert lost[k + 9] - lost[k] == pytest.approx(by_slip, rel=0.02)
 
 
-def test_times_of_rim_events_depend_on_neither_method_nor_tolerance_nor_rows() -> None:
-    """A single pendulum under two cycles that meets its rim and leaves it twice."""
-    scene = scene_of("single-push", {"dimension": "planar", "sliders": "massless"}, stop=None, duration=1.8)
-    bearing = scene.bearing.replace(rim_damping=0.0)
+def to_the_rim(motion: Motion, duration: float, rim_stiffness: float = 1e8) -> Scene:
+    """A single pendulum without dampers under a stiff rig."""
+    scene = scene_of("single-push", {"dimension": "planar", "sliders": "massless"}, stop=None, duration=duration)
+    bearing = scene.bearing.replace(rim_damping=0.0, rim_stiffness=rim_stiffness)
     top = replace(scene.top, damping=0.0, stiffness=1e9)
-    motion = Motion.harmonic(0.4, 0.5, cycles=2.0)
-    scene = replace(scene, bearing=bearing, top=top, motion=motion, motion_table=None)
+    return replace(scene, bearing=bearing, top=top, motion=motion, motion_table=None)
+
+
+def test_times_of_rim_events_depend_on_neither_method_nor_tolerance_nor_rows() -> None:
+    """Two cycles, in which the slider meets its rim and leaves it twice."""
+    scene = to_the_rim(Motion.harmonic(0.4, 0.5, cycles=2.0), 1.8)
     found = []
     for method, rtol, rows in (("implicit", 1e-3, 0.05), ("implicit", 1e-6, None), ("esdirk4", 1e-4, 0.05),
                                ("esdirk4", 1e-8, None)):  # fmt: skip
-        events = solved(replace(scene, output_step=rows), method=method, rtol=rtol).events
-        assert [event.kind for event in events] == 2 * ["rim_contact", "rim_release"]
-        found.append([event.time for event in events])
+        run = solved(replace(scene, output_step=rows), method=method, rtol=rtol)
+        assert [event.kind for event in run.events] == 2 * ["rim_contact", "rim_release"]
+        assert run.summary["energy"]["closure_error"] < 0.02
+        found.append([event.time for event in run.events])
     assert np.ptp(found, axis=0).max() < 1e-5
+
+
+@pytest.mark.parametrize("method", ["implicit", "esdirk4"])
+def test_a_rim_that_stays_closed_has_one_contact(method: str) -> None:
+    """Its gap returns into the tolerance of events, a millionth of the capacity, and does not become zero."""
+    time, least, most = np.linspace(0.0, 2.0, 201), 0.3769, 0.3791
+    path = np.interp(time, [0.0, 1.0, 1.3, 1.6, 2.0], [0.0, most, least, most, most])
+    motion = Motion.from_arrays(time, np.outer(path, [1.0, 0.0, 0.0]))
+    run = solved(replace(to_the_rim(motion, 2.0, 1e12), output_step=0.01), method=method)
+    assert [event.kind for event in run.events] == ["rim_contact"]
+    gap, tolerance = run.history.gap[run.history.time > 1.05, 0], 1e-6 * run.scene.bearing.surfaces[0].capacity
+    assert gap.min() < -3 * tolerance and -tolerance < gap.max() < 0

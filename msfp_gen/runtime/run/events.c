@@ -75,9 +75,9 @@ static int all_rims_in_contact(const double *g)
     return 1;
 }
 
-/* Whether rim j is in contact at the end of the step. located: the step was shortened to an event, and ends within the
- * tolerance on either side of it. A gap there has the sign of its state, and DBL_MIN as its size: a state that was set
- * before the gap had its sign changes beyond the tolerance only. */
+/* Whether rim j is in contact at the end of the step. located: whether the step was shortened to an event; it may then
+ * end shortly before the gap changes its sign. Such a gap is stored as +-DBL_MIN with the sign of the new state, which
+ * then lasts until the gap leaves the tolerance on the other side: the event is recorded once. */
 static int in_contact(const msfp_run *run, int j, double before, double after, int located)
 {
     const double tolerance = event_tolerance(run, j);

@@ -259,8 +259,8 @@ static int one_step(msfp_run *run)
     const double prescribed = MSFP_IF_GRADIENTS(msfp_prescribed_step(run), 0.0);
     if (prescribed > 0.0)
         h = prescribed;
-    int located = 0;
-    for (;; ++located) {
+    int relocations = 0;
+    for (;; ++relocations) {
         const int status = try_step(run, h, &error);
         if (status) {
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
@@ -275,7 +275,7 @@ static int one_step(msfp_run *run)
         }
         memcpy(before, run->events_now, sizeof before);
         msfp_event_values(run, &run->next, after);
-        const double share = located < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
+        const double share = relocations < 4 && !(prescribed > 0.0) ? msfp_first_event(run, before, after) : 1.0;
         if (share >= 1.0)
             break;
         h = fmin(0.99 * h, fmax(h * share, shortest_to_event));
@@ -286,7 +286,7 @@ static int one_step(msfp_run *run)
         run->status = MSFP_E_GUARD;
         return 0;
     }
-    return accept(run, before, after, located, error, h);
+    return accept(run, before, after, relocations > 0, error, h);
 }
 
 static int finished(const msfp_run *run)
