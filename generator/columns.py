@@ -44,8 +44,8 @@ class Columns:
     """The blocks that only the columns of the tangent use."""
 
     seed: Block
+    axis: Block
     twist: Block
-    twists: Block
     variation: Block
     variations: Block
     turning: Block
@@ -54,6 +54,13 @@ class Columns:
 def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns:
     """The blocks of the columns of a model whose bodies have these unknowns."""
     seed = BlockBuilder("seed", planar)
+    axis = BlockBuilder("axis", planar)
+    axis.vector("t", "-", "unit vector along the axis of a tilt angle", AXIAL)
+    axis.vector("w", "rad/s", "its angular velocity", AXIAL)
+    axis.vector("al", "rad/s^2", "its angular acceleration", AXIAL)
+    axis.vector("C", "m", "sphere centre on the axis", POLAR)
+    axis.vector("V", "m/s", "its velocity", POLAR)
+    axis.vector("A", "m/s^2", "its acceleration", POLAR)
     twist = BlockBuilder("twist", planar)
     for order, per in zip(ORDERS, ("", "/s", "/s^2"), strict=True):
         seed.scalar(f"s{order}", "-", f"derivative {order} in time of an angle, per unit of the unknown")
@@ -72,38 +79,30 @@ def column_blocks(b: Blocks, planar: bool, unknowns: tuple[str, ...]) -> Columns
     for block in (variation, turning) if "phi" in unknowns else (turning,):
         block.vector("wp", "rad/s", "omega', with spin (3.12)", AXIAL)
         block.vector("alp", "rad/s^2", "d omega'/dt", AXIAL)
-    one, local = twist.build(), variation.build()
-    tilts = repeated(one, "twists", tuple(u for u in unknowns if u in TILTS))
-    return Columns(seed.build(), one, tilts, local, repeated(local, "variations", unknowns), turning.build())
+    local = variation.build()
+    variations = repeated(local, "variations", unknowns)
+    return Columns(seed.build(), axis.build(), twist.build(), local, variations, turning.build())
 
 
-def axes(up: Symbols, body: Symbols) -> dict[str, tuple[Vector, Vector, Vector]]:
-    """Axis of each tilt angle, with the angular velocity and acceleration of that axis (2.4), (2.5)."""
-    return {"psi": (up["t1"], up["w"], up["al"]), "theta": (body["t2"], body["w"], body["al"])}
-
-
-def twists(b: Blocks, c: Columns) -> Program:
-    """Twists of the tilt angles of a body about the sphere centre below it, with two time derivatives."""
-    p = Program("twists", "twists of a body and all bodies above it by its tilt angles: (2.4), (2.5), (2.36)")
+def twist(c: Columns) -> Program:
+    """Twist of the bodies that a tilt angle turns about its axis, with two time derivatives."""
+    p = Program("twist", "twist of all bodies that a tilt angle turns about its axis: (2.4), (2.5), (2.36)")
     s: Symbols = p.read(c.seed, "s", active=False)
-    up: Symbols = p.read(b.body, "u", active=False)
-    body: Symbols = p.read(b.body, "b", active=False)
+    axis: Symbols = p.read(c.axis, "x", active=False)
+    p.rates = {s["s0"]: s["s1"], s["s1"]: s["s2"]}
+    p.declare_rates(axis["C"], axis["V"])
+    p.declare_rates(axis["V"], axis["A"])
+    p.declare_rates(axis["w"], axis["al"])
+    p.declare_rates(axis["t"], p.let_vector(cross(axis["w"], axis["t"]), "dt"))  # (2.36)
+    turned = p.let_vector(scale(s["s0"], axis["t"]), "q")
+    moved = p.let_vector(cross(axis["C"], turned), "t")
     out: Symbols = {}
-    for angle, (axis, w, al) in axes(up, body).items():
-        if f"{angle}_q0" not in c.twists.quantities:
-            continue
-        p.rates = {s["s0"]: s["s1"], s["s1"]: s["s2"]}
-        p.declare_rates(up["C"], up["V"])
-        p.declare_rates(up["V"], up["A"])
-        p.declare_rates(w, al)
-        p.declare_rates(axis, p.let_vector(cross(w, axis), "dt"))  # (2.36)
-        turned = p.let_vector(scale(s["s0"], axis), "q")
-        moved = p.let_vector(cross(up["C"], turned), "t")
-        for order in ORDERS:
-            out |= {f"{angle}_q{order}": turned, f"{angle}_t{order}": moved}
-            if order < 2:
-                turned, moved = p.rate_vector(turned), p.rate_vector(moved)
-    p.write(c.twists, out, tangents=False)
+    for order in ORDERS:
+        out |= {f"q{order}": turned, f"t{order}": moved}
+        if order < 2:
+            turned, moved = p.rate_vector(turned), p.rate_vector(moved)
+    p.write(c.twist, out, tangents=False)
+    p.lanes = "MSFP_DOF"
     return p
 
 
@@ -230,7 +229,8 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
         else:
             sine, cosine = (body[name] for name in TILTS[angle])
             p.rates |= {sine: s["s0"] * cosine, cosine: -s["s0"] * sine}
-            turning = p.let_vector(scale(s["s0"], axes(up, body)[angle][0]))
+            axis = up["t1"] if angle == "psi" else body["t2"]  # (2.4), (2.5)
+            turning = p.let_vector(scale(s["s0"], axis))
         turned = p.let_vector(cross(turning, force["F"]))
         found = {
             "dw": p.rate_vector(slip),
@@ -249,7 +249,7 @@ def local_variation(b: Blocks, c: Columns, unknowns: tuple[str, ...]) -> Program
 def programs(b: Blocks, c: Columns, massless: bool, unknowns: tuple[str, ...]) -> list[Program]:
     """All programs of the columns of the tangent."""
     return [
-        twists(b, c),
+        twist(c),
         transported_twist(b, c),
         variation_of_rates(b, c),
         transported_force(b, c, massless),

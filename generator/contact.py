@@ -166,7 +166,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         tangents=("M", "dY", "dZ", "N") if law is None else ("M", "dY", "dZ", "mu", "N"),
         columns="MSFP_LOCAL",
     )
-    p.lanes = True
+    p.lanes = "MSFP_LANES"
     return p
 
 

@@ -55,7 +55,7 @@ class Function:
     stores: tuple[tuple[int, str, str], ...]
     """Index in the output, its text, and the field's name."""
     tangent_stores: tuple[tuple[int, str], ...]
-    lanes: bool
+    lanes: str
     jacobian: tuple[tuple[str, ...], tuple[tuple[int, str], ...]]
     """Of a program that runs in lanes: statements, and (row * inputs + input, text)."""
 

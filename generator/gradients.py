@@ -63,7 +63,7 @@ def directional(program: Program, at_hand: bool) -> Program:
         results={field: result.xreplace(names) for field, result in program.results.items()},
         tangents=frozenset(program.results),
         columns="MSFP_COLUMNS",
-        lanes=False,
+        lanes="",
         stored=False,
     )
 

@@ -132,8 +132,9 @@ class Program:
     """Stored fields of the output whose tangent is emitted; empty for a program without a tangent."""
     columns: str = ""
     """C constant with the number of columns of the tangent."""
-    lanes: bool = False
-    """Whether C evaluates it for all surfaces at once (SIMD) and takes its Jacobian with respect to its inputs."""
+    lanes: str = ""
+    """C constant with the number of surfaces or unknowns for which C evaluates it at once (SIMD), with the Jacobian
+    with respect to its active inputs; empty for a program that is evaluated once."""
     stored: bool = True
     """Whether the results are stored. Where only their tangents are, a statement whose target is an input is read."""
     rates: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)

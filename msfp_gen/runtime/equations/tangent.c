@@ -19,7 +19,8 @@ enum {
     ND = MSFP_ND,
     FORCE = MSFP_FORCE_SIZE,
     MOMENT = MSFP_MOMENT_SIZE,
-    PAIR = MSFP_PAIR
+    PAIR = MSFP_PAIR,
+    LANES = MSFP_LANES
 };
 /* Fields of the local variation of a body: the inputs of the contact beside its force come first. */
 enum {
@@ -54,16 +55,45 @@ MSFP_INLINE void add_variation(double *column, int k, const double *variation, i
             column[f * DOF + (k - 1) * ND + i] += variation[i * VARIATION + field + f];
 }
 
-/* Twists of all unknowns. */
+/* The axis about which tilt angle i of body k turns it: t1 of the body below for psi, t2 of the body for theta. */
+MSFP_INLINE void axis(const msfp_work *w, int k, int i, double *block)
+{
+    const int theta = i == PAIR - 1;
+    const double *carrier = w->body[theta ? k : k - 1], *below = w->body[k - 1];
+    double vector[3];
+    if (theta)
+        msfp_body_t2_get(carrier, vector);
+    else
+        msfp_body_t1_get(carrier, vector);
+    msfp_axis_t_put(block, vector);
+    msfp_body_w_get(carrier, vector);
+    msfp_axis_w_put(block, vector);
+    msfp_body_al_get(carrier, vector);
+    msfp_axis_al_put(block, vector);
+    msfp_body_C_get(below, vector);
+    msfp_axis_C_put(block, vector);
+    msfp_body_V_get(below, vector);
+    msfp_axis_V_put(block, vector);
+    msfp_body_A_get(below, vector);
+    msfp_axis_A_put(block, vector);
+}
+
+/* Twists of all unknowns, [field][DOF]; zero for spins. */
 MSFP_INLINE void twists(const msfp_work *w, const double *seed, double *twist)
 {
-    double tilts[PAIR * TWIST];
-    for (int k = 1; k <= NB; ++k) {
-        msfp_twists(seed, w->body[k - 1], w->body[k], tilts);
-        for (int f = 0; f < TWIST; ++f)
-            for (int i = 0; i < ND; ++i)
-                twist[f * DOF + (k - 1) * ND + i] = i < PAIR ? tilts[i * TWIST + f] : 0.0;
-    }
+    double axes[MSFP_AXIS_SIZE * DOF], seeds[MSFP_SEED_SIZE * DOF], one[MSFP_AXIS_SIZE];
+    if (ND > PAIR)
+        memset(axes, 0, sizeof axes);
+    for (int k = 1; k <= NB; ++k)
+        for (int i = 0; i < PAIR; ++i) {
+            axis(w, k, i, one);
+            for (int f = 0; f < MSFP_AXIS_SIZE; ++f)
+                axes[f * DOF + (k - 1) * ND + i] = one[f];
+        }
+    for (int f = 0; f < MSFP_SEED_SIZE; ++f)
+        for (int c = 0; c < DOF; ++c)
+            seeds[f * DOF + c] = seed[f];
+    msfp_twist_lanes(seeds, axes, twist);
 }
 
 /* Columns of force and moment at the top, whose springs act along fixed axes. */
@@ -89,53 +119,67 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_
 }
 
 /* Derivatives of the inputs of the contact of surface j with respect to the unknowns of the body above:
- * [inputs][ND]. */
+ * [inputs][ND][lane], with the surface in lane j. */
 MSFP_INLINE void local_inputs(const msfp_work *w, const msfp_seed *seed, const double *rim, int j,
                               const double *variation, double *inputs)
 {
     const double factors[2] = { seed->cq, seed->cv };
     for (int k = 0; k < INPUTS; ++k)
         for (int i = 0; i < ND; ++i)
-            inputs[k * ND + i] = variation[i * VARIATION + (k < FORCE ? VARIATION_P + k : k - FORCE)];
+            inputs[(k * ND + i) * LANES + j] = variation[i * VARIATION + (k < FORCE ? VARIATION_P + k : k - FORCE)];
     for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
         for (int f = 0; f < FORCE; ++f)
-            inputs[f * ND + i % PAIR] -= factors[i / PAIR] * rim[f * MSFP_RIM_LOCAL + i];
+            inputs[(f * ND + i % PAIR) * LANES + j] -= factors[i / PAIR] * rim[f * MSFP_RIM_LOCAL + i];
 }
 
-/* Columns of one component of the moment, or of N, of the contact of surface j, from the columns of its force. */
-MSFP_INLINE void contact_row(const double *restrict slope, const double *restrict local, int j,
-                             const double *restrict inputs, double cv, double *restrict row)
+/* Derivatives of the results of all contacts with respect to the unknowns of the body above, at constant force on it:
+ * [MSFP_CONTACT_ROWS][ND][lane]. */
+MSFP_INLINE void local_parts(const msfp_work *w, const msfp_seed *seed, double variation[NB + 1][ND * VARIATION],
+                             double *restrict parts)
 {
-    double local_part[ND] = { 0 };
-    for (int k = 0; k < INPUTS; ++k)
-        for (int i = 0; i < ND; ++i)
-            local_part[i] += slope[k * MSFP_LANES] * inputs[k * ND + i];
+    double inputs[INPUTS * ND * LANES] = { 0.0 };
+    for (int j = 0; j < NB; ++j)
+        local_inputs(w, seed, w->jacobians.rim[j], j, variation[j + 1], inputs);
+    for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
+        const double *slopes = w->jacobians.contact + r * INPUTS * LANES;
+        for (int i = 0; i < ND; ++i) {
+            double sum[LANES] = { 0.0 };
+            for (int k = 0; k < INPUTS; ++k)
+                for (int s = 0; s < LANES; ++s)
+                    sum[s] += slopes[k * LANES + s] * inputs[(k * ND + i) * LANES + s];
+            memcpy(parts + (r * ND + i) * LANES, sum, sizeof sum);
+        }
+    }
+}
+
+/* Columns of one component of the moment, or of N, of the contact of surface j, from those of its force. */
+MSFP_INLINE void contact_row(const double *restrict slope, const double *restrict local, int j,
+                             const double *restrict part, double cv, double *restrict row)
+{
     for (int c = 0; c < DOF; ++c) {
         double sum = 0.0;
         for (int k = 0; k < FORCE; ++k)
-            sum += slope[k * MSFP_LANES] * local[k * DOF + c];
+            sum += slope[k * LANES] * local[k * DOF + c];
         row[c] = sum;
     }
     for (int i = 0; i < ND; ++i)
-        row[j * ND + i] += local_part[i];
+        row[j * ND + i] += part[i * LANES];
 #if MSFP_SPIN_LOCKED
     (void)cv;
 #else
     if (j > 0) /* spin of the body below */
-        row[j * ND - 1] -= slope[MSFP_LOCAL_DWZ * MSFP_LANES] * cv;
+        row[j * ND - 1] -= slope[MSFP_LOCAL_DWZ * LANES] * cv;
 #endif
 }
 
 /* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of dY/dt, dZ/dt. */
-MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, const msfp_surface_jacobians *jacobians, int j,
-                         const double *variation, columns *c)
+MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
 {
-    double unused[FORCE], local[FORCE * DOF], inputs[ND * INPUTS];
-    const double *rim = jacobians->rim[j], factors[2] = { seed->cq, seed->cv };
-    local_inputs(w, seed, rim, j, variation, inputs);
+    double unused[FORCE], local[FORCE * DOF];
+    const double *rim = w->jacobians.rim[j], factors[2] = { seed->cq, seed->cv };
     msfp_force_to_local_tangent(w->body[j], w->force[j], unused, c->below, local);
     for (int r = 0; r < MSFP_CONTACT_ROWS; ++r)
-        contact_row(jacobians->contact + r * INPUTS * MSFP_LANES + j, local, j, inputs, seed->cv,
+        contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j, seed->cv,
                     r < MOMENT    ? c->moment_below + r * DOF
                     : r == MOMENT ? w->dnormal[j]
                                   : FRICTION_ROW(w, j, r - MOMENT - 1));
@@ -155,6 +199,7 @@ MSFP_INLINE void force_below(const msfp_parameters *p, const msfp_work *w, int k
 #else
     add_variation(c->turning, k, variation, VARIATION_WP, MSFP_TURNING_SIZE);
 #endif
+    MSFP_UNROLL
     for (int f = 0; f < TWIST; ++f)
         memset(c->twist + f * DOF + (k - 1) * ND, 0, ND * sizeof *c->twist);
 }
@@ -177,12 +222,14 @@ MSFP_INLINE void balance(const msfp_parameters *p, const msfp_work *w, int k, co
 MSFP_INLINE void descend(const msfp_parameters *p, const msfp_seed *seed, msfp_work *w,
                          double variation[NB + 1][ND * VARIATION], columns *c, double *tangent)
 {
+    double parts[MSFP_CONTACT_ROWS * ND * LANES];
+    local_parts(w, seed, variation, parts);
     for (int k = NB; k >= 1; --k) {
         double next[FORCE * DOF]; /* in the frame of the body below */
         force_below(p, w, k, variation[k], c);
         memcpy(next, c->below, sizeof next);
         add_variation(next, k, variation[k], VARIATION_F, FORCE);
-        surface(w, seed, &w->jacobians, k - 1, variation[k], c);
+        surface(w, seed, k - 1, parts, c);
         balance(p, w, k, variation[k], c, tangent);
         memcpy(c->above, next, sizeof c->above);
         memcpy(c->moment_above, c->moment_below, sizeof c->moment_above);

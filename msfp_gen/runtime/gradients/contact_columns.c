@@ -4,7 +4,7 @@
  * equations, and the derivatives of the contact contain them.
  */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("O3") /* vectorises loops over columns */
+#pragma GCC optimize("O3", "no-tree-loop-distribute-patterns") /* one vector for each zero of a Jacobian */
 #endif
 #include <math.h>
 #include <string.h>

@@ -195,6 +195,21 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
     msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
 }
 
+/* The state at the stage that is solved; its works are those of group->next. */
+MSFP_INLINE void state_of_stage(const msfp_group *group, msfp_columns df[NB][2], msfp_columns f[NB][2],
+                                msfp_state_columns *to)
+{
+    const msfp_point_columns *dat = &group->point;
+    memcpy(to->q, dat->q, sizeof to->q);
+    memcpy(to->v, dat->v, sizeof to->v);
+    memcpy(to->a, dat->a, sizeof to->a);
+    memcpy(to->f, f, sizeof to->f);
+    memcpy(to->df, df, sizeof to->df);
+    memcpy(to->foot, group->work.foot, sizeof to->foot);
+    if (to != &group->next)
+        memcpy(to->work, group->next.work, sizeof to->work);
+}
+
 static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
@@ -203,7 +218,7 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
     const msfp_state_columns *now = &group->now;
     msfp_state_columns *next = &group->next;
     msfp_point_columns *dat = &group->point;
-    msfp_columns Q[NB][NQ], V[NB][NQ], dt;
+    msfp_columns Q[NB][NQ], V[NB][NQ], f[NB][2], dt;
     stage_columns s;
     int node = 0;
     if (MSFP_SHEAR_SIZE < 2)
@@ -225,20 +240,16 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
             dt[c] = now->t[c] + method->c[i] * group->h[c];
         msfp_inputs_columns(run, group, run->now.t + method->c[i] * h, dt, dat);
         solve_stage(run, group, i, Q, V);
-        stage_results(run, group, i, (const double(*)[2])s.rates[i], s.df[i], next->f);
+        stage_results(run, group, i, (const double(*)[2])s.rates[i], s.df[i], f);
         memcpy(s.v[i], dat->v, sizeof s.v[i]);
         memcpy(s.a[i], dat->a, sizeof s.a[i]);
         memcpy(s.foot[i], group->work.foot + MSFP_FOOT_Y1 * C, sizeof s.foot[i]);
-        memcpy(next->q, dat->q, sizeof next->q);
-        memcpy(next->v, dat->v, sizeof next->v);
-        memcpy(next->a, dat->a, sizeof next->a);
-        memcpy(next->df, s.df[i], sizeof next->df);
-        memcpy(next->foot, group->work.foot, sizeof next->foot);
         if (run->gradients->energies)
             msfp_stage_works(run, group, i);
         if (node < run->node_count && i == method->nodes[node])
-            group->node[node++] = *next;
+            state_of_stage(group, s.df[i], f, &group->node[node++]);
     }
+    state_of_stage(group, s.df[method->stages - 1], f, next);
 }
 
 #if MSFP_CLOSED_FORM

@@ -19,21 +19,21 @@ static inline double msfp_angle(double sine, double cosine)
 }
 
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
- * 45 operations; out: contact. All surfaces at once: [field][MSFP_LANES]. */
+ * 45 operations; out: contact. Several at once: [field][MSFP_LANES]. */
 MSFP_INLINED
 static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* local */, const double *restrict g /* shear */, double *restrict out)
 {
-    for (int s = 0; s < MSFP_LANES; ++s) {
-        const double par_sign = par[0 * MSFP_LANES + s];
-        const double par_R = par[1 * MSFP_LANES + s];
-        const double par_mu = par[3 * MSFP_LANES + s];
-        const double par_dy = par[4 * MSFP_LANES + s];
-        const double h_Y = h[0 * MSFP_LANES + s];
-        const double h_rest = h[2 * MSFP_LANES + s];
-        const double loc_px = loc[0 * MSFP_LANES + s];
-        const double loc_pz = loc[1 * MSFP_LANES + s];
-        const double loc_dwy = loc[2 * MSFP_LANES + s];
-        const double g_Y = g[0 * MSFP_LANES + s];
+    for (int lane = 0; lane < MSFP_LANES; ++lane) {
+        const double par_sign = par[0 * MSFP_LANES + lane];
+        const double par_R = par[1 * MSFP_LANES + lane];
+        const double par_mu = par[3 * MSFP_LANES + lane];
+        const double par_dy = par[4 * MSFP_LANES + lane];
+        const double h_Y = h[0 * MSFP_LANES + lane];
+        const double h_rest = h[2 * MSFP_LANES + lane];
+        const double loc_px = loc[0 * MSFP_LANES + lane];
+        const double loc_pz = loc[1 * MSFP_LANES + lane];
+        const double loc_dwy = loc[2 * MSFP_LANES + lane];
+        const double g_Y = g[0 * MSFP_LANES + lane];
         const double s_1 = g_Y - h_rest*(g_Y - h_Y);
         const double s_3 = -g_Y*par_mu;
         const double s_4 = sqrt((s_3*s_3) + 1);
@@ -53,30 +53,30 @@ static inline void msfp_contact_lanes(const double *restrict par /* surface_para
         const double s_23 = N_5*par_mu*s_12;
         const double s_24 = g_Y*s_23;
         const double out_25 = (-s_1*s_18 - s_17)/par_dy;
-        out[0 * MSFP_LANES + s] = s_24; /* My */
-        out[1 * MSFP_LANES + s] = dY_21; /* dY */
-        out[2 * MSFP_LANES + s] = N_5; /* N */
-        out[3 * MSFP_LANES + s] = s_1; /* Y */
-        out[4 * MSFP_LANES + s] = s_10; /* st */
-        out[5 * MSFP_LANES + s] = s_11; /* ct */
-        out[6 * MSFP_LANES + s] = u_13; /* u */
-        out[7 * MSFP_LANES + s] = out_25; /* YY */
+        out[0 * MSFP_LANES + lane] = s_24; /* My */
+        out[1 * MSFP_LANES + lane] = dY_21; /* dY */
+        out[2 * MSFP_LANES + lane] = N_5; /* N */
+        out[3 * MSFP_LANES + lane] = s_1; /* Y */
+        out[4 * MSFP_LANES + lane] = s_10; /* st */
+        out[5 * MSFP_LANES + lane] = s_11; /* ct */
+        out[6 * MSFP_LANES + lane] = u_13; /* u */
+        out[7 * MSFP_LANES + lane] = out_25; /* YY */
     }
 }
 MSFP_INLINED
 static inline void msfp_contact_jacobian(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* local */, const double *restrict g /* shear */, double *restrict out, double *restrict jacobian /* [row][input] */)
 {
-    for (int s = 0; s < MSFP_LANES; ++s) {
-        const double par_sign = par[0 * MSFP_LANES + s];
-        const double par_R = par[1 * MSFP_LANES + s];
-        const double par_mu = par[3 * MSFP_LANES + s];
-        const double par_dy = par[4 * MSFP_LANES + s];
-        const double h_Y = h[0 * MSFP_LANES + s];
-        const double h_rest = h[2 * MSFP_LANES + s];
-        const double loc_px = loc[0 * MSFP_LANES + s];
-        const double loc_pz = loc[1 * MSFP_LANES + s];
-        const double loc_dwy = loc[2 * MSFP_LANES + s];
-        const double g_Y = g[0 * MSFP_LANES + s];
+    for (int lane = 0; lane < MSFP_LANES; ++lane) {
+        const double par_sign = par[0 * MSFP_LANES + lane];
+        const double par_R = par[1 * MSFP_LANES + lane];
+        const double par_mu = par[3 * MSFP_LANES + lane];
+        const double par_dy = par[4 * MSFP_LANES + lane];
+        const double h_Y = h[0 * MSFP_LANES + lane];
+        const double h_rest = h[2 * MSFP_LANES + lane];
+        const double loc_px = loc[0 * MSFP_LANES + lane];
+        const double loc_pz = loc[1 * MSFP_LANES + lane];
+        const double loc_dwy = loc[2 * MSFP_LANES + lane];
+        const double g_Y = g[0 * MSFP_LANES + lane];
         const double s_1 = g_Y - h_rest*(g_Y - h_Y);
         const double s_3 = -g_Y*par_mu;
         const double s_4 = sqrt((s_3*s_3) + 1);
@@ -96,14 +96,14 @@ static inline void msfp_contact_jacobian(const double *restrict par /* surface_p
         const double s_23 = N_5*par_mu*s_12;
         const double s_24 = g_Y*s_23;
         const double out_25 = (-s_1*s_18 - s_17)/par_dy;
-        out[0 * MSFP_LANES + s] = s_24; /* My */
-        out[1 * MSFP_LANES + s] = dY_21; /* dY */
-        out[2 * MSFP_LANES + s] = N_5; /* N */
-        out[3 * MSFP_LANES + s] = s_1; /* Y */
-        out[4 * MSFP_LANES + s] = s_10; /* st */
-        out[5 * MSFP_LANES + s] = s_11; /* ct */
-        out[6 * MSFP_LANES + s] = u_13; /* u */
-        out[7 * MSFP_LANES + s] = out_25; /* YY */
+        out[0 * MSFP_LANES + lane] = s_24; /* My */
+        out[1 * MSFP_LANES + lane] = dY_21; /* dY */
+        out[2 * MSFP_LANES + lane] = N_5; /* N */
+        out[3 * MSFP_LANES + lane] = s_1; /* Y */
+        out[4 * MSFP_LANES + lane] = s_10; /* st */
+        out[5 * MSFP_LANES + lane] = s_11; /* ct */
+        out[6 * MSFP_LANES + lane] = u_13; /* u */
+        out[7 * MSFP_LANES + lane] = out_25; /* YY */
         const double p_s_1_g_Y = 1 - h_rest;
         const double p_s_4_s_3 = s_3/sqrt((s_3*s_3) + 1);
         const double p_N_5_loc_px = loc_px/(s_4*sqrt((loc_px*loc_px) + (loc_pz*loc_pz)));
@@ -127,18 +127,55 @@ static inline void msfp_contact_jacobian(const double *restrict par /* surface_p
         const double j_dY_21_g_Y = j_s_17_g_Y*p_dY_21_s_17 + p_dY_21_s_1*p_s_1_g_Y;
         const double j_s_23_g_Y = j_N_5_g_Y*p_s_23_N_5;
         const double j_s_24_g_Y = g_Y*j_s_23_g_Y + s_23;
-        jacobian[0 * MSFP_LANES + s] = j_s_24_loc_px;
-        jacobian[4 * MSFP_LANES + s] = 0;
-        jacobian[8 * MSFP_LANES + s] = p_N_5_loc_px;
-        jacobian[1 * MSFP_LANES + s] = j_s_24_loc_pz;
-        jacobian[5 * MSFP_LANES + s] = 0;
-        jacobian[9 * MSFP_LANES + s] = p_N_5_loc_pz;
-        jacobian[2 * MSFP_LANES + s] = 0;
-        jacobian[6 * MSFP_LANES + s] = j_dY_21_loc_dwy;
-        jacobian[10 * MSFP_LANES + s] = 0;
-        jacobian[3 * MSFP_LANES + s] = j_s_24_g_Y;
-        jacobian[7 * MSFP_LANES + s] = j_dY_21_g_Y;
-        jacobian[11 * MSFP_LANES + s] = j_N_5_g_Y;
+        jacobian[0 * MSFP_LANES + lane] = j_s_24_loc_px;
+        jacobian[4 * MSFP_LANES + lane] = 0;
+        jacobian[8 * MSFP_LANES + lane] = p_N_5_loc_px;
+        jacobian[1 * MSFP_LANES + lane] = j_s_24_loc_pz;
+        jacobian[5 * MSFP_LANES + lane] = 0;
+        jacobian[9 * MSFP_LANES + lane] = p_N_5_loc_pz;
+        jacobian[2 * MSFP_LANES + lane] = 0;
+        jacobian[6 * MSFP_LANES + lane] = j_dY_21_loc_dwy;
+        jacobian[10 * MSFP_LANES + lane] = 0;
+        jacobian[3 * MSFP_LANES + lane] = j_s_24_g_Y;
+        jacobian[7 * MSFP_LANES + lane] = j_dY_21_g_Y;
+        jacobian[11 * MSFP_LANES + lane] = j_N_5_g_Y;
+    }
+}
+
+/* twist of all bodies that a tilt angle turns about its axis: (2.4), (2.5), (2.36).
+ * 26 operations; out: twist. Several at once: [field][MSFP_DOF]. */
+MSFP_INLINED
+static inline void msfp_twist_lanes(const double *restrict s /* seed */, const double *restrict x /* axis */, double *restrict out)
+{
+    for (int lane = 0; lane < MSFP_DOF; ++lane) {
+        const double s_s0 = s[0 * MSFP_DOF + lane];
+        const double s_s1 = s[1 * MSFP_DOF + lane];
+        const double s_s2 = s[2 * MSFP_DOF + lane];
+        const double x_ty = x[0 * MSFP_DOF + lane];
+        const double x_Cx = x[3 * MSFP_DOF + lane];
+        const double x_Cz = x[4 * MSFP_DOF + lane];
+        const double x_Vx = x[5 * MSFP_DOF + lane];
+        const double x_Vz = x[6 * MSFP_DOF + lane];
+        const double x_Ax = x[7 * MSFP_DOF + lane];
+        const double x_Az = x[8 * MSFP_DOF + lane];
+        const double qy_1 = s_s0*x_ty;
+        const double tx_2 = -qy_1*x_Cz;
+        const double tz_3 = qy_1*x_Cx;
+        const double rate_4 = s_s1*x_ty;
+        const double rate_5 = -qy_1*x_Vz - rate_4*x_Cz;
+        const double rate_6 = qy_1*x_Vx + rate_4*x_Cx;
+        const double rate_7 = s_s2*x_ty;
+        const double rate_8 = -qy_1*x_Az - 2*rate_4*x_Vz - rate_7*x_Cz;
+        const double rate_9 = qy_1*x_Ax + 2*rate_4*x_Vx + rate_7*x_Cx;
+        out[0 * MSFP_DOF + lane] = qy_1; /* q0y */
+        out[1 * MSFP_DOF + lane] = tx_2; /* t0x */
+        out[2 * MSFP_DOF + lane] = tz_3; /* t0z */
+        out[3 * MSFP_DOF + lane] = rate_4; /* q1y */
+        out[4 * MSFP_DOF + lane] = rate_5; /* t1x */
+        out[5 * MSFP_DOF + lane] = rate_6; /* t1z */
+        out[6 * MSFP_DOF + lane] = rate_7; /* q2y */
+        out[7 * MSFP_DOF + lane] = rate_8; /* t2x */
+        out[8 * MSFP_DOF + lane] = rate_9; /* t2z */
     }
 }
 
@@ -1237,38 +1274,6 @@ static inline void msfp_rim_tangent(const double *restrict par, const double *re
         dout[1 * MSFP_RIM_LOCAL + c] = d_fz_17;
         dout[2 * MSFP_RIM_LOCAL + c] = d_My_21;
     }
-}
-
-/* twists of a body and all bodies above it by its tilt angles: (2.4), (2.5), (2.36).
- * 23 operations; out: twists. */
-MSFP_INLINED
-static inline void msfp_twists(const double *restrict s /* seed */, const double *restrict u /* body */, const double *restrict b /* body */, double *restrict out)
-{
-    const double s_s0 = s[0];
-    const double s_s1 = s[1];
-    const double s_s2 = s[2];
-    const double u_Cx = u[8];
-    const double u_Cz = u[9];
-    const double u_Vx = u[10];
-    const double u_Vz = u[11];
-    const double u_Ax = u[12];
-    const double u_Az = u[13];
-    (void)b;
-    const double tx_1 = -s_s0*u_Cz;
-    const double tz_2 = s_s0*u_Cx;
-    const double rate_3 = -s_s0*u_Vz - s_s1*u_Cz;
-    const double rate_4 = s_s0*u_Vx + s_s1*u_Cx;
-    const double rate_5 = -s_s0*u_Az - 2*s_s1*u_Vz - s_s2*u_Cz;
-    const double rate_6 = s_s0*u_Ax + 2*s_s1*u_Vx + s_s2*u_Cx;
-    out[0] = s_s0; /* theta_q0y */
-    out[1] = tx_1; /* theta_t0x */
-    out[2] = tz_2; /* theta_t0z */
-    out[3] = s_s1; /* theta_q1y */
-    out[4] = rate_3; /* theta_t1x */
-    out[5] = rate_4; /* theta_t1z */
-    out[6] = s_s2; /* theta_q2y */
-    out[7] = rate_5; /* theta_t2x */
-    out[8] = rate_6; /* theta_t2z */
 }
 
 /* a body after an infinitesimal twist.

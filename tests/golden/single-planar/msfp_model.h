@@ -1388,6 +1388,83 @@ static inline double msfp_seed_s2(const double *block)
     return block[2];
 }
 
+/* axis */
+enum {
+    MSFP_AXIS_TY = 0, /* [-] unit vector along the axis of a tilt angle */
+    MSFP_AXIS_WY = 1, /* [rad/s] its angular velocity */
+    MSFP_AXIS_ALY = 2, /* [rad/s^2] its angular acceleration */
+    MSFP_AXIS_CX = 3, /* [m] sphere centre on the axis */
+    MSFP_AXIS_CZ = 4, /* [m] sphere centre on the axis */
+    MSFP_AXIS_VX = 5, /* [m/s] its velocity */
+    MSFP_AXIS_VZ = 6, /* [m/s] its velocity */
+    MSFP_AXIS_AX = 7, /* [m/s^2] its acceleration */
+    MSFP_AXIS_AZ = 8, /* [m/s^2] its acceleration */
+    MSFP_AXIS_SIZE = 9
+};
+static inline void msfp_axis_t_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[0];
+    vector[2] = 0.0;
+}
+static inline void msfp_axis_t_put(double *block, const double vector[3])
+{
+    block[0] = vector[1];
+}
+static inline void msfp_axis_w_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[1];
+    vector[2] = 0.0;
+}
+static inline void msfp_axis_w_put(double *block, const double vector[3])
+{
+    block[1] = vector[1];
+}
+static inline void msfp_axis_al_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[2];
+    vector[2] = 0.0;
+}
+static inline void msfp_axis_al_put(double *block, const double vector[3])
+{
+    block[2] = vector[1];
+}
+static inline void msfp_axis_C_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = 0.0;
+    vector[2] = block[4];
+}
+static inline void msfp_axis_C_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[2];
+}
+static inline void msfp_axis_V_get(const double *block, double vector[3])
+{
+    vector[0] = block[5];
+    vector[1] = 0.0;
+    vector[2] = block[6];
+}
+static inline void msfp_axis_V_put(double *block, const double vector[3])
+{
+    block[5] = vector[0];
+    block[6] = vector[2];
+}
+static inline void msfp_axis_A_get(const double *block, double vector[3])
+{
+    vector[0] = block[7];
+    vector[1] = 0.0;
+    vector[2] = block[8];
+}
+static inline void msfp_axis_A_put(double *block, const double vector[3])
+{
+    block[7] = vector[0];
+    block[8] = vector[2];
+}
+
 /* twist */
 enum {
     MSFP_TWIST_Q0Y = 0, /* [rad] rotation, or its derivative in time */
@@ -1460,83 +1537,6 @@ static inline void msfp_twist_t2_get(const double *block, double vector[3])
     vector[2] = block[8];
 }
 static inline void msfp_twist_t2_put(double *block, const double vector[3])
-{
-    block[7] = vector[0];
-    block[8] = vector[2];
-}
-
-/* twists */
-enum {
-    MSFP_TWISTS_THETA_Q0Y = 0, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T0X = 1, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T0Z = 2, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_Q1Y = 3, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T1X = 4, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T1Z = 5, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_Q2Y = 6, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T2X = 7, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T2Z = 8, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_SIZE = 9
-};
-static inline void msfp_twists_theta_q0_get(const double *block, double vector[3])
-{
-    vector[0] = 0.0;
-    vector[1] = block[0];
-    vector[2] = 0.0;
-}
-static inline void msfp_twists_theta_q0_put(double *block, const double vector[3])
-{
-    block[0] = vector[1];
-}
-static inline void msfp_twists_theta_t0_get(const double *block, double vector[3])
-{
-    vector[0] = block[1];
-    vector[1] = 0.0;
-    vector[2] = block[2];
-}
-static inline void msfp_twists_theta_t0_put(double *block, const double vector[3])
-{
-    block[1] = vector[0];
-    block[2] = vector[2];
-}
-static inline void msfp_twists_theta_q1_get(const double *block, double vector[3])
-{
-    vector[0] = 0.0;
-    vector[1] = block[3];
-    vector[2] = 0.0;
-}
-static inline void msfp_twists_theta_q1_put(double *block, const double vector[3])
-{
-    block[3] = vector[1];
-}
-static inline void msfp_twists_theta_t1_get(const double *block, double vector[3])
-{
-    vector[0] = block[4];
-    vector[1] = 0.0;
-    vector[2] = block[5];
-}
-static inline void msfp_twists_theta_t1_put(double *block, const double vector[3])
-{
-    block[4] = vector[0];
-    block[5] = vector[2];
-}
-static inline void msfp_twists_theta_q2_get(const double *block, double vector[3])
-{
-    vector[0] = 0.0;
-    vector[1] = block[6];
-    vector[2] = 0.0;
-}
-static inline void msfp_twists_theta_q2_put(double *block, const double vector[3])
-{
-    block[6] = vector[1];
-}
-static inline void msfp_twists_theta_t2_get(const double *block, double vector[3])
-{
-    vector[0] = block[7];
-    vector[1] = 0.0;
-    vector[2] = block[8];
-}
-static inline void msfp_twists_theta_t2_put(double *block, const double vector[3])
 {
     block[7] = vector[0];
     block[8] = vector[2];

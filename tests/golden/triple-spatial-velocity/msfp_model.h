@@ -1552,6 +1552,101 @@ static inline double msfp_seed_s2(const double *block)
     return block[2];
 }
 
+/* axis */
+enum {
+    MSFP_AXIS_TX = 0, /* [-] unit vector along the axis of a tilt angle */
+    MSFP_AXIS_TY = 1, /* [-] unit vector along the axis of a tilt angle */
+    MSFP_AXIS_TZ = 2, /* [-] unit vector along the axis of a tilt angle */
+    MSFP_AXIS_WX = 3, /* [rad/s] its angular velocity */
+    MSFP_AXIS_WY = 4, /* [rad/s] its angular velocity */
+    MSFP_AXIS_WZ = 5, /* [rad/s] its angular velocity */
+    MSFP_AXIS_ALX = 6, /* [rad/s^2] its angular acceleration */
+    MSFP_AXIS_ALY = 7, /* [rad/s^2] its angular acceleration */
+    MSFP_AXIS_ALZ = 8, /* [rad/s^2] its angular acceleration */
+    MSFP_AXIS_CX = 9, /* [m] sphere centre on the axis */
+    MSFP_AXIS_CY = 10, /* [m] sphere centre on the axis */
+    MSFP_AXIS_CZ = 11, /* [m] sphere centre on the axis */
+    MSFP_AXIS_VX = 12, /* [m/s] its velocity */
+    MSFP_AXIS_VY = 13, /* [m/s] its velocity */
+    MSFP_AXIS_VZ = 14, /* [m/s] its velocity */
+    MSFP_AXIS_AX = 15, /* [m/s^2] its acceleration */
+    MSFP_AXIS_AY = 16, /* [m/s^2] its acceleration */
+    MSFP_AXIS_AZ = 17, /* [m/s^2] its acceleration */
+    MSFP_AXIS_SIZE = 18
+};
+static inline void msfp_axis_t_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_axis_t_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_axis_w_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_axis_w_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+static inline void msfp_axis_al_get(const double *block, double vector[3])
+{
+    vector[0] = block[6];
+    vector[1] = block[7];
+    vector[2] = block[8];
+}
+static inline void msfp_axis_al_put(double *block, const double vector[3])
+{
+    block[6] = vector[0];
+    block[7] = vector[1];
+    block[8] = vector[2];
+}
+static inline void msfp_axis_C_get(const double *block, double vector[3])
+{
+    vector[0] = block[9];
+    vector[1] = block[10];
+    vector[2] = block[11];
+}
+static inline void msfp_axis_C_put(double *block, const double vector[3])
+{
+    block[9] = vector[0];
+    block[10] = vector[1];
+    block[11] = vector[2];
+}
+static inline void msfp_axis_V_get(const double *block, double vector[3])
+{
+    vector[0] = block[12];
+    vector[1] = block[13];
+    vector[2] = block[14];
+}
+static inline void msfp_axis_V_put(double *block, const double vector[3])
+{
+    block[12] = vector[0];
+    block[13] = vector[1];
+    block[14] = vector[2];
+}
+static inline void msfp_axis_A_get(const double *block, double vector[3])
+{
+    vector[0] = block[15];
+    vector[1] = block[16];
+    vector[2] = block[17];
+}
+static inline void msfp_axis_A_put(double *block, const double vector[3])
+{
+    block[15] = vector[0];
+    block[16] = vector[1];
+    block[17] = vector[2];
+}
+
 /* twist */
 enum {
     MSFP_TWIST_Q0X = 0, /* [rad] rotation, or its derivative in time */
@@ -1645,191 +1740,6 @@ static inline void msfp_twist_t2_put(double *block, const double vector[3])
     block[15] = vector[0];
     block[16] = vector[1];
     block[17] = vector[2];
-}
-
-/* twists */
-enum {
-    MSFP_TWISTS_PSI_Q0X = 0, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q0Y = 1, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q0Z = 2, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_T0X = 3, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T0Y = 4, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T0Z = 5, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_Q1X = 6, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q1Y = 7, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q1Z = 8, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_T1X = 9, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T1Y = 10, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T1Z = 11, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_Q2X = 12, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q2Y = 13, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_Q2Z = 14, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_PSI_T2X = 15, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T2Y = 16, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_PSI_T2Z = 17, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_Q0X = 18, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q0Y = 19, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q0Z = 20, /* [rad] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T0X = 21, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T0Y = 22, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T0Z = 23, /* [m] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_Q1X = 24, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q1Y = 25, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q1Z = 26, /* [rad/s] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T1X = 27, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T1Y = 28, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T1Z = 29, /* [m/s] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_Q2X = 30, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q2Y = 31, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_Q2Z = 32, /* [rad/s^2] rotation, or its derivative in time */
-    MSFP_TWISTS_THETA_T2X = 33, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T2Y = 34, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_THETA_T2Z = 35, /* [m/s^2] translation of the point at the origin, or its derivative */
-    MSFP_TWISTS_SIZE = 36
-};
-static inline void msfp_twists_psi_q0_get(const double *block, double vector[3])
-{
-    vector[0] = block[0];
-    vector[1] = block[1];
-    vector[2] = block[2];
-}
-static inline void msfp_twists_psi_q0_put(double *block, const double vector[3])
-{
-    block[0] = vector[0];
-    block[1] = vector[1];
-    block[2] = vector[2];
-}
-static inline void msfp_twists_psi_t0_get(const double *block, double vector[3])
-{
-    vector[0] = block[3];
-    vector[1] = block[4];
-    vector[2] = block[5];
-}
-static inline void msfp_twists_psi_t0_put(double *block, const double vector[3])
-{
-    block[3] = vector[0];
-    block[4] = vector[1];
-    block[5] = vector[2];
-}
-static inline void msfp_twists_psi_q1_get(const double *block, double vector[3])
-{
-    vector[0] = block[6];
-    vector[1] = block[7];
-    vector[2] = block[8];
-}
-static inline void msfp_twists_psi_q1_put(double *block, const double vector[3])
-{
-    block[6] = vector[0];
-    block[7] = vector[1];
-    block[8] = vector[2];
-}
-static inline void msfp_twists_psi_t1_get(const double *block, double vector[3])
-{
-    vector[0] = block[9];
-    vector[1] = block[10];
-    vector[2] = block[11];
-}
-static inline void msfp_twists_psi_t1_put(double *block, const double vector[3])
-{
-    block[9] = vector[0];
-    block[10] = vector[1];
-    block[11] = vector[2];
-}
-static inline void msfp_twists_psi_q2_get(const double *block, double vector[3])
-{
-    vector[0] = block[12];
-    vector[1] = block[13];
-    vector[2] = block[14];
-}
-static inline void msfp_twists_psi_q2_put(double *block, const double vector[3])
-{
-    block[12] = vector[0];
-    block[13] = vector[1];
-    block[14] = vector[2];
-}
-static inline void msfp_twists_psi_t2_get(const double *block, double vector[3])
-{
-    vector[0] = block[15];
-    vector[1] = block[16];
-    vector[2] = block[17];
-}
-static inline void msfp_twists_psi_t2_put(double *block, const double vector[3])
-{
-    block[15] = vector[0];
-    block[16] = vector[1];
-    block[17] = vector[2];
-}
-static inline void msfp_twists_theta_q0_get(const double *block, double vector[3])
-{
-    vector[0] = block[18];
-    vector[1] = block[19];
-    vector[2] = block[20];
-}
-static inline void msfp_twists_theta_q0_put(double *block, const double vector[3])
-{
-    block[18] = vector[0];
-    block[19] = vector[1];
-    block[20] = vector[2];
-}
-static inline void msfp_twists_theta_t0_get(const double *block, double vector[3])
-{
-    vector[0] = block[21];
-    vector[1] = block[22];
-    vector[2] = block[23];
-}
-static inline void msfp_twists_theta_t0_put(double *block, const double vector[3])
-{
-    block[21] = vector[0];
-    block[22] = vector[1];
-    block[23] = vector[2];
-}
-static inline void msfp_twists_theta_q1_get(const double *block, double vector[3])
-{
-    vector[0] = block[24];
-    vector[1] = block[25];
-    vector[2] = block[26];
-}
-static inline void msfp_twists_theta_q1_put(double *block, const double vector[3])
-{
-    block[24] = vector[0];
-    block[25] = vector[1];
-    block[26] = vector[2];
-}
-static inline void msfp_twists_theta_t1_get(const double *block, double vector[3])
-{
-    vector[0] = block[27];
-    vector[1] = block[28];
-    vector[2] = block[29];
-}
-static inline void msfp_twists_theta_t1_put(double *block, const double vector[3])
-{
-    block[27] = vector[0];
-    block[28] = vector[1];
-    block[29] = vector[2];
-}
-static inline void msfp_twists_theta_q2_get(const double *block, double vector[3])
-{
-    vector[0] = block[30];
-    vector[1] = block[31];
-    vector[2] = block[32];
-}
-static inline void msfp_twists_theta_q2_put(double *block, const double vector[3])
-{
-    block[30] = vector[0];
-    block[31] = vector[1];
-    block[32] = vector[2];
-}
-static inline void msfp_twists_theta_t2_get(const double *block, double vector[3])
-{
-    vector[0] = block[33];
-    vector[1] = block[34];
-    vector[2] = block[35];
-}
-static inline void msfp_twists_theta_t2_put(double *block, const double vector[3])
-{
-    block[33] = vector[0];
-    block[34] = vector[1];
-    block[35] = vector[2];
 }
 
 /* variation */

@@ -124,7 +124,7 @@ def test_every_statement_parses_as_mathematics():
 def test_every_program_that_carries_the_motion_is_shown():
     spec = ModelSpec(Layout.tfp(), Effects(bouc_wen="report"))
     hidden = {"named_points", "body_energy", "top_energy", "force_to_world"}  # the same again, or bookkeeping
-    hidden |= {"twists", "transported_twist", "transported_force", "transported_wrench", "turning_balance"}
+    hidden |= {"twist", "transported_twist", "transported_force", "transported_wrench", "turning_balance"}
     hidden |= {"variation_of_rates", "local_variation", "force_to_local"}
     names = {program.name: program for program in derive(spec).programs}
     assert set(names) - hidden == set(PLACES)
