@@ -128,7 +128,9 @@ def cost(scene: Scene) -> None:
     clean = clean_tests(scene)
     begin = (scene.bearing.arrays()["friction"] * [1.3, 0.8, 0.8, 1.2]).tolist()
     start = replace(scene, bearing=scene.bearing.replace(friction=begin))
-    print("| values | Jacobian | evaluations | runs of each test | CPU time | largest difference of a value |")
+    print(
+        "| values | Jacobian | evaluations | runs of each test | CPU time | largest difference of a value [standard errors] |"
+    )
     print("|---|---|---|---|---|---|")
     for paths in SETS:
         totals = {name: np.zeros(4) for name in ("exact", "forward", "central")}
@@ -148,7 +150,7 @@ def cost(scene: Scene) -> None:
         for name, total in totals.items():
             count, runs, taken, gap = total / SEEDS
             ratio = taken * SEEDS / totals["exact"][2]
-            apart = "-" if name == "exact" else f"{gap:.1g} standard errors"
+            apart = "-" if name == "exact" else f"{gap:.1g}"
             print(f"| {len(best)} | {name} | {count:.1f} | {runs:.0f} | {ratio:.1f} | {apart} |", flush=True)
     print()
 

@@ -1,4 +1,4 @@
-"""Cost of gradients: `python benchmarks/gradients.py`, two minutes. The tables of docs/gradients.md.
+"""Cost of gradients: `python benchmarks/gradients.py`, half a minute. The tables of docs/gradients.md.
 
 Plain runs and runs with gradients alternate, and the least processor time of each counts, so that the ratios do not
 depend on the load of the machine. With `--instructions` callgrind counts instead, with vectors of AVX2. With
@@ -31,8 +31,8 @@ COUNTS = (1, 4, 8, 16)
 SCENES = {"`fenz-test2`": "fenz-test2", "`fenz-test5`": "fenz-test5", "`becker-circle-88`": "becker-circle-88"}
 
 
-def seconds(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple[float, int]:
-    """Processor time of the integration, and its steps. energies: differentiate the integrals over the run too."""
+def seconds(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple[float, dict[str, int]]:
+    """Processor time of the integration, and its counters. energies: differentiate the integrals over the run too."""
     model = build_model(scene.bearing.layout, scene.modelled, gradients=bool(paths))
     run, _ = RunSequence.of(scene).start_segment(model)
     if paths:
@@ -40,7 +40,7 @@ def seconds(scene: Scene, paths: Sequence[str], energies: bool = False) -> tuple
     start = time.process_time()
     while run.advance(100_000):
         pass
-    return time.process_time() - start, run.counts["steps"]
+    return time.process_time() - start, dict(run.counts)
 
 
 def damped(name: str, rtol: float) -> Scene:
@@ -50,15 +50,16 @@ def damped(name: str, rtol: float) -> Scene:
     return replace(scene, bearing=bearing, solver=solver, output_step=scene.end / 200)
 
 
-def shares_of_time(scene: Scene, energies: bool) -> tuple[list[float], int]:
-    """Cost of gradients over that of the run, for each number of parameters; and the steps of the run."""
-    shares, steps = [], 0
+def shares_of_time(scene: Scene, energies: bool) -> tuple[list[float], dict[str, int]]:
+    """Cost of gradients over that of the run, for each number of parameters; and the counters of the run."""
+    shares: list[float] = []
+    counts: dict[str, int] = {}
     for count in COUNTS:
         pairs = [(seconds(scene, ()), seconds(scene, PATHS[:count], energies)) for _ in range(REPEATS)]
         plain, full = (min(pair[i][0] for pair in pairs) for i in (0, 1))
         shares.append(full / plain - 1)
-        steps = pairs[0][0][1]
-    return shares, steps
+        counts = pairs[0][0][1]
+    return shares, counts
 
 
 def counted(name: str, rtol: float, count: int, energies: bool) -> int:
@@ -79,19 +80,22 @@ def main() -> None:
         os.environ["MSFP_GEN_CFLAGS"] = AVX2
         os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
     columns = " | ".join(f"{count}" for count in COUNTS)
-    print(f"| run | steps | fixed | a group | {columns} |\n|---|---|---|---|{'---|' * len(COUNTS)}")
+    work = "instructions" if counting else "steps | evaluations a step | tangents a step"
+    head = f"| run | {work} | fixed | a group | {columns} |"
+    print(f"{head}\n{'|---' * (head.count('|') - 1)}|")
     for title, name in SCENES.items():
         for rtol in (1e-4,) if counting else (1e-4, 1e-6):
             if counting:
                 plain, *full = (counted(name, rtol, count, energies) for count in (0, *COUNTS))
-                shares, steps = [each / plain - 1 for each in full], f"{plain / 1e6:.0f} million"
+                shares, done = [each / plain - 1 for each in full], f"{plain / 1e6:.0f} million"
             else:
-                shares, taken = shares_of_time(damped(name, rtol), energies)
-                steps = str(taken)
+                shares, counts = shares_of_time(damped(name, rtol), energies)
+                rates = [counts[key] / counts["steps"] for key in ("evaluations", "factorisations")]
+                done = f"{counts['steps']} | {rates[0]:.1f} | {rates[1]:.1f}"
             one = (shares[-1] - shares[-2]) / (COUNTS[-1] - COUNTS[-2])  # parameter of a full group
             each = [share / count for share, count in zip(shares, COUNTS, strict=True)]
             parts = [shares[-2] - COUNTS[-2] * one, COLUMNS * one, *each]
-            print(f"| {title}, rtol {rtol:g} | {steps} | {' | '.join(f'{100 * p:.0f} %' for p in parts)} |", flush=True)
+            print(f"| {title}, rtol {rtol:g} | {done} | {' | '.join(f'{100 * p:.0f} %' for p in parts)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,7 @@ class Function:
     """Index in the output, its text, and the field's name."""
     tangent_stores: tuple[tuple[int, str], ...]
     lanes: str
+    """As in `Program`."""
     jacobian: tuple[tuple[str, ...], tuple[tuple[int, str], ...]]
     """Of a program that runs in lanes: statements, and (row * inputs + input, text)."""
 

@@ -55,7 +55,7 @@ MSFP_INLINE void add_variation(double *column, int k, const double *variation, i
             column[f * DOF + (k - 1) * ND + i] += variation[i * VARIATION + field + f];
 }
 
-/* The axis about which tilt angle i of body k turns it: t1 of the body below for psi, t2 of the body for theta. */
+/* The axis about which tilt angle i turns body k (2.4), (2.5): t1 of the body below for psi, t2 of the body for theta. */
 MSFP_INLINE void axis(const msfp_work *w, int k, int i, double *block)
 {
     const int theta = i == PAIR - 1;
@@ -152,7 +152,7 @@ MSFP_INLINE void local_parts(const msfp_work *w, const msfp_seed *seed, double v
     }
 }
 
-/* Columns of one component of the moment, or of N, of the contact of surface j, from those of its force. */
+/* Columns of one result of the contact of surface j, from those of its force and `part`, that of local_parts. */
 MSFP_INLINE void contact_row(const double *restrict slope, const double *restrict local, int j,
                              const double *restrict part, double cv, double *restrict row)
 {

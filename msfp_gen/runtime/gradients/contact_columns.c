@@ -4,7 +4,7 @@
  * equations, and the derivatives of the contact contain them.
  */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("O3", "no-tree-loop-distribute-patterns") /* one vector for each zero of a Jacobian */
+#pragma GCC optimize("O3", "no-tree-loop-distribute-patterns") /* zeros of Jacobians as vectors, not by memset */
 #endif
 #include <math.h>
 #include <string.h>

@@ -244,8 +244,8 @@ MSFP_INLINE int msfp_last_stage(const msfp_run *run)
 {
     return msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
 }
-/* Stage whose rates and powers count where those of stage j are discontinuous at a rim and the step becomes longer: one
- * before a contact at its end. */
+/* Stage whose rates and powers stand for those of stage j where the length of the step changes: the last one before the
+ * contact, where the step ends at a rim contact and stage j has the force of the rim already. */
 MSFP_INLINE int msfp_stage_before_contact(const msfp_trail *trail, int j)
 {
     return trail->meets_rim > 0 && j >= trail->meets_rim ? trail->meets_rim - 1 : j;

@@ -68,7 +68,7 @@ MSFP_INLINE vector axis(const msfp_work *w, const msfp_work_columns *d, int k)
 }
 #endif
 
-/* Power of the load (msfp_load_power). U: velocity of the base. */
+/* Power of the load (msfp_load_power). V, turn: velocity and angular velocity of the top plate. */
 MSFP_INLINE void load_power(const msfp_point *at, const msfp_point_columns *dat, const vector *V, const vector *turn,
                             double *sum)
 {

@@ -19,7 +19,7 @@ static inline double msfp_angle(double sine, double cosine)
 }
 
 /* contact at a given force: N, psi~, theta~ in closed form, moment and Bouc-Wen rates (3.13)-(3.19).
- * 45 operations; out: contact. Several at once: [field][MSFP_LANES]. */
+ * 45 operations; out: contact. Evaluated for all surfaces or unknowns at once: [field][MSFP_LANES]. */
 MSFP_INLINED
 static inline void msfp_contact_lanes(const double *restrict par /* surface_parameters */, const double *restrict h /* stage */, const double *restrict loc /* local */, const double *restrict g /* shear */, double *restrict out)
 {
@@ -143,7 +143,7 @@ static inline void msfp_contact_jacobian(const double *restrict par /* surface_p
 }
 
 /* twist of all bodies that a tilt angle turns about its axis: (2.4), (2.5), (2.36).
- * 26 operations; out: twist. Several at once: [field][MSFP_DOF]. */
+ * 26 operations; out: twist. Evaluated for all surfaces or unknowns at once: [field][MSFP_DOF]. */
 MSFP_INLINED
 static inline void msfp_twist_lanes(const double *restrict s /* seed */, const double *restrict x /* axis */, double *restrict out)
 {
