@@ -1,12 +1,14 @@
-"""Landings by `seat_damping` and tolerance, and agreement of the models at the rims: prints docs/uplift.md's tables.
+"""Landings by `seat_damping` and tolerance, and the models with and without uplift: prints docs/uplift.md's tables.
 
 A rigid mass of 11.4 t on `prototype-tfp` is shaken vertically at 2 Hz, a little beyond 1 g, and sideways by 30 mm. Then
-`fenz-test5` is run with and without uplift, and the contact points of all preset scenes are compared with the faces of
-their sliders: `python benchmarks/uplift.py`.
+`fenz-test5`, tops on vertical springs and the hospital are run with and without uplift where nothing lifts, and the
+contact points of all preset scenes are compared with the faces of their sliders: `python benchmarks/uplift.py`; with
+`agreement` the runs with and without uplift alone.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -73,6 +75,61 @@ def agreement() -> None:
     print(f"\nfenz-test5 with uplift: largest {difference.max() / peak:.2%}, RMS {rms / peak:.3%} of the peak force")
 
 
+def heaving(amplitude: float, sway: float) -> Motion:
+    """Two seconds of a base that heaves at 8 Hz and sways at 0.7 Hz by these amplitudes [m], after a smooth start."""
+    time = np.linspace(0.0, 2.0, 1601)
+    start = np.clip(time / 0.5, 0.0, 1.0)
+    wave = start**3 * (10 - 15 * start + 6 * start**2)
+    path = np.zeros((len(time), 3))
+    path[:, 0] = sway * wave * np.sin(2 * np.pi * 0.7 * time)
+    path[:, 2] = amplitude * wave * np.sin(2 * np.pi * 8.0 * time)
+    return Motion.from_arrays(time, path)
+
+
+def on_spring(stiffness: float, ratio: float, rig: bool) -> Scene:
+    """A rig that holds its height above a heaving base, or a mass on a vertical spring, with that damping ratio."""
+    load, restraint = 112e3, (1e7, 1e4, stiffness, 2 * ratio * np.sqrt(stiffness * 11428.0))
+    held = heaving(0.3 * load / stiffness, np.sqrt(0.2 * load / stiffness)), Top.rig(load, 1e8, 1e4, *restraint)
+    carried = heaving(1.5 / (16 * np.pi) ** 2, SIDEWAYS), Top.mass(11428.0, 300.0, 0.5, *restraint)
+    motion, top = held if rig else carried
+    bearing = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
+    return Scene(bearing, motion, top, Effects(), Solver(rtol=1e-5), output_step=1e-3)
+
+
+def neutral() -> None:
+    """Print what uplift changes where nothing lifts: N over that at rest, horizontal force over friction at rest."""
+    print(
+        "\n| scene | N over that at rest | N, largest | N, RMS | force, largest | force, RMS |\n|---|---|---|---|---|---|"
+    )
+    cases = [(True, 1e8, 0.05), (True, 1e9, 0.05), (True, 5e9, 0.05), (False, 6.5e7, 0.05), (False, 5e8, 0.05)]
+    for rig, stiffness, ratio in [*cases, (False, 2e9, 0.2)]:
+        scene = on_spring(stiffness, ratio, rig)
+        runs = [simulate(replace(scene, effects=Effects(uplift=uplift))).history for uplift in (False, True)]
+        rest = runs[0].normal_force[0].mean()
+        friction = rest * max(surface.friction for surface in scene.bearing.surfaces)
+        parts = [(r.normal_force / rest, r.top_force[:, :2] / friction) for r in runs]
+        print(row(f"{'rig' if rig else 'mass'} on {stiffness:.2g} N/m, {ratio:.0%}", *parts), flush=True)
+    for name in ("hospital-clc", "hospital-ccc"):
+        scene = replace(load_scene(name), duration=25.0)
+        parts = []
+        for uplift in (False, True):
+            bearings = [replace(each, effects=Effects(uplift=uplift)) for each in scene.bearings]
+            result = simulate(replace(scene, bearings=bearings))
+            friction = scene.axial_loads * [max(s.friction for s in each.bearing.surfaces) for each in bearings]
+            forces = np.stack([each.top_force[:, :2] for each in result.bearings], axis=1) / friction[:, None]
+            parts.append((result.axial_force / scene.axial_loads, forces))
+        print(row(f"{name}, 25 s", *parts), flush=True)
+
+
+def row(name: str, closed: tuple[np.ndarray, np.ndarray], lifting: tuple[np.ndarray, np.ndarray]) -> str:
+    """A row of that table, from N and forces of both runs."""
+    cells = []
+    for before, after in zip(closed, lifting, strict=True):
+        difference = np.abs(after - before)
+        cells += [f"{difference.max():.2%}", f"{np.sqrt(np.mean(difference**2)):.3%}"]
+    return f"| {name} | {closed[0].min():.2f} to {closed[0].max():.2f} | " + " | ".join(cells) + " |"
+
+
 def contacts() -> None:
     """Print the largest distance of a contact point from the axis of its slider, over the radius of the face."""
     print("\n| scene | largest offset over radius, surface by surface |\n|---|---|")
@@ -87,6 +144,10 @@ def contacts() -> None:
 
 def main() -> None:
     """Print the tables."""
+    if sys.argv[1:] == ["agreement"]:
+        agreement()
+        neutral()
+        return
     print("| c [s/m] | " + " | ".join(f"{1e3 * v:.0f} mm/s" for v in VELOCITIES) + " |")
     print("|---" * (1 + len(VELOCITIES)) + "|")
     for damping in DAMPINGS:
@@ -98,6 +159,7 @@ def main() -> None:
             lifts, cells = zip(*(cell(peak, damping, rtol) for rtol in TOLERANCES), strict=True)
             print(f"| {peak:g} | {lifts[-1]:.2g} | {damping:g} | " + " | ".join(cells) + " |", flush=True)
     agreement()
+    neutral()
     contacts()
 
 

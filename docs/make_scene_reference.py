@@ -80,7 +80,8 @@ MEANINGS = {
     "yield_displacement": "Slip over which friction builds up; 0.25 to 1 mm in practice.",
     "rim_stiffness": "Stiffness of the rim ([faq.md](faq.md#how-stiff-is-a-rim)).",
     "rim_damping": "Damping of the rim.",
-    "seat_stiffness": "Stiffness of the unilateral contact, with uplift ([uplift.md](uplift.md)).",
+    "seat_stiffness": "Stiffness of the unilateral contact, with uplift; left out: 5e9, or more below a stiffer top "
+    "([uplift.md](uplift.md#the-model)).",
     "seat_damping": "Damping of that contact, over its stiffness and compression.",
     "contact_damping": "Damping time T of the sheared contact ([hysteresis.md](hysteresis.md)).",
     "friction_at": "What friction coefficients refer to: the surfaces, or the pivot as in data sheets"

@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.two_port import compiled_port, scene_at_rest
 from msfp_gen.errors import InputError
 from msfp_gen.model.model import Model, build_model
-from msfp_gen.results.restart_state import RestartState, transferred_foot, transferred_state
+from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_switching import Ending, stopping_monitors
 from msfp_gen.scene.monitors import monitor_options
 from msfp_gen.specification.layout import Auto, Effects
@@ -99,8 +99,9 @@ class Member:
     def continue_from(self, other: Member, ends: Array) -> None:
         """Enter the state of another model of the same bearing; ends: their motion in it, shape (2, 3, 6)."""
         at = RestartState.of_port(other.port)
-        q, v, f = transferred_state(self.rest.bearing, self.model, at)
+        parts = (self.rest.bearing, self.rest.top, self.model, at)
+        q, v, f = transferred_state(*parts)
+        origin, foot = transferred_heights(*parts)
         law = self.effects.law
         heat = at.heat if law is not None and law.depends_on_temperature else None
-        state = {"origin": at.origin, "monitor_heat": at.monitor_heat, "foot": transferred_foot(at, q), "heat": heat}
-        self.port.enter(at.time, q, v, f, ends, **state)
+        self.port.enter(at.time, q, v, f, ends, origin=origin, monitor_heat=at.monitor_heat, foot=foot, heat=heat)

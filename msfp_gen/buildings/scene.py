@@ -12,11 +12,12 @@ import numpy as np
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.effects import select_effects
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.fields import Quantity, check_fields, require_type
+from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection
+from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
@@ -85,6 +86,9 @@ class BuildingScene:
             require_type(each, BuildingBearing, f"scene.bearings[{index}]")
         if not self.bearings:
             raise InputError("scene.bearings: there are none; give at least one BuildingBearing")
+        for index, each in enumerate(self.bearings):
+            with errors_at("bearing", f"scene.bearings[{index}].bearing"):
+                check_seats(each.bearing, each.interface, each.effects)
         check_fields(self, "scene")
         self._check_gravity()
         self._check_motion()

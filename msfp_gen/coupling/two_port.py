@@ -280,7 +280,8 @@ def compiled_port(scene: Scene, model: Model, axial_load: float, **monitors: Any
 
 def _identity(scene: Scene, model: Model, axial_load: float) -> bytes:
     """Digest of everything that determines the wrenches beside the motion of the ends."""
-    arrays = (*bodies_and_surfaces(scene.bearing, model.effects), top_values(scene.top), np.array([axial_load]))
+    values = bodies_and_surfaces(scene.bearing, model.effects, scene.top)
+    arrays = (*values, top_values(scene.top), np.array([axial_load]))
     digest = hashlib.sha256(f"{model.info.key} {scene.bearing.gravity!r} {scene.solver!r}".encode())
     for array in arrays:
         digest.update(array.tobytes())

@@ -22,7 +22,7 @@ _SLIDER = {
 _PLATE = {"height": 0.05, "centroid": 0.025, "mass": 150.0, "inertia_transverse": 5.0, "inertia_axial": 10.0}
 _SURFACE = {
     "radius": 1.0, "capacity": 0.15, "yield_displacement": 5e-4, "rim_stiffness": 1e7, "rim_damping": 1e3,
-    "contact_damping": 1e-4, "seat_stiffness": 5e9, "seat_damping": 10.0,
+    "contact_damping": 1e-4, "seat_stiffness": 5e10, "seat_damping": 10.0,
     "friction_slow": 0.03, "velocity_rate": 50.0, "velocity_drop": 0.5, "reference_pressure": 15e6,
     "pressure_ratio": 0.7, "temperature_ratio": 0.7, "area": 0.03, "reach": 0.1, "heating": 6.6e-5,
     "start_temperature": 20.0, **dict.fromkeys(COEFFICIENTS, 0.1),

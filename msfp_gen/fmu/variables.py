@@ -135,7 +135,7 @@ def top_names(scene: Scene) -> tuple[str, ...]:
 
 def _parameters(scene: Scene) -> Iterator[Variable]:
     spec, solver = scene.spec, scene.solver
-    bodies, surfaces = bodies_and_surfaces(scene.bearing, spec.effects)
+    bodies, surfaces = bodies_and_surfaces(scene.bearing, spec.effects, scene.top)
     yield Variable("gravity", Block.PARAMETERS, "m/s^2", "gravity", scene.bearing.gravity, place="GRAVITY")
     for k, row in enumerate(bodies):
         yield from _values(f"body[{k + 1}]", contract.BODY, row, "" if k else "BODIES", f"body {k + 1}")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.seats import seat_stiffness
 from msfp_gen.scene.top import MassTop, Top, load_values
 from msfp_gen.specification import contract
 
@@ -31,9 +32,14 @@ def vector(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Ar
     return array
 
 
-def bodies_and_surfaces(bearing: Bearing, effects: Effects) -> tuple[Array, Array]:
-    """Arrays of bodies, shape (n, values of a body), and surfaces, (n-1, values of a surface), in contract order."""
+def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = None) -> tuple[Array, Array]:
+    """Arrays of bodies, shape (n, values of a body), and surfaces, (n-1, values of a surface), in contract order.
+
+    top: on which the stiffness of unilateral contacts depends where it is not given. Raises InputError as it does.
+    """
     arrays = bearing.arrays()
+    if effects.uplift:
+        arrays["seat_stiffness"] = seat_stiffness(bearing, top)
     if (law := effects.law) is not None:
         rows = [law_parameters(law, bearing, index) for index in range(bearing.layout.surfaces)]
         arrays = {**arrays, **{name: np.array([row[name] for row in rows]) for name in law.columns}}
@@ -67,5 +73,5 @@ def separations_at_rest(bearing: Bearing, top: Top | None, added_load: float = 0
     masses[-1] += mass
     carried = load + bearing.gravity * np.cumsum(masses[::-1])[::-1]
     out = np.zeros((len(masses), 3))
-    out[:, 2] = -carried / np.array([surface.seat_stiffness for surface in bearing.surfaces])
+    out[:, 2] = -carried / seat_stiffness(bearing, top)
     return out

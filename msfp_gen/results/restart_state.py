@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.model.marshalling import separations_at_rest
 from msfp_gen.model.plane import out_of_plane, rotated_pairs, tilts_out_of_plane
 from msfp_gen.results.geometry.shape import rim_forces
+from msfp_gen.scene.seats import seat_stiffness
+from msfp_gen.scene.top import sprung_mass
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Port, Run
     from msfp_gen.model.model import Model
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.top import Top
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ class RestartState:
         return force
 
 
-def transferred_state(bearing: Bearing, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
+def transferred_state(bearing: Bearing, top: Top, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
     Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
@@ -83,9 +87,8 @@ def transferred_state(bearing: Bearing, model: Model, at: RestartState) -> tuple
                 out_of_plane(separations[1], at.azimuth, "vector"),
             )
     if model.effects.uplift:
-        stiffness = np.array([surface.seat_stiffness for surface in bearing.surfaces])
         if separations is None:
-            separations = (-force / stiffness[:, None], np.zeros_like(force))
+            separations = (-force / seat_stiffness(bearing, top)[:, None], np.zeros_like(force))
         q, v = np.hstack([q, separations[0]]), np.hstack([v, separations[1]])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), np.ascontiguousarray(f)
 
@@ -95,11 +98,17 @@ def _is_oblique(azimuth: float) -> bool:
     return min(abs(azimuth), abs(azimuth - np.pi / 2)) > 1e-9
 
 
-def transferred_foot(at: RestartState, q: Array) -> Array:
-    """Height of the foot of the supported mass and its rate, shape (2,) [m], [m/s], above a stack at `q`.
+def transferred_heights(
+    bearing: Bearing, top: Top, model: Model, at: RestartState, added_load: float = 0.0
+) -> tuple[Array, Array]:
+    """Origin and foot of the earlier model for the next one: see `RestartState`.
 
-    The separations that the earlier model did not have lower the top plate. The foot follows, so that the force of its
-    spring does not change.
+    Separations that the earlier model did not have lower the top plate at rest and change the length of a spring below
+    a mass, whose compliance they take over: the next model goes on as if it had been there from the start. added_load:
+    that at the start, as of `separations_at_rest`.
     """
-    lowered = float(q[:, 5].sum()) if q.shape[1] > at.q.shape[1] else 0.0
-    return np.array([at.foot[0] + lowered, at.foot[1]])
+    if at.q.shape[1] > 3 or not model.effects.uplift:
+        return at.origin, at.foot
+    lowered = separations_at_rest(bearing, top, added_load)[:, 2].sum()
+    below_mass = sprung_mass(top) * bearing.gravity * (1.0 / seat_stiffness(bearing, top)).sum()
+    return at.origin - np.array([0.0, 0.0, lowered]), at.foot + np.array([lowered + below_mass, 0.0])

@@ -66,6 +66,7 @@ typedef struct {
     double top[MSFP_TOP_PARAMETERS_SIZE];
     double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met */
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
+    double settlement_ratio;    /* compliance of spring and unilateral contacts over that of the spring alone */
     double weight;              /* of the moving bodies and the supported mass [N] */
 } msfp_parameters;
 

@@ -38,9 +38,10 @@ class Surface:
     friction: friction coefficient mu. yield_displacement: d_y of the Bouc-Wen equations [m]; R_gamma/R_0 of (2.94),
     with its values in SI, is 1/d_y. rim_stiffness: k_c [N/m]. rim_damping: c_c [N s/m] (2.103).
     seat_stiffness [N/m], seat_damping [s/m]: k and c of the unilateral contact of models with uplift, whose force is
-    k s (1 + c ds/dt) at compression s (docs/uplift.md). contact_damping: T [s]; friction is mu N (Y + T dY/dt) in place
-    of mu N Y (docs/hysteresis.md). The remaining fields are parameters of friction laws (docs/friction.md): each is
-    given if, and only if, the law of `Effects.friction` has it. Raises InputError.
+    k s (1 + c ds/dt) at compression s (docs/uplift.md); k = None: `seats.seat_stiffness`. contact_damping: T [s];
+    friction is mu N (Y + T dY/dt) in place of mu N Y (docs/hysteresis.md). The remaining fields are parameters of
+    friction laws (docs/friction.md): each is given if, and only if, the law of `Effects.friction` has it. Raises
+    InputError.
     """
 
     radius: Annotated[float, _LENGTH]
@@ -49,7 +50,7 @@ class Surface:
     yield_displacement: Annotated[float, _LENGTH]
     rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
     rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
-    seat_stiffness: Annotated[float, Quantity("N/m", above=0.0)] = 5e9
+    seat_stiffness: Annotated[float | None, Quantity("N/m", above=0.0)] = None
     seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 10.0
     contact_damping: Annotated[float, Quantity("s", least=0.0)] = 1e-4
     friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
@@ -119,7 +120,6 @@ _SURFACE_ARRAYS = (
     "yield_displacement",
     "rim_stiffness",
     "rim_damping",
-    "seat_stiffness",
     "seat_damping",
     "contact_damping",
 )
@@ -248,7 +248,7 @@ class Bearing:
         """All values as float64 arrays.
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
-        seat_stiffness, seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height,
+        seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height,
         centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in
         the fields.
         """

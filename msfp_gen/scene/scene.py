@@ -15,6 +15,7 @@ from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
 from msfp_gen.scene.parts import InitialState, SceneParts, Stop
 from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification.friction_laws import HEAT_TIMES
@@ -45,6 +46,7 @@ class Scene(SceneParts):
         self._check_sizes()
         word, law = self.law
         check_bearing(law, word, self.bearing)
+        check_seats(self.bearing, self.top, self.effects)
         if self.effects.rims is not False:
             self._check_rims()
         elif self.stop is not None and self.stop.all_rims:

@@ -162,6 +162,11 @@ def is_sprung(top: Top) -> bool:
     return isinstance(top, RigTop | MassTop) and bool(top.vertical_stiffness or top.vertical_damping)
 
 
+def sprung_mass(top: Top) -> float:
+    """Supported mass that rests on a vertical spring [kg]."""
+    return top.mass if isinstance(top, MassTop) and is_sprung(top) else 0.0
+
+
 def load_values(top: Top) -> Array:
     """Constant force [N] and moment [N m] of the top on the top plate at r_nn, ndarray, shape (6,)."""
     if isinstance(top, RigTop):

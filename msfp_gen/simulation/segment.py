@@ -20,7 +20,7 @@ from msfp_gen.model.plane import (
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
-from msfp_gen.results.restart_state import RestartState, transferred_foot, transferred_state
+from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending
 from msfp_gen.scene.monitors import monitor_options
@@ -92,7 +92,10 @@ def start_run(
     solver, stop = scene.solver, scene.stop
     load_knots, wrench = wrench_pieces(scene)
     frame = Frame.of(scene, model, wrench)
-    q, v, f = _initial_state(scene, model, frame.azimuth) if at is None else transferred_state(scene.bearing, model, at)
+    if at is None:
+        q, v, f = _initial_state(scene, model, frame.azimuth)
+    else:
+        q, v, f = transferred_state(scene.bearing, scene.top, model, at)
     stack = model.stack(scene.bearing, scene.top, anchor=frame.motion.displacement(0.0)[:2])
     grid = time_grid(scene)
     options: dict[str, Any] = {}
@@ -101,9 +104,9 @@ def start_run(
         options["support_knots"], options["support_coefficients"] = support
     if at is not None:
         becomes_spatial = at.planar and not model.planar
-        origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
+        origin, options["foot"] = transferred_heights(scene.bearing, scene.top, model, at, _first_load(scene))
+        origin = out_of_plane(origin, at.azimuth, "vector") if becomes_spatial else origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
-        options["foot"] = transferred_foot(at, q)
         if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
             options["heat"] = at.heat
     run: Run = model.extension.Run(
@@ -173,10 +176,14 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
     if model.planar:
         q, v, f = state_in_plane(q, v, f, azimuth)
     if model.effects.uplift:
-        load = 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
-        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, load)])
+        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, _first_load(scene))])
         v = np.hstack([v, np.zeros((count, 3))])
     return q, v, f
+
+
+def _first_load(scene: Scene) -> float:
+    """Load at the start beside that of the top, downward positive [N]."""
+    return 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
 
 
 def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:

@@ -6,7 +6,21 @@ import numpy as np
 import pytest
 from support.flights import shaken
 
-from msfp_gen import Auto, Effects, Motion, RunError, Scene, Top, load_scene, presets, simulate
+from msfp_gen import (
+    Auto,
+    Effects,
+    InputError,
+    Motion,
+    RunError,
+    Scene,
+    Solver,
+    Top,
+    build_model,
+    load_scene,
+    presets,
+    simulate,
+)
+from msfp_gen.model.marshalling import bodies_and_surfaces, top_values
 from msfp_gen.results.geometry.shape import contact_offsets
 
 
@@ -75,3 +89,54 @@ def test_a_small_bounce_has_one_answer():
     peaks = [np.abs(history.displacement[:, 0]).max() for history in histories]
     assert max(peaks) < 1.02 * min(peaks)
     assert max(peaks[1:]) < 1.005 * min(peaks[1:])
+
+
+def differences(scene):
+    """Largest differences of N over N at rest, and of the horizontal force over friction at rest, by uplift."""
+    runs = [
+        simulate(replace(scene, effects=replace(scene.modelled, uplift=uplift))).history for uplift in (False, True)
+    ]
+    assert runs[1].lift.max() == 0.0 and np.ptp(runs[0].normal_force) > 0.3 * runs[0].normal_force[0, 0]
+    normal, force = (np.abs(getattr(runs[1], name) - getattr(runs[0], name)) for name in ("normal_force", "top_force"))
+    rest = runs[0].normal_force[0].mean()
+    return normal.max() / rest, force[:, :2].max() / (rest * max(s.friction for s in scene.bearing.surfaces))
+
+
+PLANAR = Effects(dimension="planar")
+
+
+def heaving(stiffness, sway, effects=PLANAR):
+    """A rig that holds its height above a base that sways and heaves, so that N changes by a third or more."""
+    time = np.linspace(0.0, 2.0, 1601)
+    start = np.clip(time / 0.5, 0.0, 1.0)
+    wave = start**3 * (10 - 15 * start + 6 * start**2)
+    path = np.zeros((len(time), 3))
+    path[:, 0] = sway * wave * np.sin(2 * np.pi * 0.7 * time)
+    path[:, 2] = 0.3 * 112e3 / stiffness * wave * np.sin(2 * np.pi * 8.0 * time)
+    damping = 0.1 * np.sqrt(stiffness * 11.4e3)
+    top = Top.rig(112e3, 1e8, 1e4, 1e7, 1e4, vertical_stiffness=stiffness, vertical_damping=damping)
+    solver = Solver(rtol=1e-5)
+    return Scene(presets.bearing("fenz-tfp"), Motion.from_arrays(time, path), top, effects, solver, output_step=2e-3)
+
+
+@pytest.mark.parametrize(("stiffness", "sway"), [(1e8, 0.02), (3e9, 0.004)])
+def test_a_rig_that_holds_its_height_has_one_force(stiffness, sway):
+    """The given stiffness contains the contacts of models with uplift."""
+    normal, force = differences(heaving(stiffness, sway))
+    assert normal < 2e-3 and force < 2e-3
+
+
+def test_contacts_softer_than_the_top_are_refused():
+    scene = heaving(1e9, 0.01, replace(PLANAR, uplift=True))
+    soft = scene.bearing.replace(seat_stiffness=4e9)
+    with pytest.raises(InputError) as error:
+        replace(scene, bearing=soft)
+    text = "bearing.surfaces[0].seat_stiffness = 4e+09: with it the contacts of all surfaces in series have 1e+09 N/m"
+    assert str(error.value).startswith(text) and "vertical_stiffness = 1e+09" in str(error.value)
+    with pytest.raises(InputError, match=r"bearing\.surfaces\[0\]\.seat_stiffness"):  # they may open on the way
+        replace(scene, bearing=soft, effects=Auto())
+    replace(scene, bearing=soft, effects=replace(scene.effects, uplift=False))
+    values = bodies_and_surfaces(soft, scene.effects)
+    model = build_model(soft.layout, scene.effects)
+    with pytest.raises(ValueError, match=r"surfaces: seat_stiffness: .*in series must be stiffer than the top"):
+        model.extension.Stack(soft.gravity, *values, top_values(scene.top))

@@ -64,6 +64,14 @@ int msfp_check_bearing(double gravity, const double *bodies, const double *surfa
                 && TOP(VERTICAL_STIFFNESS) && TOP(VERTICAL_DAMPING) && TOP(MASS) && TOP(INERTIA_TRANSVERSE)
                 && TOP(INERTIA_AXIAL),
             "top: give stiffnesses, dampings, mass and inertias of at least 0");
+#if MSFP_UPLIFT
+    double compliance = 0.0;
+    for (int j = 0; j < NB; ++j)
+        compliance += 1.0 / surfaces[(size_t)j * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_SEAT_STIFFNESS];
+    REQUIRE(compliance * fmax(top[MSFP_TOP_VALUE_STIFFNESS], top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS]) < 1.0,
+            "surfaces: seat_stiffness: the unilateral contacts of all surfaces in series must be stiffer than the top, "
+            "whose stiffness and vertical_stiffness contain them; give more [N/m]");
+#endif
     return MSFP_OK;
 }
 

@@ -8,6 +8,21 @@ enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOME
 
 static const int signs[NB] = MSFP_SIGNS;
 
+#if MSFP_UPLIFT
+/* Stiffness and damping of a spring of the top, less the compliance of the unilateral contacts, which the given stiffness
+ * contains. The damper loses as much in slow motion as the given one. Returns the share of the spring in the
+ * compliance. */
+static double less_contacts(const msfp_parameters *p, double *stiffness, double *damping)
+{
+    double share = 1.0;
+    for (int j = 0; j < NB; ++j)
+        share -= *stiffness / p->surface[j][MSFP_SURFACE_PARAMETERS_KS];
+    *stiffness /= share;
+    *damping /= share * share;
+    return share;
+}
+#endif
+
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies, const double *surfaces,
                          const double *top)
 {
@@ -75,6 +90,11 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
     t[MSFP_TOP_PARAMETERS_G] = gravity;
     t[MSFP_TOP_PARAMETERS_KV] = top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS];
     t[MSFP_TOP_PARAMETERS_CV] = top[MSFP_TOP_VALUE_VERTICAL_DAMPING];
+    p->settlement_ratio = 1.0;
+#if MSFP_UPLIFT
+    less_contacts(p, &t[MSFP_TOP_PARAMETERS_K], &t[MSFP_TOP_PARAMETERS_C]);
+    p->settlement_ratio = 1.0 / less_contacts(p, &t[MSFP_TOP_PARAMETERS_KV], &t[MSFP_TOP_PARAMETERS_CV]);
+#endif
     t[MSFP_TOP_PARAMETERS_MZ] = msfp_top_is_sprung(p) ? 0.0 : t[MSFP_TOP_PARAMETERS_M];
     const double anchor[3] = { top[MSFP_TOP_VALUE_ANCHOR_X], top[MSFP_TOP_VALUE_ANCHOR_Y], 0.0 };
     msfp_top_parameters_x0_put(t, anchor);

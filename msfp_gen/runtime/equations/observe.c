@@ -315,7 +315,7 @@ void msfp_record(const msfp_parameters *p, const msfp_point *at, const msfp_work
     msfp_force_F_get(w->force[NB], row->top_force);
     msfp_moment_M_get(w->moment[NB], row->top_moment);
     msfp_settlement(p, w, settlement);
-    row->top_settlement = settlement[0];
+    row->top_settlement = p->settlement_ratio * settlement[0];
     row->kinetic = mechanical->kinetic;
     row->potential = mechanical->potential;
     row->restraint = restraint_energy(p, at, w);

@@ -133,7 +133,6 @@ def test_arrays_hold_every_number_base_first():
         "yield_displacement": [1e-4, 1e-4],
         "rim_stiffness": [1e7, 1e7],
         "rim_damping": [5.0, 5.0],
-        "seat_stiffness": [5e9, 5e9],
         "seat_damping": [10.0, 10.0],
         "contact_damping": [1e-4, 1e-4],
         "height": [0.01, 0.04, 0.02],
