@@ -289,9 +289,14 @@ class Motion(Trajectory):
 
     @classmethod
     def from_csv(cls, path: str | PathLike[str], *, name: str = "") -> Motion:
-        """Motion from a CSV table of displacements, velocities or accelerations: see `records.read_table`."""
+        """Motion from a CSV table of displacements, velocities or accelerations: see `records.read_table`.
+
+        Metadata `notes` are those of the table.
+        """
         from msfp_gen.motions.records import read_table
 
         table = read_table(path)
         build: Callable[..., Motion] = getattr(cls, _BUILDERS[table.quantity])
-        return build(table.time, table.values, name=name or table.name)
+        motion = build(table.time, table.values, name=name or table.name)
+        notes = {"notes": "; ".join(table.notes)} if table.notes else {}
+        return replace(motion, metadata={**motion.metadata, **notes})

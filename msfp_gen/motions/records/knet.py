@@ -87,6 +87,7 @@ def _counts(lines: Lines, rate: float) -> np.ndarray:
         values += lines.numbers(index, lines[index].split())
     if len(values) != points:
         lines.fail(where, f"duration and sampling rate promise {points} values, the file holds {len(values)}")
+    lines.check_columns(_HEADER)
     return column(values)
 
 

@@ -78,11 +78,16 @@ def read(lines: Lines) -> list[Channel]:
     unit = (found[2] or found[3]).strip()
     factor = si_factor(lines, where, unit, quantity)
     points, step = int(counts[1]), lines.positive(head, "DT", counts[2])
+    words: list[str] = []
     values: list[float] = []
     for index in range(head + 1, len(lines)):
-        values += lines.numbers(index, _MISSING_BLANK.sub(" ", lines[index]).split())
+        row = _MISSING_BLANK.sub(" ", lines[index]).split()
+        words += row
+        values += lines.numbers(index, row)
     if len(values) != points:
         lines.fail(head, f"NPTS promises {points} values, the file holds {len(values)}; fetch it again")
+    lines.check_columns(head + 1)
+    lines.check_end(len(lines) - 1, words)
     title = lines[where - 1].strip() if where else ""
     direction, station = _direction(title, stem(lines.path))
     si, label = column(values) * factor, title or lines.path.name

@@ -30,7 +30,7 @@ class Table:
         time: ndarray, shape (k,), [s].
         values: ndarray, shape (k, 3), [m/s^2], [m/s] or [m].
         units: units in the header.
-        notes: notes on missing components, whose values are zero.
+        notes: on missing components, whose values are zero, and on a last number that may be cut.
     """
 
     name: str
@@ -103,19 +103,22 @@ def _first(lines: Lines) -> tuple[int, str]:
 def _table(lines: Lines) -> Table:
     head, header = _first(lines)
     names, units, factors = _columns(lines, head, header)
-    rows = []
+    rows, last, end = [], [], head
     for index in range(head + 1, len(lines)):
         if lines[index].strip() and not lines[index].lstrip().startswith("#"):
             fields = lines[index].split(",")
             if len(fields) != len(names):
                 lines.fail(index, f"{len(fields)} columns, the header names {len(names)}")
             rows.append(lines.numbers(index, fields))
+            last.append(fields[-1])
+            end = index
     if not rows:
         lines.fail(head, "no rows of numbers after the header")
+    notes = lines.check_end(end, last)
     data = {name: column([row[i] for row in rows]) * factors[i] for i, name in enumerate(names)}
     letter = next(n[0] for n in names if n != "time")
-    values, notes = common_window([data.get(f"{letter}{i}") for i in (1, 2, 3)])
-    return Table(stem(lines.path), _QUANTITIES[letter][0], data["time"], values, ", ".join(units), notes)
+    values, missing = common_window([data.get(f"{letter}{i}") for i in (1, 2, 3)])
+    return Table(stem(lines.path), _QUANTITIES[letter][0], data["time"], values, ", ".join(units), missing + notes)
 
 
 def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str], list[float]]:

@@ -13,7 +13,11 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 
+_WORD = re.compile(r"\S+")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_DECIMALS = re.compile(r"[^.]*(?:\.(\d*))?(?:[eE][+-]?(\d+))?")
+_FIXED = 10  # numbers of one form, one of them with a zero at its end, show that all are written with fixed decimals
+_MOST = 0.95  # share of numbers with more digits than the last one, above which it may be cut
 _MAX_VALUE = 1e100  # larger numbers are rejected, so that conversions of units cannot overflow
 _MAX_BYTES = 256 << 20  # of text, after decompression
 _GZIP = b"\x1f\x8b"
@@ -26,6 +30,7 @@ class Lines:
     def __init__(self, path: Path, text: str) -> None:
         self.path = path
         self.lines = text.splitlines()
+        self.ended = text.endswith(("\n", "\r"))  # the last line is whole
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -59,6 +64,43 @@ class Lines:
             self.fail(index, f"{name} is {field.strip()}; it must be positive")
         return value
 
+    def check_end(self, index: int, numbers: list[str]) -> tuple[str, ...]:
+        """Notes where the file may end inside its last number, which is the last of `numbers`, on the line at `index`.
+
+        numbers: of one column, or all of the file, as they are written. A line break ends a number. Raises InputError
+        where the last number lacks decimals or digits of the exponent that all others have.
+        """
+        if self.ended or index < len(self.lines) - 1:
+            return ()
+        *others, last = (text.strip() for text in numbers)
+        forms, (decimals, exponent) = {_form(text) for text in others}, _form(last)
+        if len(others) >= _FIXED and len(forms) == 1 and any(_has_final_zero(text) for text in others):
+            every = forms.pop()
+            if decimals < every[0] or exponent < every[1]:
+                self.fail(
+                    index,
+                    f"the file ends inside the number {last[:24]!r}, all others have {every[0]} decimals; "
+                    "fetch it again",
+                )
+        digits = sum(map(str.isdigit, last))
+        longer = sum(sum(map(str.isdigit, text)) > digits for text in others)
+        if longer <= _MOST * len(others):
+            return ()
+        return (f"the file ends without a line break after {last[:24]!r}, which is shorter than most: it may be cut",)
+
+    def check_columns(self, top: int) -> None:
+        """Raise InputError where the file ends inside a number: all lines from `top` on have columns of fixed width.
+
+        Where they have not, nothing is checked.
+        """
+        ends = [[word.end() for word in _WORD.finditer(line)] for line in self.lines[top:] if line.strip()]
+        if self.ended or len(ends) < 3 or any(each != ends[0] for each in ends[:-1]):
+            return
+        if ends[-1] != ends[0][: len(ends[-1])]:
+            self.fail(
+                len(self.lines) - 1, "the file ends inside a number, before the end of its column; fetch it again"
+            )
+
     def block(self, top: int, points: int, layout: tuple[int, int]) -> tuple[Array, int]:
         """Numbers in columns of fixed width.
 
@@ -85,6 +127,19 @@ class Lines:
             values += self.numbers(index, [row[i : i + width] for i in range(0, len(row), width)])
             index += 1
         return column(values), index
+
+
+def _form(text: str) -> tuple[int, int]:
+    """Number of decimals, and of digits of the exponent, of a written number."""
+    found = _DECIMALS.match(text)
+    decimals, exponent = found.groups() if found else ("", "")
+    return len(decimals or ""), len(exponent or "")
+
+
+def _has_final_zero(text: str) -> bool:
+    """Whether the decimals of a written number end with a zero, as those of a fixed count do."""
+    found = _DECIMALS.match(text)
+    return bool(found and (found[1] or "").endswith("0"))
 
 
 def read_lines(path: Path) -> Lines:

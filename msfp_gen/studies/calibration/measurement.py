@@ -128,17 +128,20 @@ def _rows(
     lines: Lines, head: int, mark: str, header: list[str], places: Mapping[str, tuple[int, float]]
 ) -> list[list[float]]:
     """The numbers of time, displacement and force of every row."""
-    rows = []
+    rows, last, end = [], [], head
     for index in range(head + 1, len(lines)):
         if not lines[index].strip() or lines[index].lstrip().startswith("#"):
             continue
         cells = lines[index].split(mark)
         if len(cells) != len(header):
             lines.fail(index, f"{len(cells)} columns, the header names {len(header)}")
+        last.append(cells[-1])
+        end = index
         rows.append([_number(lines, index, header[at], cells[at]) for at, _ in places.values()])
         if len(rows) > 1 and rows[-1][0] <= rows[-2][0]:
             at = places["time"][0]
             lines.fail(index, f"column {header[at]!r}: {cells[at].strip()} does not increase; sort or cut the data")
+    lines.check_end(end, last)
     return rows
 
 

@@ -184,6 +184,17 @@ def test_bad_rows_are_named(tmp_path: Path, row: int, text: str, message: str) -
     assert str(caught.value).startswith(f"test.csv, {message}")
 
 
+def test_a_file_that_ends_inside_its_last_number_is_refused(tmp_path: Path) -> None:
+    """Decimals of fixed count: the last number has fewer."""
+    path = tmp_path / "test.csv"
+    rows = [",".join((f"{t:.3f}", f"{1e3 * u:.3f}", f"{1e-3 * f:.4f}")) for t, u, f in zip(*loop(0.05), strict=True)]
+    path.write_text("\n".join([HEADER, *rows]), encoding="utf-8")
+    assert len(read_measurement(path).time) == ROWS
+    path.write_text("\n".join([HEADER, *rows])[:-2], encoding="utf-8")
+    with pytest.raises(InputError, match=rf"test\.csv, line {ROWS + 1}: the file ends inside the number .*4 decimals"):
+        read_measurement(path)
+
+
 def test_tests_that_cannot_be_fitted_are_refused() -> None:
     test = measured(0.05)
     for changes, message in (

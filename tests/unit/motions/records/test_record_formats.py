@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support import record_writers as w
 
+from msfp_gen import Motion
 from msfp_gen.errors import InputError
 from msfp_gen.motions.records import baseline_corrected, bundled, read_peer, read_record, uncorrected, write_csv
 
@@ -284,3 +285,37 @@ def test_files_that_do_not_belong_together_are_refused(put):
 def test_uncorrected_refuses_a_record_that_drifts(put):
     with pytest.raises(InputError, match=r"correct: without it the record ends at .* it drifts"):
         uncorrected(bundled("ridgecrest-2019-ci-clc"), duration=60.0)
+
+
+# --- files that end inside their last number
+
+PLAIN = "time [s], a1 [m/s^2]\n" + "".join(
+    f"{0.01 * i:.2f}, {x:.6f}\n" for i, x in enumerate(series("acceleration")[0])
+)
+WHOLE = {**KINDS, "CSV, fixed decimals": PLAIN, "CSV, exponents": PLAIN.split("\n")[0] + "\n"}
+WHOLE["CSV, exponents"] += "".join(f"{0.01 * i:.2f}, {x:.5e}\n" for i, x in enumerate(series("acceleration")[0]))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in WHOLE if kind != "CSV"])
+def test_a_file_that_ends_inside_its_last_number_is_refused(kind, put):
+    marks = [WHOLE[kind].rfind(mark) for mark in ("/&", "End-of-data")]
+    whole = WHOLE[kind][: max(marks)].rstrip()  # of a file without such a mark all but the last line break
+    if max(marks) < 0:
+        read_record(put(whole, "record.txt"))  # is sound
+    size = len(whole) - max(whole.rfind(mark) for mark in (" ", ",", "\n")) - 1
+    for missing in range(1, size):
+        with pytest.raises(InputError, match=r"record\.txt, line \d+: "):
+            read_record(put(whole[:-missing], "record.txt"))
+
+
+def test_a_last_number_that_may_be_cut_is_noted(put):
+    """Numbers of any length: a whole file without a line break at its end, a cut one, a few rows written by hand."""
+    rows = [f"{0.01 * i!r}, {x!r}" for i, x in enumerate(series("acceleration")[0][:900].tolist())]
+    whole = "\n".join(["time [s], a1 [m/s^2]", *rows])
+    assert not any("cut" in note for note in read_record(put(whole, "record.csv")).notes)
+    note = next(note for note in read_record(put(whole[:-8], "record.csv")).notes if "cut" in note)
+    assert note.startswith("the file ends without a line break after ") and note.endswith("it may be cut")
+    assert note in str(Motion.from_csv(put(whole[:-8], "record.csv")).metadata["notes"])
+    assert not any("may be cut" in note for note in read_record(put(whole[:-8] + "\n", "record.csv")).notes)
+    by_hand = "time [s], u1 [mm]\n0.0, 0.00\n0.1, 0.25\n0.2, 0.50\n0.3, 0.25\n0.4, 0"
+    assert any("may be cut" in note for note in read_record(put(by_hand, "record.csv")).notes)
