@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ABI_VERSION = 2
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
     ("argument", "an argument is missing or out of range; `message` names it"),
-    ("snapshot", "these bytes are no snapshot of a run of this model and scene by this build"),
+    ("snapshot", "these bytes are no snapshot of this model with these inputs by this build"),
 )
 # A function declared in a header of the runtime: the line begins with its type.
 _PROTOTYPE = re.compile(r"^(?!static\b|typedef\b)[A-Za-z_][\w \t*]*?\b(msfp_\w+)\(", re.MULTILINE)
