@@ -13,6 +13,7 @@ from msfp_gen.specification.hysteresis import is_plastic
 from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
+from .checks import checks_context
 from .derive import Equations
 from .gradients import COLUMNS, contact_lists
 from .header import environment, word_enums
@@ -24,7 +25,15 @@ from .program import Block, Use
 
 # Each is made from the template of its name.
 GRADIENT_FILES = ("msfp_gradient_kernels.h",)  # of models with gradients
-FILES = ("msfp.h", "msfp_symbols.h", "msfp_model.h", "msfp_kernels.h", "msfp_fields.h", "msfp_module.pyx")
+FILES = (
+    "msfp.h",
+    "msfp_symbols.h",
+    "msfp_model.h",
+    "msfp_kernels.h",
+    "msfp_fields.h",
+    "msfp_checks.h",
+    "msfp_module.pyx",
+)
 
 
 @dataclass(frozen=True)
@@ -260,6 +269,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
         **interface_context(spec, shape_of(spec)),
+        "checks": checks_context(spec),
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from msfp_gen.specification import contract, rows
 from msfp_gen.specification.friction_laws import NUMBERS
+from msfp_gen.specification.values import Value
 
 if TYPE_CHECKING:
     from importlib.abc import Traversable  # in Python 3.14 importlib.resources.abc alone
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 ABI_VERSION = 2
 CALL_ERRORS = (  # what calls return beside the statuses of a run: name, meaning and remedy
     ("argument", "an argument is missing or out of range; `message` names it"),
-    ("snapshot", "these bytes are no snapshot of a run of this model and scene by this build"),
+    ("snapshot", "these bytes are no snapshot of this model with these inputs by this build"),
 )
 # A function declared in a header of the runtime: the line begins with its type.
 _PROTOTYPE = re.compile(r"^(?!static\b|typedef\b)[A-Za-z_][\w \t*]*?\b(msfp_\w+)\(", re.MULTILINE)
@@ -42,11 +43,10 @@ def runtime_symbols() -> list[str]:
     return sorted({name for file in headers for name in _PROTOTYPE.findall(file.read_text(encoding="utf-8"))})
 
 
-def surface_values(spec: ModelSpec) -> list[contract.Value]:
+def surface_values(spec: ModelSpec) -> list[Value]:
     """The values of a surface in order, those of its friction law included."""
     known = {value.name: value for value in (*contract.SURFACE, *contract.SURFACE_UPLIFT)}
-    laws = {name: contract.Value(name, unit, meaning) for name, (unit, meaning) in NUMBERS.items()}
-    return [(known | laws)[name] for name in contract.surface_values(spec.effects)]
+    return [(known | NUMBERS)[name] for name in contract.surface_values(spec.effects)]
 
 
 def effects_text(spec: ModelSpec) -> str:

@@ -47,9 +47,10 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
     contact = with_fields(b.contact, [Field("mu", "-", "friction coefficient by its law")], before="N")
     slopes = [Field(f"law_{f.name}", "-", f"d mu/d{f.name} at constant N and slip") for f in b.friction.fields]
     contact = with_fields(contact, slopes)
+    numbers = [Field(value.name, value.unit, value.meaning) for value in map(NUMBERS.__getitem__, law.columns)]
     b = replace(
         b,
-        surface_parameters=with_fields(b.surface_parameters, [Field(name, *NUMBERS[name]) for name in law.columns]),
+        surface_parameters=with_fields(b.surface_parameters, numbers),
         coefficient=with_fields(
             Block("coefficient", (), {}), COEFFICIENT_FIELDS if law.depends_on_temperature else COEFFICIENT_FIELDS[:1]
         ),

@@ -7,11 +7,12 @@ reader of scene files builds its schema from the same annotations.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import fields as dataclass_fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from numbers import Integral, Real
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -29,6 +30,7 @@ class Quantity:
         unit: SI unit; "" for a plain number.
         above: exclusive lower bound [unit]; None: unbounded.
         least: inclusive lower bound [unit]; None: unbounded.
+        below: exclusive upper bound [unit]; None: `LARGEST`.
         shape: () for one number, (3,) for three numbers, (None, 3) for any number of triples.
         whole: only integers are accepted.
         pair: a single number is accepted for two equal ones.
@@ -38,6 +40,7 @@ class Quantity:
     unit: str
     above: float | None = None
     least: float | None = None
+    below: float | None = None
     shape: tuple[int | None, ...] = ()
     whole: bool = False
     pair: bool = False
@@ -56,7 +59,7 @@ class Quantity:
         if not shape:
             return self._number(value, text)
         if not _is_sequence(value) or (shape[0] is not None and len(value) != shape[0]):  # type: ignore[arg-type]
-            raise ValueError(self._remedy())
+            raise ValueError(self.remedy)
         return tuple(self._parse(item, shape[1:], text) for item in value)  # type: ignore[attr-defined]
 
     def _number(self, value: object, text: bool) -> float | int:
@@ -64,24 +67,45 @@ class Quantity:
             value = to_si(value, self.unit)
         kind = Integral if self.whole else Real
         if isinstance(value, bool) or not isinstance(value, kind):
-            raise ValueError(self._remedy())
+            raise ValueError(self.remedy)
         number = int(value) if self.whole else _float(value)  # type: ignore[call-overload]
-        too_low = (self.above is not None and number <= self.above) or (self.least is not None and number < self.least)
-        if too_low or not math.isfinite(_float(number)):
-            raise ValueError(self._remedy())
-        if abs(number) > LARGEST and not self.computed:
-            raise ValueError(f"{self._remedy()} and of at most {LARGEST:g}")
-        if self.above == 0 and number < 1 / LARGEST:
-            raise ValueError(f"{self._remedy()} and of at least {1 / LARGEST:g}")
-        return number
+        low, high = self.limits
+        if low <= number <= high:
+            return number
+        beyond = math.isfinite(_float(number)) and (number > high or number < low == -LARGEST or 0 < number < low)
+        raise ValueError(self.remedy_with_limits if beyond else self.remedy)
 
-    def _remedy(self) -> str:
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """The least and the largest permitted number [unit]; what is emitted to C as well."""
+        largest = sys.float_info.max if self.computed else LARGEST
+        low = -largest if self.least is None else self.least
+        if self.above is not None:
+            low = math.nextafter(self.above, math.inf) if self.above else 1 / LARGEST
+        return low, largest if self.below is None else math.nextafter(self.below, -math.inf)
+
+    @property
+    def remedy(self) -> str:
+        """What to give, such as `give a finite number above 0 [m]`."""
         counts = ["any number of" if count is None else str(count) for count in self.shape]
         noun = "whole number" if self.whole else "finite number"
         head = f"give {' lists of '.join(counts)} {noun}s" if counts else f"give a {noun}"
-        bounds = {"above": self.above, "not below": self.least}
-        limit = "".join(f" {word} {bound:g}" for word, bound in bounds.items() if bound is not None)
+        bounds = {"above": self.above, "not below": self.least, "below": self.below}
+        limit = " and".join(f" {word} {bound:g}" for word, bound in bounds.items() if bound is not None)
         return head + limit + (f" [{self.unit}]" if self.unit else "")
+
+    @property
+    def remedy_with_limits(self) -> str:
+        """The same with the largest number, and the least positive one."""
+        if LARGEST not in self.limits:
+            return self.remedy
+        least = f"{1 / LARGEST:g} to " if self.above == 0 else "at most "
+        return f"{self.remedy}, {least}{LARGEST:g}"
+
+
+def paired(rule: Quantity) -> Quantity:
+    """The rule of two numbers of one kind, for which a single one is accepted."""
+    return replace(rule, shape=(2,), pair=True)
 
 
 @dataclass(frozen=True, eq=False)

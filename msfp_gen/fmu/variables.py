@@ -11,6 +11,7 @@ from msfp_gen.model.marshalling import bodies_and_surfaces, top_values
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.specification import contract
+from msfp_gen.specification.values import Value
 
 AXES = ("E1", "E2", "E3")
 # Orders of an input: suffixes of names for translations and for rotations, of units, and words.
@@ -159,9 +160,7 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
         yield Variable(f"solver.{name}", Block.PARAMETERS, unit, meaning, value, place=f"SOLVER_{name.upper()}")
 
 
-def _values(
-    prefix: str, values: Sequence[contract.Value], numbers: Sequence[float], place: str, of: str
-) -> Iterator[Variable]:
+def _values(prefix: str, values: Sequence[Value], numbers: Sequence[float], place: str, of: str) -> Iterator[Variable]:
     for i, (value, number) in enumerate(zip(values, numbers, strict=True)):
         meaning = f"{value.meaning}, {of}" if of else value.meaning
         at = place if i == 0 else ""

@@ -28,7 +28,13 @@ from msfp_gen.version import __version__
 MANIFEST_NAME = "manifest.json"
 PACKAGE = Path(__file__).parents[1]
 # (folder, pattern) of all sources that determine the content of a compiled model.
-SOURCES = (("specification", "*.py"), ("generator", "*.py"), ("templates", "*.jinja"), ("runtime", "*.[ch]"))
+SOURCES = (
+    ("common", "fields.py"),
+    ("specification", "*.py"),
+    ("generator", "*.py"),
+    ("templates", "*.jinja"),
+    ("runtime", "*.[ch]"),
+)
 TOOLS = ("sympy", "cython", "jinja2")
 
 

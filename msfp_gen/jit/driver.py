@@ -59,8 +59,9 @@ def headers() -> dict[str, str]:
     """The headers that a driver includes: file name -> text."""
     from msfp_gen.generator.header import public_header
 
-    math = resources.files("msfp_gen") / "runtime" / "msfp_math.h"
-    return {"msfp.h": public_header(), math.name: math.read_text(encoding="utf-8")}
+    runtime = resources.files("msfp_gen") / "runtime"
+    own = {name: (runtime / name).read_text(encoding="utf-8") for name in ("msfp_math.h", "msfp_hash.h")}
+    return {"msfp.h": public_header(), **own}
 
 
 def _build(entry: cache.Entry, files: dict[str, str], folder: Path) -> cache.Manifest:

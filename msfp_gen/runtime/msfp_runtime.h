@@ -7,6 +7,7 @@
 #ifndef MSFP_RUNTIME_H
 #define MSFP_RUNTIME_H
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -335,6 +336,7 @@ struct msfp_run {
     int jump_count;
     msfp_options options;
     msfp_point reached; /* where the evaluation that ended the last step was made, base and load included */
+    uint64_t identity;  /* of all that the run computes from; 0: of any scene */
     int stop, span;     /* indices into options.stops and options.span_ends: where a search by time begins */
     /* A snapshot holds what follows, down to `rows`: no pointers. What is above follows from the scene. */
     int next_jump;
@@ -405,8 +407,8 @@ int msfp_run_advance(msfp_run *run, long steps);
  * rows it holds, without events; negative: all rows and events. `snapshot` has the size that msfp_snapshot_size gives. */
 size_t msfp_snapshot_size(const msfp_run *run, long rows);
 void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot);
-/* Continue from a snapshot of a run of the same scene and build. Returns MSFP_OK, MSFP_E_MEMORY, or MSFP_E_FINITE for
- * bytes that no run of this model writes; `run` is then unchanged. */
+/* Continue from a snapshot of a run of the same identity and build. Returns MSFP_OK, MSFP_E_MEMORY, or MSFP_E_FINITE for
+ * other bytes; `run` is then unchanged. */
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
 /* Forget all rows but the last, which the caller has stored elsewhere. */
 void msfp_drop_rows(msfp_run *run);

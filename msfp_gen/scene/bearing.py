@@ -6,28 +6,29 @@ PEER 2017/07 follows in brackets.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
 from dataclasses import replace as dataclass_replace
 from importlib import import_module
-from math import asin, pi
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
+from msfp_gen.common.fields import check_fields, errors_at, paired, require_type
 from msfp_gen.errors import InputError
 from msfp_gen.scene.pivot_friction import friction_from_pivot
+from msfp_gen.specification import contract
+from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.specification.layout import Layout
+from msfp_gen.specification.values import Bound, rules
 
 if TYPE_CHECKING:
     from msfp_gen.scene.top import NodeTop
 
-_LENGTH = Quantity("m", above=0.0)
-_OFFSET = Quantity("m", least=0.0)
-_INERTIA = Quantity("kg m^2", above=0.0, shape=(2,), pair=True)
+_BODY = rules(contract.BODY)
+_SURFACE = rules((*contract.SURFACE, *contract.SURFACE_UPLIFT, *NUMBERS.values()))
 
 
 @dataclass(frozen=True)
@@ -44,29 +45,29 @@ class Surface:
     InputError.
     """
 
-    radius: Annotated[float, _LENGTH]
-    capacity: Annotated[float, _LENGTH]
-    friction: Annotated[float, Quantity("", least=0.0)]
-    yield_displacement: Annotated[float, _LENGTH]
-    rim_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
-    rim_damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
-    seat_stiffness: Annotated[float | None, Quantity("N/m", above=0.0)] = None
-    seat_damping: Annotated[float, Quantity("s/m", least=0.0)] = 10.0
-    contact_damping: Annotated[float, Quantity("s", least=0.0)] = 1e-4
-    friction_slow: Annotated[float | None, Quantity("", least=0.0)] = None
-    velocity_rate: Annotated[float | None, Quantity("s/m", least=0.0)] = None
-    velocity_drop: Annotated[float | None, Quantity("", least=0.0)] = None
-    reference_pressure: Annotated[float | None, Quantity("Pa", least=0.0)] = None
-    pressure_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
-    temperature_ratio: Annotated[float | None, Quantity("", above=0.0)] = None
-    patch_radius: Annotated[float | None, _LENGTH] = None
-    conductivity: Annotated[float | None, Quantity("W/(m K)", above=0.0)] = None
-    diffusivity: Annotated[float | None, Quantity("m^2/s", above=0.0)] = None
-    start_temperature: Annotated[float | None, Quantity("degC")] = None
-    c1: Annotated[float | None, Quantity("")] = None
-    c2: Annotated[float | None, Quantity("")] = None
-    c3: Annotated[float | None, Quantity("")] = None
-    c4: Annotated[float | None, Quantity("")] = None
+    radius: Annotated[float, _SURFACE["radius"]]
+    capacity: Annotated[float, _SURFACE["capacity"]]
+    friction: Annotated[float, _SURFACE["friction"]]
+    yield_displacement: Annotated[float, _SURFACE["yield_displacement"]]
+    rim_stiffness: Annotated[float, _SURFACE["rim_stiffness"]] = 0.0
+    rim_damping: Annotated[float, _SURFACE["rim_damping"]] = 0.0
+    seat_stiffness: Annotated[float | None, _SURFACE["seat_stiffness"]] = None
+    seat_damping: Annotated[float, _SURFACE["seat_damping"]] = 10.0
+    contact_damping: Annotated[float, _SURFACE["contact_damping"]] = 1e-4
+    friction_slow: Annotated[float | None, _SURFACE["friction_slow"]] = None
+    velocity_rate: Annotated[float | None, _SURFACE["velocity_rate"]] = None
+    velocity_drop: Annotated[float | None, _SURFACE["velocity_drop"]] = None
+    reference_pressure: Annotated[float | None, _SURFACE["reference_pressure"]] = None
+    pressure_ratio: Annotated[float | None, _SURFACE["pressure_ratio"]] = None
+    temperature_ratio: Annotated[float | None, _SURFACE["temperature_ratio"]] = None
+    patch_radius: Annotated[float | None, _SURFACE["patch_radius"]] = None
+    conductivity: Annotated[float | None, _SURFACE["conductivity"]] = None
+    diffusivity: Annotated[float | None, _SURFACE["diffusivity"]] = None
+    start_temperature: Annotated[float | None, _SURFACE["start_temperature"]] = None
+    c1: Annotated[float | None, _SURFACE["c1"]] = None
+    c2: Annotated[float | None, _SURFACE["c2"]] = None
+    c3: Annotated[float | None, _SURFACE["c3"]] = None
+    c4: Annotated[float | None, _SURFACE["c4"]] = None
 
     def __post_init__(self) -> None:
         check_fields(self, "surface")
@@ -83,27 +84,19 @@ class Body:
     Raises InputError.
     """
 
-    height: Annotated[float, _LENGTH]
-    centroid: Annotated[float, _OFFSET]
-    mass: Annotated[float, Quantity("kg", above=0.0)]
-    inertia: Annotated[tuple[float, float] | float, _INERTIA]
-    rim_radius: Annotated[float, _OFFSET] = 0.0
-    rim_offset: Annotated[float, _OFFSET] = 0.0
+    height: Annotated[float, _BODY["height"]]
+    centroid: Annotated[float, _BODY["centroid"]]
+    mass: Annotated[float, _BODY["mass"]]
+    inertia: Annotated[tuple[float, float] | float, paired(_BODY["inertia_transverse"])]
+    rim_radius: Annotated[float, _BODY["rim_radius"]] = 0.0
+    rim_offset: Annotated[float, _BODY["rim_offset"]] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self, "body")
-        if self.centroid > self.height:
-            raise InputError(f"body.centroid = {self.centroid}: give at most the height of the body, {self.height} [m]")
-        if self.rim_offset > self.height:
-            raise InputError(
-                f"body.rim_offset = {self.rim_offset}: give at most the height of the body, {self.height} [m]"
-            )
         transverse, axial = self.moments
-        if axial > 2 * transverse:
-            raise InputError(
-                f"body.inertia = {self.inertia}: the axial moment of a rigid body is at most twice its transverse one; "
-                "give (transverse, axial) [kg m^2]"
-            )
+        values = {**vars(self), "inertia_transverse": transverse, "inertia_axial": axial}
+        shown = {name: f"body.{name} = {value}" for name, value in values.items()}
+        _check_bounds(contract.BODY_BOUNDS, values, shown | {"inertia_axial": f"body.inertia = {self.inertia}"})
 
     @property
     def moments(self) -> tuple[float, float]:
@@ -113,6 +106,7 @@ class Body:
 
 
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
+<<<<<<< HEAD
 _SURFACE_ARRAYS = (
     "radius",
     "capacity",
@@ -123,6 +117,9 @@ _SURFACE_ARRAYS = (
     "seat_damping",
     "contact_damping",
 )
+=======
+_SURFACE_ARRAYS = contract.names((*contract.SURFACE, *contract.SURFACE_UPLIFT))
+>>>>>>> cchecks
 
 
 @dataclass(frozen=True)
@@ -135,23 +132,22 @@ class Bearing:
     """
 
     layout: Layout
-    base_height: Annotated[float, _LENGTH]
+    base_height: Annotated[float, _BODY["height"]]
     surfaces: Sequence[Surface]
     bodies: Sequence[Body]
-    gravity: Annotated[float, Quantity("m/s^2", least=0.0)] = 9.8
-    base_rim_radius: Annotated[float, _OFFSET] = 0.0
-    base_rim_offset: Annotated[float, _OFFSET] = 0.0
-    base_centroid: Annotated[float | None, _OFFSET] = None
+    gravity: Annotated[float, contract.GRAVITY.rule] = 9.8
+    base_rim_radius: Annotated[float, _BODY["rim_radius"]] = 0.0
+    base_rim_offset: Annotated[float, _BODY["rim_offset"]] = 0.0
+    base_centroid: Annotated[float | None, _BODY["centroid"]] = None
 
     def __post_init__(self) -> None:
         require_type(self.layout, Layout, "bearing.layout")
         check_fields(self, "bearing")
         for name, kind in _LISTS.items():
             self._check_list(name, kind)
-        for name in ("base_centroid", "base_rim_offset"):
-            value = getattr(self, name)
-            if value is not None and value > self.base_height:
-                raise InputError(f"bearing.{name} = {value}: give at most base_height = {self.base_height} [m]")
+        base = dict(zip(_BODY, self._base, strict=True))
+        shown = {name: f"bearing.base_{name} = {value}" for name, value in base.items()}
+        _check_bounds(contract.BODY_BOUNDS, base, shown)
         for index in range(self.layout.surfaces):
             self._check_geometry(index)
 
@@ -191,24 +187,19 @@ class Bearing:
         return self.bodies[body - 1].rim_radius if body else self.base_rim_radius
 
     def _check_geometry(self, index: int) -> None:
-        surface, rim, body = self.surfaces[index], self.slider_rim_radius(index), self.slider(index)
-        radius, path = surface.radius, f"bearing.surfaces[{index}]"
-        if surface.capacity >= pi / 2 * radius:
-            raise InputError(
-                f"{path}.capacity = {surface.capacity} (surface {index + 1}): a sphere of radius {radius} m allows "
-                f"less than a quarter turn; give less than {pi / 2 * radius:.6g} [m]"
-            )
-        if rim >= radius:
-            field = f"bearing.bodies[{body - 1}].rim_radius" if body else "bearing.base_rim_radius"
-            raise InputError(
-                f"{field} = {rim} (body {body + 1}): give less than the radius of the surface it slides in, "
-                f"{path}.radius = {radius} [m]"
-            )
-        if asin(rim / radius) + surface.capacity / radius >= pi / 2:
-            raise InputError(
-                f"{path}.capacity = {surface.capacity} (surface {index + 1}): the rim of body {body + 1}, of radius "
-                f"{rim} m, would leave the hemisphere; give less than {radius * (pi / 2 - asin(rim / radius)):.6g} [m]"
-            )
+        body, rim = self.slider(index), self.slider_rim_radius(index)
+        surface, field = self.surfaces[index], f"bodies[{body - 1}].rim_radius" if body else "base_rim_radius"
+        shown = {
+            "rim_radius": f"bearing.{field} = {rim} (body {body + 1})",
+            "capacity": f"bearing.surfaces[{index}].capacity = {surface.capacity} (surface {index + 1})",
+        }
+        _check_bounds(contract.SURFACE_BOUNDS, {**vars(surface), "rim_radius": rim}, shown)
+
+    @property
+    def _base(self) -> tuple[float, ...]:
+        """The values of the base, as those of a body in `contract.BODY`; mass and moments of inertia 0."""
+        centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
+        return (self.base_height, centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
 
     def replace(self, **changes: Any) -> Bearing:
         """A copy with some values changed: fields of the bearing, or one field of all its surfaces or bodies.
@@ -248,18 +239,27 @@ class Bearing:
         """All values as float64 arrays.
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
+<<<<<<< HEAD
         seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height,
+=======
+        contact_damping, seat_stiffness, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height,
+>>>>>>> cchecks
         centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in
         the fields.
         """
-        base_centroid = self.base_height / 2 if self.base_centroid is None else self.base_centroid
-        base = (self.base_height, base_centroid, 0.0, 0.0, 0.0, self.base_rim_radius, self.base_rim_offset)
         rows = [(b.height, b.centroid, b.mass, *b.moments, b.rim_radius, b.rim_offset) for b in self.bodies]
-        names = ("height", "centroid", "mass", "inertia_transverse", "inertia_axial", "rim_radius", "rim_offset")
-        arrays = dict(zip(names, np.array([base, *rows]).T.copy(), strict=True))
+        arrays = dict(zip(_BODY, np.array([self._base, *rows]).T.copy(), strict=True))
         for name in _SURFACE_ARRAYS:
             arrays[name] = np.array([getattr(surface, name) for surface in self.surfaces])
         return {**arrays, "gravity": np.array(self.gravity)}
+
+
+def _check_bounds(bounds: Iterable[Bound], values: Mapping[str, float], shown: Mapping[str, str]) -> None:
+    """Raise InputError where a value is beyond what others permit. shown: path and value of each, for the message."""
+    for bound in bounds:
+        if (limit := bound.excess(values)) is not None:
+            unit = (_BODY | _SURFACE)[bound.name].unit
+            raise InputError(f"{shown[bound.name]}: {bound.remedy}, {limit:.6g} [{unit}]")
 
 
 def _names(kind: type) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -15,10 +15,12 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_selection import select_friction
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import Top
+from msfp_gen.specification import contract
 from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto, Effects
+from msfp_gen.specification.values import rules
 
-_TIME = Quantity("s", above=0.0)
+_RUN = rules((*contract.RUN, *contract.ARRAYS))
 Triples = tuple[tuple[float, float, float], ...]
 Pairs = tuple[tuple[float, float], ...]
 
@@ -31,14 +33,14 @@ class InitialState:
     h: friction state Y, Z of each surface, shape (n-1, 2) [-], within the unit disc (2.94). Raises InputError.
     """
 
-    q: Annotated[Triples, Quantity("rad", shape=(None, 3))]
-    v: Annotated[Triples, Quantity("rad/s", shape=(None, 3))]
-    h: Annotated[Pairs, Quantity("", shape=(None, 2))]
+    q: Annotated[Triples, replace(_RUN["q"], shape=(None, 3))]
+    v: Annotated[Triples, replace(_RUN["v"], shape=(None, 3))]
+    h: Annotated[Pairs, replace(_RUN["f"], shape=(None, 2))]
 
     def __post_init__(self) -> None:
         check_fields(self, "initial_state")
         for index, (first, second) in enumerate(self.h):
-            if first**2 + second**2 > 1 + 1e-9:
+            if first**2 + second**2 > contract.LARGEST_FRICTION_STATE:
                 raise InputError(
                     f"initial_state.h[{index}] = {(first, second)}: friction cannot exceed mu N; give Y^2 + Z^2 <= 1"
                 )
@@ -51,7 +53,7 @@ class Stop:
     displacement: horizontal displacement across the bearing [m]. all_rims: every rim is in contact. Raises InputError.
     """
 
-    displacement: Annotated[float | None, Quantity("m", above=0.0)] = None
+    displacement: Annotated[float | None, _RUN["stop_displacement"]] = None
     all_rims: bool = False
 
     def __post_init__(self) -> None:
@@ -69,9 +71,9 @@ class SceneParts:
     top: Top
     effects: Effects | Auto = field(default_factory=Auto)
     solver: Solver = field(default_factory=Solver)
-    duration: Annotated[float | None, _TIME] = None
+    duration: Annotated[float | None, Quantity("s", above=0.0)] = None
     initial_state: InitialState | None = None
-    output_step: Annotated[float | None, _TIME] = None
+    output_step: Annotated[float | None, _RUN["output_step"]] = None
     stop: Stop | None = None
     load: Load | None = None
     top_rotation: Rotation | None = None

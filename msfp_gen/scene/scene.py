@@ -18,10 +18,9 @@ from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, Top
+from msfp_gen.specification import contract
 from msfp_gen.specification.friction_laws import HEAT_TIMES
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
-
-MAX_ROWS = 1e8  # output rows of a run; about 100 GB
 
 
 @dataclass(frozen=True, init=False)
@@ -106,10 +105,10 @@ class Scene(SceneParts):
             )
         if self.output_step is not None and self.output_step > self.end:
             raise InputError(f"output_step = {self.output_step}: give at most the duration, {self.end:.12g} [s]")
-        if self.output_step is not None and self.end / self.output_step > MAX_ROWS:
+        if self.output_step is not None and self.end / self.output_step > contract.MAX_ROWS:
             raise InputError(
                 f"output_step = {self.output_step}: {self.end / self.output_step:.1e} rows exceed the limit of "
-                f"{MAX_ROWS:g}; give at least {self.end / MAX_ROWS:.2g} [s]"
+                f"{contract.MAX_ROWS:g}; give at least {self.end / contract.MAX_ROWS:.2g} [s]"
             )
 
     def _check_sizes(self) -> None:

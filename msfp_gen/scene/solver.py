@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.common.fields import check_fields
 from msfp_gen.errors import InputError
+from msfp_gen.specification import contract
+from msfp_gen.specification.values import rules
 
-_TIME = Quantity("s", above=0.0)
+_RUN = rules(contract.RUN)
 
 
 @dataclass(frozen=True)
@@ -23,16 +25,14 @@ class Solver:
     """
 
     method: Literal["implicit", "esdirk4", "dopri5"] = "implicit"
-    rtol: Annotated[float, Quantity("", above=0.0)] = 1e-4
-    atol_angle: Annotated[float | None, Quantity("rad", above=0.0)] = None
-    max_step: Annotated[float | None, _TIME] = None
-    first_step: Annotated[float | None, _TIME] = None
-    max_steps: Annotated[int, Quantity("", above=0, whole=True)] = 10_000_000
+    rtol: Annotated[float, _RUN["rtol"]] = 1e-4
+    atol_angle: Annotated[float | None, _RUN["atol_angle"]] = None
+    max_step: Annotated[float | None, _RUN["max_step"]] = None
+    first_step: Annotated[float | None, _RUN["first_step"]] = None
+    max_steps: Annotated[int, replace(_RUN["max_steps"], whole=True)] = 10_000_000
 
     def __post_init__(self) -> None:
         check_fields(self, "solver")
-        if self.rtol >= 1:
-            raise InputError(f"solver.rtol = {self.rtol}: give a number below 1, such as 1e-4")
         if self.max_step is not None and self.first_step is not None and self.first_step > self.max_step:
             raise InputError(f"solver.first_step = {self.first_step}: give at most max_step = {self.max_step} [s]")
 

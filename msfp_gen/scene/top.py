@@ -8,12 +8,14 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.common.fields import Quantity, check_fields, paired
 from msfp_gen.errors import InputError
+from msfp_gen.specification import contract
+from msfp_gen.specification.values import rules
 
-_ROTATIONAL_STIFFNESS = Quantity("N m/rad", least=0.0)
-_ROTATIONAL_DAMPING = Quantity("N m s/rad", least=0.0)
-_VERTICAL_DAMPING = Quantity("N s/m", least=0.0)
+_TOP = rules(contract.TOP)
+_MASS = _TOP | rules(contract.TOP_MASS)
+_INTERFACE = _TOP | rules(contract.INTERFACE)
 
 
 @dataclass(frozen=True)
@@ -90,13 +92,13 @@ class RigTop(Top):
     """
 
     kind: ClassVar[str] = "rig"
-    axial_load: Annotated[float, Quantity("N", least=0.0)]
-    stiffness: Annotated[float, Quantity("N/m", least=0.0)]
-    damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
-    rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
-    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
-    vertical_stiffness: Annotated[float, Quantity("N/m", least=0.0)] = 0.0
-    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
+    axial_load: Annotated[float, contract.AXIAL_LOAD.rule]
+    stiffness: Annotated[float, _TOP["stiffness"]]
+    damping: Annotated[float, _TOP["damping"]] = 0.0
+    rotational_stiffness: Annotated[float, _TOP["rotational_stiffness"]] = 0.0
+    rotational_damping: Annotated[float, _TOP["rotational_damping"]] = 0.0
+    vertical_stiffness: Annotated[float, _TOP["vertical_stiffness"]] = 0.0
+    vertical_damping: Annotated[float, _TOP["vertical_damping"]] = 0.0
 
 
 @dataclass(frozen=True)
@@ -122,13 +124,13 @@ class MassTop(Top):
 
     kind: ClassVar[str] = "mass"
     # Without field(), the inherited static method Top.mass would be taken as the default value.
-    mass: Annotated[float, Quantity("kg", above=0.0)] = field()  # type: ignore[assignment]
-    inertia: Annotated[tuple[float, float] | float, Quantity("kg m^2", above=0.0, shape=(2,), pair=True)]
-    height: Annotated[float, Quantity("m", least=0.0)]
-    rotational_stiffness: Annotated[float, _ROTATIONAL_STIFFNESS] = 0.0
-    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
-    vertical_stiffness: Annotated[float | None, Quantity("N/m", above=0.0)] = None
-    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
+    mass: Annotated[float, _MASS["mass"]] = field()  # type: ignore[assignment]
+    inertia: Annotated[tuple[float, float] | float, paired(_MASS["inertia_transverse"])]
+    height: Annotated[float, _MASS["height"]]
+    rotational_stiffness: Annotated[float, _MASS["rotational_stiffness"]] = 0.0
+    rotational_damping: Annotated[float, _MASS["rotational_damping"]] = 0.0
+    vertical_stiffness: Annotated[float | None, _MASS["vertical_stiffness"]] = None
+    vertical_damping: Annotated[float, _MASS["vertical_damping"]] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -149,12 +151,12 @@ class NodeTop(Top):
     """
 
     kind: ClassVar[str] = "node"
-    stiffness: Annotated[float, Quantity("N/m", above=0.0)]
-    vertical_stiffness: Annotated[float, Quantity("N/m", above=0.0)]
-    rotational_stiffness: Annotated[float, Quantity("N m/rad", above=0.0)]
-    damping: Annotated[float, Quantity("N s/m", least=0.0)] = 0.0
-    vertical_damping: Annotated[float, _VERTICAL_DAMPING] = 0.0
-    rotational_damping: Annotated[float, _ROTATIONAL_DAMPING] = 0.0
+    stiffness: Annotated[float, _INTERFACE["stiffness"]]
+    vertical_stiffness: Annotated[float, _INTERFACE["vertical_stiffness"]]
+    rotational_stiffness: Annotated[float, _INTERFACE["rotational_stiffness"]]
+    damping: Annotated[float, _INTERFACE["damping"]] = 0.0
+    vertical_damping: Annotated[float, _INTERFACE["vertical_damping"]] = 0.0
+    rotational_damping: Annotated[float, _INTERFACE["rotational_damping"]] = 0.0
 
 
 def is_sprung(top: Top) -> bool:

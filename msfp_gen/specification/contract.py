@@ -1,7 +1,8 @@
-"""The contract between Python and the compiled C: what crosses, in which order, in which unit, written once.
+"""The contract between Python and the compiled C: what crosses, in which order, unit and range, written once.
 
-The C header, the Cython wrapper, the unpacking of rows, the messages of failed runs and the table of statuses in
-docs/glossary.md are made from these tables, or a test holds them against them. SI units throughout.
+The C header and its checks, the rules of the fields of a bearing, a top and a solver, the Cython wrapper, the unpacking
+of rows, the messages of failed runs and the table of statuses in docs/glossary.md are made from these tables, or a test
+holds them against them. SI units throughout.
 """
 
 from __future__ import annotations
@@ -9,55 +10,127 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msfp_gen.common.fields import Quantity
+from msfp_gen.specification.values import Array, Bound, Value
+
 if TYPE_CHECKING:
     from msfp_gen.specification.layout import Effects
 
 
-@dataclass(frozen=True)
-class Value:
-    """One number that a run takes for a body, a surface or the top."""
+_LENGTH, _OFFSET = Quantity("m", above=0.0), Quantity("m", least=0.0)
+_INERTIA = Quantity("kg m^2", above=0.0)
+_TIME = Quantity("s", above=0.0)
+_STIFFNESS, _DAMPING = Quantity("N/m", least=0.0), Quantity("N s/m", least=0.0)
 
-    name: str
-    unit: str
-    meaning: str
-
-
+GRAVITY = Value("gravity", Quantity("m/s^2", least=0.0), "gravity")
 BODY = (  # of each body, the base first
-    Value("height", "m", "height l"),
-    Value("centroid", "m", "distance z of the centre of mass from the bottom; not used for the base"),
-    Value("mass", "kg", "mass m; not used for the base"),
-    Value("inertia_transverse", "kg m^2", "moments of inertia lambda_1 = lambda_2; not used for the base"),
-    Value("inertia_axial", "kg m^2", "moment of inertia lambda_3; not used for the base"),
-    Value("rim_radius", "m", "radius r of the edge that meets a rim"),
-    Value("rim_offset", "m", "height p of that edge above the face"),
+    Value("height", _LENGTH, "height l"),
+    Value("centroid", _OFFSET, "distance z of the centre of mass from the bottom; not used for the base"),
+    Value("mass", Quantity("kg", above=0.0), "mass m; not used for the base", base=False),
+    Value("inertia_transverse", _INERTIA, "moments of inertia lambda_1 = lambda_2; not used for the base", base=False),
+    Value("inertia_axial", _INERTIA, "moment of inertia lambda_3; not used for the base", base=False),
+    Value("rim_radius", _OFFSET, "radius r of the edge that meets a rim"),
+    Value("rim_offset", _OFFSET, "height p of that edge above the face"),
+)
+BODY_BOUNDS = (
+    Bound("centroid", "height", "the height of the body"),
+    Bound("rim_offset", "height", "the height of the body"),
+    Bound("inertia_axial", "2 * inertia_transverse", "twice its transverse moment for the axial one"),
 )
 SURFACE = (  # of each surface, the lowest first
-    Value("radius", "m", "radius R"),
-    Value("capacity", "m", "sliding capacity s_c"),
-    Value("friction", "-", "friction coefficient mu"),
-    Value("yield_displacement", "m", "yield displacement d_y"),
-    Value("rim_stiffness", "N/m", "stiffness k_c of the rim"),
-    Value("rim_damping", "N s/m", "damping c_c of the rim"),
-    Value("contact_damping", "s", "damping time T of the sheared contact"),
+    Value("radius", _LENGTH, "radius R"),
+    Value("capacity", _LENGTH, "sliding capacity s_c"),
+    Value("friction", Quantity("", least=0.0), "friction coefficient mu"),
+    Value("yield_displacement", _LENGTH, "yield displacement d_y"),
+    Value("rim_stiffness", _STIFFNESS, "stiffness k_c of the rim"),
+    Value("rim_damping", _DAMPING, "damping c_c of the rim"),
+    Value("contact_damping", Quantity("s", least=0.0), "damping time T of the sheared contact"),
 )
 SURFACE_UPLIFT = (  # after those, in models with uplift
-    Value("seat_stiffness", "N/m", "stiffness of the unilateral contact"),
-    Value("seat_damping", "s/m", "damping of the unilateral contact, over its stiffness and compression"),
+    Value("seat_stiffness", Quantity("N/m", above=0.0), "stiffness of the unilateral contact"),
+    Value(
+        "seat_damping",
+        Quantity("s/m", least=0.0),
+        "damping of the unilateral contact, over its stiffness and compression",
+    ),
+)
+SURFACE_BOUNDS = (  # of a surface and the rim_radius of its slider, the body that meets its rim
+    Bound("capacity", "pi / 2 * radius", "a quarter turn on its sphere", open=True),
+    Bound("rim_radius", "radius", "the radius of the surface it slides in", open=True),
+    Bound(
+        "capacity",
+        "radius * (pi / 2 - asin(rim_radius / radius))",
+        "that at which the rim of its slider leaves the hemisphere",
+        open=True,
+    ),
 )
 TOP = (
-    Value("stiffness", "N/m", "horizontal stiffness of the rig"),
-    Value("damping", "N s/m", "horizontal damping of the rig"),
-    Value("rotational_stiffness", "N m/rad", "rotational stiffness"),
-    Value("rotational_damping", "N m s/rad", "rotational damping"),
-    Value("vertical_stiffness", "N/m", "vertical stiffness of the rig or below the supported mass"),
-    Value("vertical_damping", "N s/m", "vertical damping beside it"),
-    Value("mass", "kg", "supported mass"),
-    Value("inertia_transverse", "kg m^2", "its moment of inertia about a horizontal axis"),
-    Value("inertia_axial", "kg m^2", "its moment of inertia about the vertical axis"),
-    Value("height", "m", "height of its centre above r_nn"),
-    Value("anchor_x", "m", "anchor of the horizontal springs, along E1"),
-    Value("anchor_y", "m", "anchor of the horizontal springs, along E2"),
+    Value("stiffness", _STIFFNESS, "horizontal stiffness of the rig"),
+    Value("damping", _DAMPING, "horizontal damping of the rig"),
+    Value("rotational_stiffness", Quantity("N m/rad", least=0.0), "rotational stiffness"),
+    Value("rotational_damping", Quantity("N m s/rad", least=0.0), "rotational damping"),
+    Value("vertical_stiffness", _STIFFNESS, "vertical stiffness of the rig or below the supported mass"),
+    Value("vertical_damping", _DAMPING, "vertical damping beside it"),
+    Value("mass", Quantity("kg", least=0.0), "supported mass"),
+    Value("inertia_transverse", Quantity("kg m^2", least=0.0), "its moment of inertia about a horizontal axis"),
+    Value("inertia_axial", Quantity("kg m^2", least=0.0), "its moment of inertia about the vertical axis"),
+    Value("height", _OFFSET, "height of its centre above r_nn"),
+    Value("anchor_x", Quantity("m"), "anchor of the horizontal springs, along E1"),
+    Value("anchor_y", Quantity("m"), "anchor of the horizontal springs, along E2"),
 )
+TOP_MASS = (  # of a top with a mass, in place of those of these names
+    Value("mass", Quantity("kg", above=0.0), "supported mass"),
+    Value("inertia_transverse", _INERTIA, "its moment of inertia about a horizontal axis"),
+    Value("inertia_axial", _INERTIA, "its moment of inertia about the vertical axis"),
+    Value("vertical_stiffness", Quantity("N/m", above=0.0), "vertical stiffness below it", zero="rigid"),
+)
+INTERFACE = (  # of the interface of a two-port likewise
+    Value("stiffness", Quantity("N/m", above=0.0), "horizontal stiffness"),
+    Value("vertical_stiffness", Quantity("N/m", above=0.0), "vertical stiffness"),
+    Value("rotational_stiffness", Quantity("N m/rad", above=0.0), "rotational stiffness"),
+)
+AXIAL_LOAD = Value("axial_load", Quantity("N", least=0.0), "compression of a bearing at rest")
+
+# The numbers of msfp_scene in C. Of the monitors some are without limit.
+RUN = (
+    Value("start_time", Quantity("s"), "time at which the run starts"),
+    Value("end_time", Quantity("s"), "time at which it ends"),
+    Value("rtol", Quantity("", above=0.0, below=1.0), "bound of the relative error of a step"),
+    Value("atol_angle", Quantity("rad", above=0.0), "bound of the absolute error of an angle"),
+    Value("max_step", _TIME, "longest step", zero="chosen"),
+    Value("first_step", _TIME, "first step", zero="chosen"),
+    Value("max_steps", Quantity("", above=0.0), "number of steps after which the run fails"),
+    Value("output_step", _TIME, "time between rows", zero="a row at every step"),
+    Value("stop_displacement", _LENGTH, "displacement across the bearing at which the run stops", zero="none"),
+    Value("monitor_normal", Quantity("N", computed=True), "least normal force"),
+    Value("monitor_peak", Quantity("N", least=0.0, computed=True), "largest normal force"),
+    Value("monitor_inertia", Quantity("", least=0.0, computed=True), "largest inertial force over normal force"),
+    Value("monitor_time", Quantity("s", least=0.0, computed=True), "time over which a change of velocity is averaged"),
+    Value("monitor_rise", Quantity("K", least=0.0, computed=True), "largest rise in temperature"),
+    Value("law_speed", Quantity("m/s", least=0.0, computed=True), "slip velocity up to which the law was checked"),
+    Value("law_temperature[0]", Quantity("degC", computed=True), "lowest temperature for which it was checked"),
+    Value("law_temperature[1]", Quantity("degC", computed=True), "highest temperature for which it was checked"),
+)
+
+
+ARRAYS = (
+    Array("q", Quantity("rad"), "coordinates", count="MSFP_NB * MSFP_NQ"),
+    Array("v", Quantity("rad/s"), "their rates", count="MSFP_NB * MSFP_NQ"),
+    Array("f", Quantity(""), "friction state Y, Z", count="MSFP_NB * 2"),
+    Array("foot", Quantity("m"), "height of the foot of the mass, and rate", count="2", default=False),
+    Array("heat", Quantity("K"), "parts of the temperature", count="MSFP_NB * MSFP_HEAT"),
+    Array("origin", Quantity("m"), "r_01 - r_nn without displacement", count="3", default=False),
+    Array("monitor_heat", Quantity("K s^1/2"), "state of the monitor of heat", count="2 * MSFP_NB"),
+    Array(
+        "monitor_heating",
+        Quantity("K s^1/2/J", least=0.0, computed=True),
+        "heating by unit heat flux",
+        count="MSFP_NB",
+    ),
+    Array("law_load", Quantity("N", computed=True), "normal forces for which the law was checked", count="2 * MSFP_NB"),
+)
+LARGEST_FRICTION_STATE = 1.0 + 1e-9  # Y^2 + Z^2: friction does not exceed mu N; the margin is for rounding
+MAX_ROWS = 1e8  # output rows of a run; about 100 GB
 
 
 def surface_values(effects: Effects) -> tuple[str, ...]:

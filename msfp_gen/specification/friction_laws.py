@@ -12,8 +12,10 @@ import ast
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
+from msfp_gen.common.fields import Quantity
 from msfp_gen.errors import InputError
 from msfp_gen.specification.formula import names_in, parse, units_of
+from msfp_gen.specification.values import Value
 
 COEFFICIENTS = ("c1", "c2", "c3", "c4")
 # Variables of a law and their units: sliding velocity, pressure, temperature, normal force.
@@ -24,20 +26,32 @@ PATCH: dict[str, float | None] = {"patch_radius": None}
 HEAT_TIMES = (1e-3, 1e3)  # range of times over which heat conduction is represented [s] (generator/heat.py)
 HEAT: dict[str, float | None] = {"conductivity": 18.0, "diffusivity": 4.44e-6, "start_temperature": 20.0}
 
-NUMBERS: dict[str, tuple[str, str]] = {
-    "friction_slow": ("-", "friction coefficient at rest"),
-    "velocity_rate": ("s/m", "rate a of the exponential increase of friction with the slip velocity"),
-    "velocity_drop": ("-", "relative reduction of friction at rest"),
-    "reference_pressure": ("Pa", "pressure at which mu is given"),
-    "pressure_ratio": ("-", "factor on friction for a pressure increase of 50 MPa"),
-    "temperature_ratio": ("-", "0.7 in Kumar et al. (2015); 1: no influence of temperature"),
-    "area": ("m^2", "area of the contact patch"),
-    "reach": ("m", "distance from the centre of the surface within which the patch covers that centre"),
-    "heating": ("K s^1/2 m^2/J", "sqrt(D/pi)/k of the heated half-space"),
-    "start_temperature": ("degC", "temperature at the start"),
-    **dict.fromkeys(COEFFICIENTS, ("SI", "parameter of the law")),
-}
-"""Unit and meaning of every parameter of a law, and of every value derived from parameters for the compiled model."""
+_NUMBERS = (
+    Value("friction_slow", Quantity("", least=0.0), "friction coefficient at rest"),
+    Value(
+        "velocity_rate",
+        Quantity("s/m", least=0.0),
+        "rate a of the exponential increase of friction with the slip velocity",
+    ),
+    Value("velocity_drop", Quantity("", least=0.0), "relative reduction of friction at rest"),
+    Value("reference_pressure", Quantity("Pa", least=0.0), "pressure at which mu is given"),
+    Value("pressure_ratio", Quantity("", above=0.0), "factor on friction for a pressure increase of 50 MPa"),
+    Value("temperature_ratio", Quantity("", above=0.0), "0.7 in Kumar et al. (2015); 1: no influence of temperature"),
+    Value("patch_radius", Quantity("m", above=0.0), "radius of the contact patch"),
+    Value("conductivity", Quantity("W/(m K)", above=0.0), "thermal conductivity of the heated half-space"),
+    Value("diffusivity", Quantity("m^2/s", above=0.0), "its thermal diffusivity"),
+    Value("area", Quantity("m^2", above=0.0, computed=True), "area of the contact patch"),
+    Value(
+        "reach",
+        Quantity("m", above=0.0, computed=True),
+        "distance from the centre of the surface within which the patch covers that centre",
+    ),
+    Value("heating", Quantity("K s^1/2 m^2/J", above=0.0, computed=True), "sqrt(D/pi)/k of the heated half-space"),
+    Value("start_temperature", Quantity("degC"), "temperature at the start"),
+    *(Value(name, Quantity(""), "parameter of the law", other_unit="SI") for name in COEFFICIENTS),
+)
+NUMBERS = {value.name: value for value in _NUMBERS}
+"""Every parameter of a law, and every value derived from parameters for the compiled model."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ LAW, NUMBER, FIELD, SWITCHES = re.findall(
 WHERE = {
     # The page shows the entry within the parentheses of `_LAWS`, as the formatter requires.
     ("msfp_gen/specification/friction_laws.py", "_LAWS = (\n"): LAW.removeprefix("(\n").removesuffix(")\n"),
-    ("msfp_gen/specification/friction_laws.py", "NUMBERS: dict[str, tuple[str, str]] = {\n"): NUMBER,
+    ("msfp_gen/specification/friction_laws.py", "_NUMBERS = (\n"): f"    {NUMBER.strip()},\n",
     ("msfp_gen/specification/hysteresis.py", "HYSTERESIS = {\n"): SWITCHES,
     ("msfp_gen/scene/bearing.py", "    friction_slow: Annotated[float | None"): FIELD,
 }

@@ -108,7 +108,7 @@ enum msfp_monitor {
 /* What a function of this interface returns beside the statuses above. */
 enum msfp_call_error {
     MSFP_E_ARGUMENT = 100, /* an argument is missing or out of range; `message` names it */
-    MSFP_E_SNAPSHOT, /* these bytes are no snapshot of a run of this model and scene by this build */
+    MSFP_E_SNAPSHOT, /* these bytes are no snapshot of this model with these inputs by this build */
     MSFP_CALL_ERRORS
 };
 
@@ -175,7 +175,7 @@ typedef struct {
     int jump_count;
     /* The state at the start; NULL: zero. */
     const double *q, *v;         /* [nb][nq] as in msfp_inputs */
-    const double *f;             /* [nb][2] friction state Y, Z [-] */
+    const double *f;             /* [nb][2] friction state Y, Z [-], within the unit disc */
     const double *foot;          /* [2] as in msfp_inputs */
     const double *heat;          /* [nb][api->heat_states] parts of the temperature above the start [K] */
     const double *origin;        /* [3] r_01 - r_nn at which the displacement is zero [m]; NULL: that of the start */
@@ -239,7 +239,7 @@ typedef struct {
 typedef struct {
     double time;          /* [s] */
     double *q, *v;        /* [nb][nq] as in msfp_inputs */
-    double *f;            /* [nb][2] friction state Y, Z [-] */
+    double *f;            /* [nb][2] friction state Y, Z [-]; what the error of a step adds to mu N is left out */
     double *foot;         /* [2] as in msfp_inputs */
     double *heat;         /* [nb][api->heat_states] parts of the temperature above the start [K] */
     double *force;        /* [nb][3] force on the body above each surface, of the last row [N] */
@@ -250,10 +250,10 @@ typedef struct {
 } msfp_run_state;
 
 /* Derivatives of everything that a run is given, [parameter] first: of gravity, of the values that bearing_new takes, of
- * q, v [nb][nq], f [nb][2]; of the coefficients of motion and load, those with the index motion[i], load[i] of
- * `motions`, `loads` [index][pieces][6][degree + 1], -1: zero. All arrays are given. steps [step_count]: ends of all
- * steps [s], in place of the step control, for checks. Histories and steps must outlive the run. energies: whether the
- * derivatives of the works, integrals over the run, are computed too; else those of a row are zero. */
+ * q, v [nb][nq], f [nb][2]; of the coefficients of motion and load, those with the index motion[i], load[i], below
+ * count, of `motions`, `loads` [index][pieces][6][degree + 1], -1: zero. All arrays are given. steps [step_count]: ends
+ * of all steps [s], in place of the step control, for checks. Histories and steps must outlive the run. energies:
+ * whether the derivatives of the works, integrals over the run, are computed too; else those of a row are zero. */
 typedef struct {
     int count;
     const double *gravity, *bodies, *surfaces, *top, *q, *v, *f, *motion, *load;
@@ -368,8 +368,9 @@ typedef struct msfp_api {
      * [snapshot_size]. */
     size_t (*snapshot_size)(const msfp_run *run, long rows);
     void (*snapshot_write)(const msfp_run *run, long rows, void *snapshot);
-    /* Go to a snapshot of a run of the same scene and build: what follows is bit by bit what followed there. The run is
-     * unchanged after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
+    /* Go to a snapshot of a run of the same scene and build: what follows is bit by bit what followed there. A snapshot of a
+     * scene with any other number, as it was given to run_new, is MSFP_E_SNAPSHOT; coefficients that were changed later
+     * are not compared. The run is unchanged after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
     int (*snapshot_read)(msfp_run *run, const void *snapshot, size_t size);
     /* A run of no scene in the state of a snapshot, to read its state from; it takes no steps. */
     int (*snapshot_open)(const void *snapshot, size_t size, msfp_run **run);
@@ -405,18 +406,20 @@ typedef struct msfp_api {
     int (*port_commit)(msfp_port *port);
     void (*port_revert)(msfp_port *port); /* return to the committed state */
     /* The committed state as bytes [port_snapshot_size] without pointers; in a port of the same values and build, what
-     * follows is bit by bit what followed there. Nothing has changed after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
+     * follows is bit by bit what followed there. Of all that is given to port_new only start_time may be another. Nothing
+     * has changed after MSFP_E_SNAPSHOT and MSFP_E_MEMORY. */
     size_t (*port_snapshot_size)(const msfp_port *port);
     void (*port_snapshot_write)(const msfp_port *port, void *snapshot);
     int (*port_snapshot_read)(msfp_port *port, const void *snapshot, size_t size);
 
     /* ---- derivatives of a run with respect to parameters (docs/gradients.md); NULL in models without them ---- */
-    /* Begin them, before the first step of a run that keeps its rows. Returns a status. */
+    /* Begin them, before the first step of a run that keeps its rows. Returns a status; nothing has begun after
+     * MSFP_E_ARGUMENT. */
     int (*gradients_start)(msfp_run *run, const msfp_gradient_inputs *inputs);
     /* Of the rows, [row][parameter][row_size]; of time, displacement and top force of events, [event][parameter][7]. */
     const double *(*gradient_rows)(const msfp_run *run, size_t *count);
     const double *(*gradient_events)(const msfp_run *run, size_t *count);
-    /* Of the extremes with respect to one parameter, [extremes_size]. */
+    /* Of the extremes with respect to one parameter, [extremes_size]; of another than those begun nothing is written. */
     void (*gradient_extremes)(const msfp_run *run, int parameter, double *out);
 
     /* ---- the two-port by stages: your program takes the steps ---- */

@@ -83,7 +83,7 @@ ROWS = [
     ("motion.cycles", -1, ("motion.cycles = -1", "above 0")),
     ("top.axial_load", -112e3, ("top.axial_load = -112000.0", "not below 0 [N]")),
     ("solver.rtol", 0, ("solver.rtol = 0", "above 0")),
-    ("solver.rtol", 2, ("solver.rtol = 2.0", "below 1")),
+    ("solver.rtol", 2, ("solver.rtol = 2", "below 1")),
     ("duration", 0, ("duration = 0", "above 0 [s]")),
     ("output_step", -1, ("output_step = -1", "above 0 [s]")),
     ("stop", {"displacement": 0}, ("stop.displacement = 0", "above 0 [m]")),
@@ -96,7 +96,7 @@ ROWS = [
     # impossible geometry
     ("bearing.surfaces.1.capacity", 0.12, ("bearing.surfaces[1].capacity = 0.12 (surface 2)", "quarter turn")),
     ("bearing.surfaces.1.capacity", 0.1, ("bearing.surfaces[1].capacity = 0.1 (surface 2)", "hemisphere")),
-    ("bearing.bodies.1.rim_radius", 0.08, ("bearing.bodies[1].rim_radius = 0.08 (body 3)", "surfaces[1].radius")),
+    ("bearing.bodies.1.rim_radius", 0.08, ("bearing.bodies[1].rim_radius = 0.08 (body 3)", "radius of the surface")),
     ("bearing.bodies.1.centroid", 0.05, ("bearing.bodies[1].centroid = 0.05", "height of the body, 0.046")),
     ("bearing.bodies.1.inertia", [1e-4, 3e-4], ("bearing.bodies[1].inertia", "twice its transverse")),
     ("bearing.bodies.0.rim_radius", 0, ("bearing.bodies[0].rim_radius = 0 (body 2)", "effects.rims = false")),

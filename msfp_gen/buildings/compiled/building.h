@@ -4,6 +4,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
 #include "msfp_building.h"
+#include "msfp_hash.h"
 #include "msfp_math.h"
 
 enum { FACTORS = 3 }; /* step sizes whose factors are kept */
@@ -73,6 +74,7 @@ struct msfp_building {
     double *scratch;             /* [3][attachments] */
     int status, bearing, surface;
     double value;
+    uint64_t identity; /* of all that the run computes from but its two-ports */
     int *entries;  /* as in the scene, of the present models */
     double *peaks; /* see peaks.c */
     double *rows;
@@ -120,6 +122,11 @@ void ends_now(msfp_building *b);
 int write_row(msfp_building *b);
 /* Take the row of a bearing from its two-port; MSFP_OK or MSFP_E_MEMORY. */
 int read_row(msfp_building *b, int bearing);
+
+/* Numbers that are kept of the rows of all bearings. */
+size_t entry_count(const msfp_building *b);
+/* A number that tells what a run computes from, its two-ports aside, which have their own. */
+uint64_t identity_of(const msfp_building *b);
 
 /* ---- peaks.c ---- */
 

@@ -14,14 +14,6 @@ static double smallest(double t) { return smallest_step * fmax(1.0, t); }
 
 /* ---- begin and end ---- */
 
-static size_t entry_count(const msfp_building *b)
-{
-    size_t count = 0;
-    for (int i = 0; i < b->scene.bearings; ++i)
-        count += b->scene.entry_count[i];
-    return count;
-}
-
 static int allocate(msfp_building *b)
 {
     const size_t n = b->scene.n, r = b->scene.attachments, stages = MSFP_STAGES;
@@ -128,6 +120,7 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
         return NULL;
     }
     set_scale(b);
+    b->identity = identity_of(b);
     memcpy(b->entries, scene->entries, entry_count(b) * sizeof *b->entries);
     b->status = scene->parts[0].api->port_method(scene->method, &b->method);
     begin(b);

@@ -1,5 +1,4 @@
 /* state.c: rows of a run of a building, and its snapshots. */
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "building.h"
@@ -73,7 +72,69 @@ int write_row(msfp_building *b)
 
 /* ---- snapshots ---- */
 
-static const uint64_t magic = 0x6d73667062756932; /* "msfpbui2" */
+static const uint64_t magic = 0x6d73667062756933; /* "msfpbui3" */
+enum { HEAD = 3 };        /* that, the identity, and the number of rows */
+
+size_t entry_count(const msfp_building *b)
+{
+    size_t count = 0;
+    for (int i = 0; i < b->scene.bearings; ++i)
+        count += b->scene.entry_count[i];
+    return count;
+}
+
+uint64_t identity_of(const msfp_building *b)
+{
+    const msfp_building_scene *s = &b->scene;
+    const size_t n = s->n, r = s->attachments, k = s->bearings, g = s->grounds, size = sizeof(double);
+    const struct {
+        const void *data;
+        size_t size;
+    } parts[] = {
+        { &n, sizeof n },
+        { &r, sizeof r },
+        { &k, sizeof k },
+        { &g, sizeof g },
+        { s->mass, n * n * size },
+        { s->damping, n * n * size },
+        { s->stiffness, n * n * size },
+        { s->attached, r * sizeof(int) },
+        { s->rows, k * MSFP_WRENCH * r * size },
+        { s->ground_of, k * sizeof(int) },
+        { s->entry_count, k * sizeof(int) },
+        { s->entries, entry_count(b) * sizeof(int) },
+        { &s->weight, size },
+        { &s->vectors, sizeof(int) },
+        { s->vector_orders, (size_t)s->vectors * sizeof(int) },
+        { s->vector_rows, (size_t)s->vectors * 3 * n * size },
+        { s->vector_grounds, (size_t)s->vectors * g * size },
+        { s->arms, k * 2 * size },
+        { &s->stop_count, sizeof(int) },
+        { s->stops, (size_t)s->stop_count * size },
+        { &s->jump_count, sizeof(int) },
+        { s->jumps, (size_t)s->jump_count * size },
+        { &s->span_count, sizeof(int) },
+        { s->span_ends, (size_t)s->span_count * size },
+        { s->span_steps, (size_t)s->span_count * size },
+        { &s->method, sizeof(int) },
+        { &s->rtol, size },
+        { &s->max_step, size },
+        { &s->first_step, size },
+        { &s->max_steps, size },
+        { &s->end, size },
+        { &s->output_step, size },
+    };
+    uint64_t sum = MSFP_HASH_START;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; ++i)
+        sum = msfp_hash(sum, parts[i].data, parts[i].size);
+    for (size_t i = 0; i < g; ++i) {
+        const msfp_piecewise *h = &s->ground[i];
+        sum = msfp_hash(sum, &h->pieces, sizeof h->pieces);
+        sum = msfp_hash(sum, h->knots, ((size_t)h->pieces + 1) * size);
+        sum = msfp_hash(sum, h->coefficients, (size_t)h->pieces * 6 * (MSFP_DEGREE + 1) * size);
+    }
+    return sum;
+}
 
 /* The numbers of the state in order, in both directions. */
 typedef struct {
@@ -120,7 +181,7 @@ static size_t state_size(const msfp_building *b)
 
 static size_t fixed_size(const msfp_building *b)
 {
-    size_t size = 3 * sizeof(uint64_t) + state_size(b);
+    size_t size = HEAD * sizeof(uint64_t) + state_size(b);
     for (int i = 0; i < b->scene.bearings; ++i)
         size += b->scene.parts[i].api->port_snapshot_size(b->scene.parts[i].port);
     return size;
@@ -133,7 +194,7 @@ size_t msfp_building_snapshot_size(const msfp_building *b) { return fixed_size(b
 void msfp_building_snapshot_write(const msfp_building *b, void *snapshot)
 {
     tape t = { snapshot, 0 };
-    uint64_t head[3] = { magic, msfp_building_row_size(b), b->row_count };
+    uint64_t head[HEAD] = { magic, b->identity, b->row_count };
     pass(&t, head, sizeof head);
     pass_state((msfp_building *)b, &t); /* which only reads it here */
     for (int i = 0; i < b->scene.bearings; ++i) {
@@ -147,11 +208,11 @@ void msfp_building_snapshot_write(const msfp_building *b, void *snapshot)
 int msfp_building_snapshot_read(msfp_building *b, const void *snapshot, size_t size)
 {
     tape t = { (char *)snapshot, 1 }; /* read only */
-    uint64_t head[3];
+    uint64_t head[HEAD];
     if (size < fixed_size(b))
         return MSFP_E_SNAPSHOT;
     pass(&t, head, sizeof head);
-    if (head[0] != magic || head[1] != msfp_building_row_size(b) || head[2] > size || !head[2] ||
+    if (head[0] != magic || head[1] != b->identity || head[2] > size || !head[2] ||
         size != fixed_size(b) + rows_size(b, head[2]))
         return MSFP_E_SNAPSHOT;
     if (room_for(b, head[2]))

@@ -1,8 +1,9 @@
 /* fmu_state.c: the state of a unit as one block of bytes without pointers, for this build of the unit. */
-#include <stdint.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmu.h"
+#include "msfp_hash.h"
 
 /* What comes first; then the snapshots of the two-port before and after the last step, where there is one. */
 typedef struct {
@@ -15,11 +16,7 @@ typedef struct {
 
 static uint64_t checksum(const head *h)
 {
-    const unsigned char *bytes = (const unsigned char *)h;
-    uint64_t sum = 14695981039346656037u; /* FNV-1a */
-    for (size_t i = offsetof(head, phase); i < h->size; ++i)
-        sum = (sum ^ bytes[i]) * 1099511628211u;
-    return sum;
+    return msfp_hash(MSFP_HASH_START, (const char *)h + offsetof(head, phase), h->size - offsetof(head, phase));
 }
 
 size_t fmu_state_size(const fmu *f) { return sizeof(head) + 2 * f->size; }

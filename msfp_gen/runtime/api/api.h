@@ -18,11 +18,17 @@ int msfp_check_bearing(double gravity, const double *bodies, const double *surfa
                        const char **message);
 int msfp_check_scene(const msfp_scene *scene, const char **message);
 int msfp_check_port(const msfp_scene *scene, double axial_load, const char **message);
-/* A state that a port of another model has reached. */
+/* Of a state that a port of another model has reached. */
 int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const double *ends);
 int msfp_check_port_loaded(const msfp_scene *scene, const char **message);
 /* Also the status of a two-port that has failed at its start. */
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message);
+/* Numbers that tell what a run, or a two-port, computes from, as long as histories are not changed; not 0. */
+uint64_t msfp_identity(const msfp_scene *scene);
+uint64_t msfp_port_identity(const msfp_scene *scene, double axial_load, int loaded);
+#if MSFP_GRADIENTS
+int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *inputs);
+#endif
 /* Sets *message and returns MSFP_E_ARGUMENT; message: NULL where nothing is asked. */
 int msfp_refuse(const char **message, const char *text);
 
@@ -48,6 +54,7 @@ int msfp_api_named_vectors(const msfp_bearing *bearing, const msfp_inputs *at, d
 void msfp_api_scene_default(msfp_scene *scene);
 int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **message);
 void msfp_api_run_free(msfp_run *run);
+int msfp_api_run_record(msfp_run *run);
 int msfp_api_run_advance(msfp_run *run, long steps);
 void msfp_api_run_on_rows(msfp_run *run, msfp_row_callback callback, void *user);
 
@@ -65,6 +72,9 @@ void msfp_api_run_trips(const msfp_run *run, msfp_trip *trips);
 const msfp_event *msfp_api_run_events(const msfp_run *run, size_t *count);
 const double *msfp_api_run_rows(const msfp_run *run, size_t *count);
 int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
+#if MSFP_GRADIENTS
+int msfp_api_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs);
+#endif
 int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run);
 
 /* ---- two_port.c ---- */

@@ -45,23 +45,31 @@ static int point_of(const msfp_bearing *bearing, const msfp_inputs *at, msfp_poi
     return MSFP_OK;
 }
 
-/* The row of the evaluation in `w`, its time and integrals zero. */
-static void row_of(const msfp_bearing *bearing, const msfp_point *point, msfp_work *w, double *row)
+/* Hand over numbers that were found. Returns MSFP_OK, or MSFP_E_FINITE where not all are finite. */
+static int give(double *to, const void *from, size_t size)
+{
+    if (to)
+        memcpy(to, from, size);
+    return msfp_all_finite(from, size / sizeof *to) ? MSFP_OK : MSFP_E_FINITE;
+}
+
+/* The row of the evaluation in `w`, its time and integrals zero. Status as of give. */
+static int row_of(const msfp_bearing *bearing, const msfp_point *point, msfp_work *w, double *row)
 {
     msfp_row found;
     memset(&found, 0, sizeof found);
     msfp_observe(&bearing->parameters, point, w, &found);
-    if (row)
-        memcpy(row, &found, sizeof found);
+    return give(row, &found, sizeof found);
 }
 
-static void rates_of(const msfp_work *w, double *rates)
+static int rates_of(const msfp_work *w, double *rates)
 {
     double found[NB][2];
     msfp_friction_rates(w, found);
-    if (rates)
-        memcpy(rates, found, sizeof found);
+    return give(rates, found, sizeof found);
 }
+
+static int first(int status, int other) { return status ? status : other; }
 
 int msfp_api_bearing_new(double gravity, const double *bodies, const double *surfaces, const double *top,
                          msfp_bearing **bearing, const char **message)
@@ -99,14 +107,10 @@ int msfp_api_accelerations(const msfp_bearing *bearing, const msfp_inputs *at, i
     memset(point.a, 0, sizeof point.a);
     status = balances ? msfp_solve_momentum_balances(&bearing->parameters, &point, &w, found, 0, &solution)
                       : msfp_accelerations(&bearing->parameters, &point, &w, &solution);
-    row_of(bearing, &point, &w, row);
-    rates_of(&w, rates);
-    if (status == MSFP_OK && msfp_surface_in_tension(&w))
-        status = MSFP_E_UPLIFT;
-    if (status == MSFP_OK && msfp_invalid_friction(&w))
-        status = MSFP_E_LAW;
-    if (a)
-        memcpy(a, point.a, sizeof point.a);
+    const int finite = first(row_of(bearing, &point, &w, row), rates_of(&w, rates));
+    status = first(status, msfp_surface_in_tension(&w) ? MSFP_E_UPLIFT : MSFP_OK);
+    status = first(status, msfp_invalid_friction(&w) ? MSFP_E_LAW : MSFP_OK);
+    status = first(first(status, finite), give(a, point.a, sizeof point.a));
     if (unknowns && balances)
         memcpy(unknowns, found, sizeof found);
     if (how)
@@ -120,18 +124,16 @@ int msfp_api_observe(const msfp_bearing *bearing, const msfp_inputs *at, double 
     msfp_point point;
     msfp_work w;
     double found[MSFP_WORKS];
-    const int status = point_of(bearing, at, &point);
+    int status = point_of(bearing, at, &point);
     if (status)
         return status;
-    row_of(bearing, &point, &w, row);
+    status = row_of(bearing, &point, &w, row);
     const msfp_mechanical mechanical = msfp_mechanical_energy(&bearing->parameters, &point, &w);
     msfp_powers(&bearing->parameters, &point, &w, &mechanical, found);
-    if (powers)
-        memcpy(powers, found, sizeof found);
-    rates_of(&w, rates);
+    status = first(first(status, give(powers, found, sizeof found)), rates_of(&w, rates));
     if (in_tension)
         *in_tension = msfp_surface_in_tension(&w);
-    return MSFP_OK;
+    return status;
 }
 
 int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, double cq, double cv, double ca,
@@ -158,11 +160,10 @@ int msfp_api_condensed(const msfp_bearing *bearing, const msfp_inputs *at, doubl
     memcpy(seed.fp, point.f, sizeof seed.fp);
     memcpy(g, point.f, sizeof g);
     status = msfp_condensed(&bearing->parameters, &point, &seed, &w, g, residual ? residual : rest, tangent);
-    if (found) {
-        msfp_friction_state(&w, g);
-        memcpy(found, g, sizeof g);
-    }
-    return status;
+    msfp_friction_state(&w, g);
+    status = first(status, give(found, g, sizeof g));
+    return msfp_all_finite(residual, MSFP_DOF) && msfp_all_finite(tangent, MSFP_DOF * MSFP_DOF) ? status
+                                                                                                 : first(status, MSFP_E_FINITE);
 }
 
 static int valid_variable(const msfp_variable *x)
@@ -194,7 +195,10 @@ int msfp_api_momentum_balances(const msfp_bearing *bearing, const msfp_inputs *a
     if (rates)
         memset(rates, 0, 2 * NB * (size_t)count * sizeof *rates);
     msfp_momentum_balances(&bearing->parameters, &point, unknowns, &w, residual, variables, count, jacobian, rates);
-    return MSFP_OK;
+    const int finite = msfp_all_finite(residual, MSFP_UNKNOWNS) &&
+                       msfp_all_finite(jacobian, MSFP_UNKNOWNS * (size_t)count) &&
+                       msfp_all_finite(rates, 2 * NB * (size_t)count);
+    return finite ? MSFP_OK : MSFP_E_FINITE;
 }
 
 int msfp_api_named_vectors(const msfp_bearing *bearing, const msfp_inputs *at, double *points, double *rotations,
@@ -207,5 +211,7 @@ int msfp_api_named_vectors(const msfp_bearing *bearing, const msfp_inputs *at, d
     if (status)
         return status;
     msfp_named_vectors(&bearing->parameters, &point, points, rotations, bases);
-    return MSFP_OK;
+    const int finite = msfp_all_finite(points, (NB + 1) * 36) && msfp_all_finite(rotations, (NB + 1) * 12) &&
+                       msfp_all_finite(bases, (NB + 1) * 9);
+    return finite ? MSFP_OK : MSFP_E_FINITE;
 }

@@ -1,9 +1,15 @@
-/* checks.c: what the interface refuses before anything is computed, each with one line that names it. */
+/* checks.c: what the interface refuses before anything is computed, each with one line that names it; and the identity
+ * of what a run or a two-port computes from. Both go over the same lists of what there is. */
 #include <math.h>
+#include <string.h>
 #include "api.h"
+#include "msfp_checks.h"
 
-enum { NB = MSFP_NB };
+enum { NB = MSFP_NB, MOST_ITEMS = INT32_MAX / 64 }; /* of a list: sizes in bytes fit */
 static const double time_tolerance = 1e-9; /* times closer than this share of max(1, t) are equal, as in run.c */
+static const int signs[NB] = MSFP_SIGNS;
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
 
 int msfp_refuse(const char **message, const char *text)
 {
@@ -18,52 +24,62 @@ int msfp_refuse(const char **message, const char *text)
             return msfp_refuse(message, text);                                                                         \
     } while (0)
 
-/* Column `index` of values [rows][size] has no number below the limit, or, where `open`, none at it. */
-static int column(const double *values, int rows, int size, int index, double limit, int open)
+static int in_range(const msfp_range *range, double x)
 {
-    for (int i = 0; i < rows; ++i) {
-        const double x = values[(size_t)i * size + index];
-        if (!(open ? x > limit : x >= limit))
-            return 0;
-    }
-    return 1;
+    return (x >= range->least && x <= range->most) || (range->zero && x == 0.0);
 }
 
-#define BODY(field, open) column(bodies + MSFP_BODY_VALUES, NB, MSFP_BODY_VALUES, MSFP_BODY_VALUE_##field, 0.0, open)
-#define SURFACE(field, open) column(surfaces, NB, MSFP_SURFACE_VALUES, MSFP_SURFACE_VALUE_##field, 0.0, open)
-#define TOP(field) (top[MSFP_TOP_VALUE_##field] >= 0.0)
-
-int msfp_check_bearing(double gravity, const double *bodies, const double *surfaces, const double *top,
-                       const char **message)
+/* Whether values [range->at] are in their ranges. base: they are of the base, which has not all of them. */
+static int check_ranges(const msfp_range *ranges, size_t count, const double *values, int base, const char **message)
 {
-    if (message)
-        *message = NULL;
-    REQUIRE(gravity >= 0.0 && gravity < INFINITY, "gravity: give a finite number of at least 0 [m/s^2]");
-    REQUIRE(bodies && msfp_all_finite(bodies, (NB + 1) * MSFP_BODY_VALUES),
-            "bodies: give finite numbers [n][body_size], the base first");
-    REQUIRE(surfaces && msfp_all_finite(surfaces, NB * MSFP_SURFACE_VALUES),
-            "surfaces: give finite numbers [n - 1][surface_size], the lowest first");
-    REQUIRE(msfp_all_finite(top, MSFP_TOP_VALUES), "top: give finite numbers [top_size]");
-    REQUIRE(BODY(HEIGHT, 1), "bodies: height: give a number above 0 [m]");
-    REQUIRE(BODY(CENTROID, 0), "bodies: centroid: give a number of at least 0 [m]");
-    REQUIRE(BODY(MASS, !MSFP_MASSLESS), "bodies: mass: give a number above 0 [kg]");
-    REQUIRE(BODY(INERTIA_TRANSVERSE, !MSFP_MASSLESS), "bodies: inertia_transverse: give a number above 0 [kg m^2]");
-    REQUIRE(BODY(INERTIA_AXIAL, !MSFP_MASSLESS), "bodies: inertia_axial: give a number above 0 [kg m^2]");
-    REQUIRE(SURFACE(RADIUS, 1), "surfaces: radius: give a number above 0 [m]");
-    REQUIRE(SURFACE(CAPACITY, 1), "surfaces: capacity: give a number above 0 [m]");
-    REQUIRE(SURFACE(FRICTION, 0), "surfaces: friction: give a number of at least 0");
-    REQUIRE(SURFACE(YIELD_DISPLACEMENT, 1), "surfaces: yield_displacement: give a number above 0 [m]");
-    REQUIRE(SURFACE(RIM_STIFFNESS, 0), "surfaces: rim_stiffness: give a number of at least 0 [N/m]");
-    REQUIRE(SURFACE(RIM_DAMPING, 0), "surfaces: rim_damping: give a number of at least 0 [N s/m]");
-    REQUIRE(SURFACE(CONTACT_DAMPING, 0), "surfaces: contact_damping: give a number of at least 0 [s]");
-#if MSFP_UPLIFT
-    REQUIRE(SURFACE(SEAT_STIFFNESS, 1), "surfaces: seat_stiffness: give a number above 0 [N/m]");
-    REQUIRE(SURFACE(SEAT_DAMPING, 0), "surfaces: seat_damping: give a number of at least 0 [s/m]");
-#endif
-    REQUIRE(TOP(STIFFNESS) && TOP(DAMPING) && TOP(ROTATIONAL_STIFFNESS) && TOP(ROTATIONAL_DAMPING)
-                && TOP(VERTICAL_STIFFNESS) && TOP(VERTICAL_DAMPING) && TOP(MASS) && TOP(INERTIA_TRANSVERSE)
-                && TOP(INERTIA_AXIAL),
-            "top: give stiffnesses, dampings, mass and inertias of at least 0");
+    for (size_t i = 0; i < count; ++i) {
+        const double x = values[ranges[i].at];
+        REQUIRE(base && ranges[i].moving ? fabs(x) < INFINITY : in_range(ranges + i, x), ranges[i].message);
+    }
+    return MSFP_OK;
+}
+
+#define CHECK(ranges, values) check_ranges(ranges, COUNT(ranges), values, 0, message)
+
+static int check_bodies(const double *bodies, const char **message)
+{
+    for (int k = 0; k <= NB; ++k) {
+        const double *body = bodies + k * MSFP_BODY_VALUES;
+        const int status = check_ranges(msfp_body_ranges, COUNT(msfp_body_ranges), body, k == 0, message);
+        if (status)
+            return status;
+        const char *excess = msfp_excess_of_body(body);
+        REQUIRE(!excess, excess);
+    }
+    return MSFP_OK;
+}
+
+static int check_surfaces(const double *surfaces, const double *bodies, const char **message)
+{
+    for (int j = 0; j < NB; ++j) {
+        const double *surface = surfaces + j * MSFP_SURFACE_VALUES;
+        const int status = CHECK(msfp_surface_ranges, surface);
+        if (status)
+            return status;
+        const char *excess = msfp_excess_of_surface(surface, bodies + (signs[j] > 0 ? j + 1 : j) * MSFP_BODY_VALUES);
+        REQUIRE(!excess, excess);
+    }
+    return MSFP_OK;
+}
+
+static int check_top(const double *top, const char **message)
+{
+    const int status = CHECK(msfp_top_ranges, top);
+    if (status || top[MSFP_TOP_VALUE_MASS] == 0.0)
+        return status;
+    REQUIRE(top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS] > 0.0 || top[MSFP_TOP_VALUE_VERTICAL_DAMPING] == 0.0,
+            "top: vertical_damping: a damper alone carries no mass; give vertical_stiffness as well");
+    return CHECK(msfp_top_mass_ranges, top);
+}
+
+/* The stiffnesses of the top contain the unilateral contacts of all surfaces in series. */
+static int check_contacts(const double *surfaces, const double *top, const char **message)
+{
 #if MSFP_UPLIFT
     double compliance = 0.0;
     for (int j = 0; j < NB; ++j)
@@ -71,9 +87,62 @@ int msfp_check_bearing(double gravity, const double *bodies, const double *surfa
     REQUIRE(compliance * fmax(top[MSFP_TOP_VALUE_STIFFNESS], top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS]) < 1.0,
             "surfaces: seat_stiffness: the unilateral contacts of all surfaces in series must be stiffer than the top, "
             "whose stiffness and vertical_stiffness contain them; give more [N/m]");
+#else
+    (void)surfaces;
+    (void)top;
+    (void)message;
 #endif
     return MSFP_OK;
 }
+
+int msfp_check_bearing(double gravity, const double *bodies, const double *surfaces, const double *top,
+                       const char **message)
+{
+    if (message)
+        *message = NULL;
+    REQUIRE(bodies, "bodies: give numbers [n][body_size], the base first");
+    REQUIRE(surfaces, "surfaces: give numbers [n - 1][surface_size], the lowest first");
+    int status = CHECK(msfp_gravity_ranges, &gravity);
+    status = status ? status : check_bodies(bodies, message);
+    status = status ? status : check_surfaces(surfaces, bodies, message);
+    status = status ? status : check_top(top, message);
+    return status ? status : check_contacts(surfaces, top, message);
+}
+
+/* ---- a scene: its numbers, switches, arrays, lists of times and histories ---- */
+
+static double number_at(const msfp_scene *s, size_t at) { return *(const double *)((const char *)s + at); }
+
+static int integer_at(const msfp_scene *s, size_t at) { return *(const int *)((const char *)s + at); }
+
+static const double *values_at(const msfp_scene *s, size_t at)
+{
+    return *(const double *const *)((const char *)s + at);
+}
+
+static const struct {
+    size_t at;
+    int most; /* least: 0 */
+    const char *message;
+} switches[] = {
+    { offsetof(msfp_scene, method), MSFP_METHODS - 1, "method: give one of enum msfp_method" },
+    { offsetof(msfp_scene, sampled), 1, "sampled: give 0 or 1" },
+    { offsetof(msfp_scene, quasistatic), 1, "quasistatic: give 0 or 1" },
+    { offsetof(msfp_scene, stop_all_rims), 1, "stop_all_rims: give 0 or 1" },
+    { offsetof(msfp_scene, monitors), (1 << MSFP_MONITORS) - 1, "monitors: give bits 1 << MSFP_MONITOR_..." },
+    { offsetof(msfp_scene, monitor_stop), (1 << MSFP_MONITORS) - 1, "monitor_stop: give bits 1 << MSFP_MONITOR_..." },
+};
+
+static const struct {
+    size_t at, count;
+    int strict; /* no two are equal */
+    const char *message;
+} lists[] = {
+    { offsetof(msfp_scene, jumps), offsetof(msfp_scene, jump_count), 1, "jumps: give rising times [jump_count] [s]" },
+    { offsetof(msfp_scene, stops), offsetof(msfp_scene, stop_count), 0, "stops: give rising times [stop_count] [s]" },
+    { offsetof(msfp_scene, span_ends), offsetof(msfp_scene, span_count), 0,
+      "span_ends: give rising times [span_count] [s]" },
+};
 
 /* No number is below the one before it, or, where `strict`, equal to it; all are finite. */
 static int rising(const double *values, int count, int strict)
@@ -84,14 +153,9 @@ static int rising(const double *values, int count, int strict)
     return 1;
 }
 
-static int valid_list(const double *values, int count, int strict)
-{
-    return count >= 0 && (!count || (values && rising(values, count, strict)));
-}
-
 static int valid_history(const msfp_piecewise *h)
 {
-    if (h->pieces < 0 || h->pieces > INT32_MAX / 64)
+    if (h->pieces < 0 || h->pieces > MOST_ITEMS)
         return 0;
     return !h->pieces || (h->knots && h->coefficients && rising(h->knots, h->pieces + 1, 1)
                           && msfp_all_finite(h->coefficients, (size_t)h->pieces * 6 * (MSFP_DEGREE + 1)));
@@ -104,9 +168,6 @@ static int covers(const msfp_piecewise *h, const msfp_scene *s)
     return !h->pieces || (h->knots[0] <= s->start_time + tolerance && h->knots[h->pieces] >= end - tolerance);
 }
 
-/* A number that is not negative; infinite where `unlimited`. */
-static int natural(double x, int unlimited) { return x >= 0.0 && (unlimited || x < INFINITY); }
-
 static int check_histories(const msfp_scene *s, const char **message)
 {
     REQUIRE(valid_history(&s->motion), "motion: give rising knots [pieces + 1] and finite coefficients [pieces][6][6]");
@@ -117,44 +178,54 @@ static int check_histories(const msfp_scene *s, const char **message)
     REQUIRE(covers(&s->motion, s), "motion: its knots do not reach from start_time to end_time; give pieces for all of it");
     REQUIRE(covers(&s->load, s), "load: its knots do not reach from start_time to end_time; give pieces for all of it");
     REQUIRE(covers(&s->support, s), "support: its knots do not reach from start_time to end_time; give pieces for all of it");
-    REQUIRE(valid_list(s->jumps, s->jump_count, 1), "jumps: give rising times [jump_count] [s]");
-    REQUIRE(valid_list(s->stops, s->stop_count, 0), "stops: give rising times [stop_count] [s]");
-    REQUIRE(valid_list(s->span_ends, s->span_count, 0), "span_ends: give rising times [span_count] [s]");
+    for (size_t i = 0; i < COUNT(lists); ++i) {
+        const int count = integer_at(s, lists[i].count);
+        const double *times = values_at(s, lists[i].at);
+        REQUIRE(count >= 0 && count <= MOST_ITEMS && (!count || (times && rising(times, count, lists[i].strict))),
+                lists[i].message);
+    }
     REQUIRE(!s->span_count || s->span_steps, "span_steps: give the longest step of each interval [span_count] [s]");
     for (int i = 0; i < s->span_count; ++i)
         REQUIRE(s->span_steps[i] > 0.0, "span_steps: give numbers above 0 [s]");
     return MSFP_OK;
 }
 
-static int check_solver(const msfp_scene *s, const char **message)
+static int check_arrays(const msfp_scene *s, const char **message)
 {
-    REQUIRE(s->method >= 0 && s->method < MSFP_METHODS, "method: give one of enum msfp_method");
-    REQUIRE(s->method != MSFP_METHOD_DOPRI5 || !(MSFP_MASSLESS || MSFP_UPLIFT),
-            "method: MSFP_METHOD_DOPRI5 is for models with masses and without uplift; use MSFP_METHOD_IMPLICIT");
-    REQUIRE(s->rtol > 0.0 && s->rtol < INFINITY, "rtol: give a finite number above 0");
-    REQUIRE(s->atol_angle > 0.0 && s->atol_angle < INFINITY, "atol_angle: give a finite number above 0 [rad]");
-    REQUIRE(natural(s->max_step, 0), "max_step: give a finite number of at least 0 [s]; 0: chosen");
-    REQUIRE(natural(s->first_step, 0), "first_step: give a finite number of at least 0 [s]; 0: chosen");
-    REQUIRE(s->max_steps > 0.0, "max_steps: give a number above 0");
-    REQUIRE(natural(s->output_step, 0), "output_step: give a finite number of at least 0 [s]; 0: every step");
-    REQUIRE(natural(s->stop_displacement, 0), "stop_displacement: give a finite number of at least 0 [m]; 0: none");
+    for (size_t i = 0; i < COUNT(msfp_scene_arrays); ++i) {
+        const msfp_range *range = &msfp_scene_arrays[i].range;
+        const double *values = values_at(s, range->at);
+        for (size_t k = 0; values && k < msfp_scene_arrays[i].count; ++k)
+            REQUIRE(in_range(range, values[k]), range->message);
+    }
+    for (int j = 0; s->f && j < NB; ++j)
+        REQUIRE(s->f[2 * j] * s->f[2 * j] + s->f[2 * j + 1] * s->f[2 * j + 1] <= MSFP_LARGEST_FRICTION_STATE,
+                "f: friction does not exceed mu N; give Y^2 + Z^2 of at most 1");
+    REQUIRE(MSFP_HEAT || !s->heat, "heat: the friction of this model does not depend on temperature; leave it NULL");
     return MSFP_OK;
 }
 
-static int check_monitors(const msfp_scene *s, const char **message)
+/* The bearing, numbers, switches and arrays. */
+static int check_values(const msfp_scene *s, const char **message)
 {
-    const int all = (1 << MSFP_MONITORS) - 1;
-    REQUIRE(!(s->monitors & ~all) && !(s->monitor_stop & ~all), "monitors: give bits 1 << MSFP_MONITOR_...");
-    REQUIRE(s->monitor_normal == s->monitor_normal, "monitor_normal: give a number [N]");
-    REQUIRE(natural(s->monitor_peak, 1) && natural(s->monitor_inertia, 1) && natural(s->monitor_time, 1) && natural(s->monitor_rise, 1)
-                && natural(s->law_speed, 1),
-            "monitor_peak, monitor_inertia, monitor_time, monitor_rise, law_speed: give numbers of at least 0");
-    for (int j = 0; s->monitor_heating && j < NB; ++j)
-        REQUIRE(natural(s->monitor_heating[j], 1), "monitor_heating: give numbers of at least 0 [K s^1/2/J]");
-    for (int i = 0; s->law_load && i < 2 * NB; ++i)
-        REQUIRE(s->law_load[i] == s->law_load[i], "law_load: give numbers [N]");
+    for (size_t i = 0; i < COUNT(msfp_scene_ranges); ++i)
+        REQUIRE(in_range(msfp_scene_ranges + i, number_at(s, msfp_scene_ranges[i].at)), msfp_scene_ranges[i].message);
+    for (size_t i = 0; i < COUNT(switches); ++i) {
+        const int value = integer_at(s, switches[i].at);
+        REQUIRE(value >= 0 && value <= switches[i].most, switches[i].message);
+    }
+    REQUIRE(s->method != MSFP_METHOD_DOPRI5 || !(MSFP_MASSLESS || MSFP_UPLIFT),
+            "method: MSFP_METHOD_DOPRI5 is for models with masses and without uplift; use MSFP_METHOD_IMPLICIT");
+    REQUIRE(s->max_step == 0.0 || s->first_step <= s->max_step, "first_step: give at most max_step [s]");
     REQUIRE(s->law_temperature[0] <= s->law_temperature[1], "law_temperature: give a range of temperatures [degC]");
-    return MSFP_OK;
+    for (int j = 0; MSFP_RIMS && j < NB; ++j) {
+        const double *surface = s->bearing->parameters.surface[j];
+        REQUIRE(surface[MSFP_SURFACE_PARAMETERS_RS] > 0.0,
+                "bearing: bodies: rim_radius: give that of each slider, or take a model without rims [m]");
+        REQUIRE(surface[MSFP_SURFACE_PARAMETERS_KC] > 0.0,
+                "bearing: surfaces: rim_stiffness: give one above 0, or take a model without rims [N/m]");
+    }
+    return check_arrays(s, message);
 }
 
 int msfp_check_scene(const msfp_scene *s, const char **message)
@@ -163,35 +234,81 @@ int msfp_check_scene(const msfp_scene *s, const char **message)
         *message = NULL;
     REQUIRE(s, "scene: give a scene");
     REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
-    REQUIRE(fabs(s->start_time) < INFINITY && s->end_time >= s->start_time && s->end_time < INFINITY,
-            "end_time: give a finite time that is not before start_time [s]");
-    int status = check_histories(s, message);
-    status = status ? status : check_solver(s, message);
-    status = status ? status : check_monitors(s, message);
+    const int status = check_values(s, message);
     if (status)
         return status;
-    const int state = NB * MSFP_NQ;
-    REQUIRE(msfp_all_finite(s->q, state) && msfp_all_finite(s->v, state) && msfp_all_finite(s->f, 2 * NB)
-                && msfp_all_finite(s->foot, 2) && msfp_all_finite(s->origin, 3),
-            "q, v, f, foot, origin: give finite numbers");
-    REQUIRE(MSFP_HEAT || !s->heat, "heat: the friction of this model does not depend on temperature; leave it NULL");
-    REQUIRE(msfp_all_finite(s->heat, NB * MSFP_HEAT) && msfp_all_finite(s->monitor_heat, 2 * NB),
-            "heat, monitor_heat: give finite numbers");
-    return MSFP_OK;
+    REQUIRE(s->end_time >= s->start_time, "end_time: give a time that is not before start_time [s]");
+    REQUIRE(s->output_step == 0.0 || (s->end_time - s->start_time) / s->output_step <= MSFP_MAX_ROWS,
+            "output_step: the rows exceed the limit of 1e8; give a longer one [s]");
+    REQUIRE(!MSFP_HEAT || s->end_time - s->start_time <= MSFP_LONGEST_HEATING,
+            "end_time: heating is computed for 1000 s; give at most that, or a law without temperature [s]");
+    return check_histories(s, message);
+}
+
+/* ---- identity ---- */
+
+static uint64_t hash_number(uint64_t sum, double x) { return msfp_hash(sum, &x, sizeof x); }
+
+static uint64_t hash_list(uint64_t sum, const double *values, int count)
+{
+    return msfp_hash(msfp_hash(sum, &count, sizeof count), values, (size_t)count * sizeof *values);
+}
+
+static uint64_t hash_history(uint64_t sum, const msfp_piecewise *h)
+{
+    sum = hash_list(sum, h->knots, h->pieces ? h->pieces + 1 : 0);
+    return hash_list(sum, h->coefficients, h->pieces * 6 * (MSFP_DEGREE + 1));
+}
+
+static uint64_t hash_array(uint64_t sum, const msfp_array *array, const double *values)
+{
+    if (!values && !array->zero)
+        return hash_number(sum, NAN);
+    for (size_t i = 0; i < array->count; ++i)
+        sum = hash_number(sum, values ? values[i] : 0.0);
+    return sum;
+}
+
+uint64_t msfp_identity(const msfp_scene *s)
+{
+    static const char model[] = MSFP_VERSION " " MSFP_SPEC;
+    uint64_t sum = msfp_hash(MSFP_HASH_START, model, sizeof model);
+    sum = msfp_hash(sum, &s->bearing->parameters, sizeof s->bearing->parameters); /* numbers alone */
+    for (size_t i = 0; i < COUNT(msfp_scene_ranges); ++i)
+        sum = hash_number(sum, number_at(s, msfp_scene_ranges[i].at));
+    for (size_t i = 0; i < COUNT(switches); ++i)
+        sum = hash_number(sum, integer_at(s, switches[i].at));
+    for (size_t i = 0; i < COUNT(msfp_scene_arrays); ++i)
+        sum = hash_array(sum, msfp_scene_arrays + i, values_at(s, msfp_scene_arrays[i].range.at));
+    for (size_t i = 0; i < COUNT(lists); ++i)
+        sum = hash_list(sum, values_at(s, lists[i].at), integer_at(s, lists[i].count));
+    sum = hash_list(sum, s->span_steps, s->span_count);
+    sum = hash_history(sum, &s->motion);
+    sum = hash_history(sum, &s->load);
+    sum = hash_history(sum, &s->support);
+    return sum ? sum : 1; /* 0: of any scene */
+}
+
+uint64_t msfp_port_identity(const msfp_scene *s, double axial_load, int loaded)
+{
+    msfp_scene fixed = *s;
+    fixed.start_time = fixed.end_time = 0.0; /* its committed state may be of any time */
+    return hash_number(hash_number(msfp_identity(&fixed), axial_load), loaded);
 }
 
 /* ---- the two-port ---- */
 
 static int check_interface(const double *top, const char **message)
 {
-    REQUIRE(top[MSFP_TOP_PARAMETERS_K] > 0.0 && top[MSFP_TOP_PARAMETERS_KV] > 0.0 && top[MSFP_TOP_PARAMETERS_KR] > 0.0,
-            "bearing: top: give stiffness, vertical_stiffness and rotational_stiffness of the interface above 0");
+    const double values[MSFP_TOP_VALUES] = { [MSFP_TOP_VALUE_STIFFNESS] = top[MSFP_TOP_PARAMETERS_K],
+                                             [MSFP_TOP_VALUE_VERTICAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KV],
+                                             [MSFP_TOP_VALUE_ROTATIONAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KR] };
     REQUIRE(top[MSFP_TOP_PARAMETERS_M] == 0.0, "bearing: top: a two-port supports no mass; give mass = 0");
 #if !MSFP_PLANAR /* others were refused */
     REQUIRE(top[MSFP_TOP_PARAMETERS_X0X] == 0.0 && top[MSFP_TOP_PARAMETERS_X0Y] == 0.0,
             "bearing: top: the upper end is the anchor of a two-port; give anchor_x = anchor_y = 0");
 #endif
-    return MSFP_OK;
+    return CHECK(msfp_interface_ranges, values);
 }
 
 /* Coordinates of a bearing that is centred: separations alone. */
@@ -206,7 +323,6 @@ static int centred(const double *q)
 /* What both kinds of two-port ask of a scene. */
 static int check_ends(const msfp_scene *s, const char **message)
 {
-    REQUIRE(fabs(s->start_time) < INFINITY, "start_time: give a finite time [s]");
     REQUIRE(s->method != MSFP_METHOD_DOPRI5, "method: give MSFP_METHOD_IMPLICIT or MSFP_METHOD_ESDIRK4");
     REQUIRE(!s->motion.pieces && !s->load.pieces && !s->support.pieces && !s->jump_count,
             "motion, load, support, jumps: leave them out; the ends of a two-port move as its trials say");
@@ -217,8 +333,7 @@ static int check_ends(const msfp_scene *s, const char **message)
     REQUIRE(!s->v && !s->f && !s->foot && !s->heat && !s->origin && !s->monitor_heat,
             "v, f, foot, heat, origin, monitor_heat: leave them out; a two-port starts at rest");
     REQUIRE(centred(s->q), "q: give zero angles and finite separations; a two-port starts centred");
-    const int status = check_solver(s, message);
-    return status ? status : check_monitors(s, message);
+    return check_values(s, message);
 }
 
 int msfp_check_port(const msfp_scene *s, double axial_load, const char **message)
@@ -229,24 +344,21 @@ int msfp_check_port(const msfp_scene *s, double axial_load, const char **message
     REQUIRE(s->bearing, "bearing: give a bearing of bearing_new");
     REQUIRE(!MSFP_PLANAR && MSFP_SPIN_LOCKED && MSFP_TOP_ROTATION,
             "bearing: give one of a model for two-ports; export it with --top-rotation, in space, with locked spin");
-    REQUIRE(natural(axial_load, 0), "axial_load: give a finite number of at least 0 [N]");
-    const int status = check_ends(s, message);
+    int status = CHECK(msfp_axial_load_ranges, &axial_load);
+    status = status ? status : check_ends(s, message);
     return status ? status : check_interface(s->bearing->parameters.top, message);
 }
 
 int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const double *ends)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     if (port->committed.status)
         return port->committed.status;
-    const int size = NB * MSFP_NQ;
     if (port->loaded || !state || !state->q || !state->v || !state->f || !ends || !msfp_valid_ends(ends, 0) ||
-        !(fabs(state->start_time) < INFINITY) || (state->heat && !MSFP_HEAT))
+        !(fabs(state->start_time) < INFINITY))
         return MSFP_E_ARGUMENT;
-    const int finite = msfp_all_finite(state->q, size) && msfp_all_finite(state->v, size) &&
-                       msfp_all_finite(state->f, 2 * NB) && msfp_all_finite(state->foot, 2) &&
-                       msfp_all_finite(state->origin, 3) && msfp_all_finite(state->heat, NB * MSFP_HEAT) &&
-                       msfp_all_finite(state->monitor_heat, 2 * NB);
-    return finite ? MSFP_OK : MSFP_E_FINITE;
+    return check_arrays(state, NULL);
 }
 
 int msfp_check_port_loaded(const msfp_scene *s, const char **message)
@@ -261,6 +373,38 @@ int msfp_check_port_loaded(const msfp_scene *s, const char **message)
     REQUIRE(top[MSFP_TOP_PARAMETERS_M] > 0.0, "bearing: top: give the supported mass above 0");
     return check_ends(s, message);
 }
+
+#if MSFP_GRADIENTS
+/* Whether an index into derivatives of a history is one, -1: zero; one history of each parameter at most. */
+static int valid_column(double index, int count, const double *coefficients, size_t size)
+{
+    if (!(index >= -1.0 && index < count && floor(index) == index))
+        return 0;
+    return index < 0.0 || (coefficients && msfp_all_finite(coefficients + (size_t)index * size, size));
+}
+
+int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *in)
+{
+    if (!run || run->gradients || run->counts[MSFP_COUNT_STEPS] || run->callback || !in || in->count < 0 ||
+        in->count > MOST_ITEMS || in->step_count < 0 || in->step_count > MOST_ITEMS ||
+        (in->step_count && !(in->steps && rising(in->steps, in->step_count, 1) && in->steps[0] > run->now.t)))
+        return MSFP_E_ARGUMENT;
+    const struct {
+        const double *values;
+        size_t of_each;
+    } arrays[] = { { in->gravity, 1 },    { in->bodies, (NB + 1) * MSFP_BODY_VALUES }, { in->surfaces, NB * MSFP_SURFACE_VALUES },
+                   { in->top, MSFP_TOP_VALUES }, { in->q, NB * MSFP_NQ }, { in->v, NB * MSFP_NQ }, { in->f, NB * 2 },
+                   { in->motion, 1 },     { in->load, 1 } };
+    for (size_t i = 0; in->count && i < COUNT(arrays); ++i)
+        if (!arrays[i].values || !msfp_all_finite(arrays[i].values, arrays[i].of_each * (size_t)in->count))
+            return MSFP_E_ARGUMENT;
+    const size_t motion = (size_t)run->motion.pieces * 6 * (MSFP_DEGREE + 1), load = (size_t)run->load.pieces * 6 * (MSFP_DEGREE + 1);
+    for (int i = 0; i < in->count; ++i)
+        if (!valid_column(in->motion[i], in->count, in->motions, motion) || !valid_column(in->load[i], in->count, in->loads, load))
+            return MSFP_E_ARGUMENT;
+    return MSFP_OK;
+}
+#endif
 
 int msfp_check_trial(const msfp_port *port, double time, const double *ends, const char **message)
 {

@@ -19,13 +19,24 @@ static void give(double *to, const void *from, size_t size)
         memcpy(to, from, size);
 }
 
+/* The friction state of a run exceeds the unit disc by the error of a step; a run that starts from it must not. */
+static void give_friction(const double f[NB][2], double *to)
+{
+    for (int j = 0; j < NB; ++j) {
+        const double size = sqrt(f[j][0] * f[j][0] + f[j][1] * f[j][1]), factor = size > 1.0 ? 1.0 / size : 1.0;
+        to[2 * j] = factor * f[j][0];
+        to[2 * j + 1] = factor * f[j][1];
+    }
+}
+
 void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
 {
     const msfp_state *now = &run->now;
     state->time = now->t;
     give(state->q, now->q, sizeof now->q);
     give(state->v, now->v, sizeof now->v);
-    give(state->f, now->f, sizeof now->f);
+    if (state->f)
+        give_friction(now->f, state->f);
     give(state->foot, now->foot, 2 * sizeof *now->foot);
 #if MSFP_HEAT
     give(state->heat, now->heat, sizeof now->heat);
@@ -77,11 +88,15 @@ static int status_of_snapshot(int status) { return status == MSFP_E_FINITE ? MSF
 
 int msfp_api_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
 {
+    if (!run)
+        return MSFP_E_ARGUMENT;
     return snapshot ? status_of_snapshot(msfp_snapshot_read(run, snapshot, size)) : MSFP_E_SNAPSHOT;
 }
 
 int msfp_api_snapshot_open(const void *snapshot, size_t size, msfp_run **run)
 {
+    if (!run)
+        return MSFP_E_ARGUMENT;
     *run = calloc(1, sizeof **run);
     if (!*run)
         return MSFP_E_MEMORY;

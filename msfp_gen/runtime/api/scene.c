@@ -99,6 +99,7 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
         memcpy(made->monitor.peak, scene->monitor_heat + NB, sizeof made->monitor.peak);
     }
     made->options.origin = made->options.foot = made->options.heat = NULL; /* need not outlive this call */
+    made->identity = msfp_identity(scene);
     *run = made;
     return made->status;
 }
@@ -109,6 +110,16 @@ void msfp_api_run_free(msfp_run *run)
         msfp_run_free(run);
     free(run);
 }
+
+int msfp_api_run_record(msfp_run *run) { return run ? msfp_write_now(run) : MSFP_E_ARGUMENT; }
+
+#if MSFP_GRADIENTS
+int msfp_api_gradients_start(msfp_run *run, const msfp_gradient_inputs *inputs)
+{
+    const int wrong = msfp_check_gradients(run, inputs);
+    return wrong ? wrong : msfp_gradients_start(run, inputs);
+}
+#endif
 
 /* Hand over the rows that the callback has not received, and keep the last one. Returns what the callback returns. */
 static int deliver(msfp_run *run)

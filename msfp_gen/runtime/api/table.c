@@ -74,7 +74,7 @@ static const msfp_api table = {
     .run_events = msfp_api_run_events,
     .run_rows = msfp_api_run_rows,
     .run_on_rows = msfp_api_run_on_rows,
-    .run_record = msfp_write_now,
+    .run_record = msfp_api_run_record,
     .run_hold_rows = msfp_api_run_hold_rows,
     .run_drop_rows = msfp_drop_rows,
     .snapshot_size = msfp_snapshot_size,
@@ -96,7 +96,7 @@ static const msfp_api table = {
     .port_snapshot_write = msfp_port_snapshot_write,
     .port_snapshot_read = msfp_api_port_snapshot_read,
 #if MSFP_GRADIENTS
-    .gradients_start = msfp_gradients_start,
+    .gradients_start = msfp_api_gradients_start,
     .gradient_rows = msfp_gradient_rows,
     .gradient_events = msfp_gradient_events,
     .gradient_extremes = msfp_gradient_extremes,

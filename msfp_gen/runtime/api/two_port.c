@@ -3,34 +3,34 @@
 #include <string.h>
 #include "api.h"
 
-int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message)
+static int new_port(const msfp_scene *scene, double axial_load, int loaded, msfp_port **port)
 {
     static const double centred[MSFP_NB * MSFP_NQ] = { 0.0 };
+    msfp_options options = msfp_scene_options(scene);
+    options.duration = options.start_time + 1.0;
+    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred, loaded);
+    if (!*port)
+        return MSFP_E_MEMORY;
+    (*port)->committed.identity = msfp_port_identity(scene, axial_load, loaded);
+    return (*port)->committed.status;
+}
+
+int msfp_api_port_new(const msfp_scene *scene, double axial_load, msfp_port **port, const char **message)
+{
     if (!port)
         return msfp_refuse(message, "port: give the address of a handle");
     *port = NULL;
     const int wrong = msfp_check_port(scene, axial_load, message);
-    if (wrong)
-        return wrong;
-    msfp_options options = msfp_scene_options(scene);
-    options.duration = options.start_time + 1.0;
-    *port = msfp_port_new(&scene->bearing->parameters, &options, axial_load, scene->q ? scene->q : centred, 0);
-    return *port ? (*port)->committed.status : MSFP_E_MEMORY;
+    return wrong ? wrong : new_port(scene, axial_load, 0, port);
 }
 
 int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message)
 {
-    static const double centred[MSFP_NB * MSFP_NQ] = { 0.0 };
     if (!port)
         return msfp_refuse(message, "port: give the address of a handle");
     *port = NULL;
     const int wrong = msfp_check_port_loaded(scene, message);
-    if (wrong)
-        return wrong;
-    msfp_options options = msfp_scene_options(scene);
-    options.duration = options.start_time + 1.0;
-    *port = msfp_port_new(&scene->bearing->parameters, &options, 0.0, scene->q ? scene->q : centred, 1);
-    return *port ? (*port)->committed.status : MSFP_E_MEMORY;
+    return wrong ? wrong : new_port(scene, 0.0, 1, port);
 }
 
 int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const char **message)
@@ -41,6 +41,8 @@ int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const 
 
 int msfp_api_port_wrench(const msfp_port *port, double *wrench)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     if (port->committed.status)
         return port->committed.status;
     if (!wrench)
@@ -88,6 +90,8 @@ int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, 
 
 int msfp_api_port_row(const msfp_port *port, double *row)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     if (port->committed.status)
         return port->committed.status;
     if (!row)
@@ -114,6 +118,8 @@ int msfp_api_port_commit(msfp_port *port) { return port ? msfp_port_commit(port)
 
 int msfp_api_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     return snapshot ? msfp_port_snapshot_read(port, snapshot, size) : MSFP_E_SNAPSHOT;
 }
 
@@ -135,6 +141,8 @@ int msfp_api_port_method(int method, msfp_method_stages *stages)
 
 int msfp_api_port_step_begin(msfp_port *port, double step, const double *expected)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     if (port->committed.status)
         return port->committed.status;
     if (port->loaded || !(step > 0.0 && step < INFINITY) || !expected || !msfp_all_finite(expected, 2))
@@ -145,7 +153,7 @@ int msfp_api_port_step_begin(msfp_port *port, double step, const double *expecte
 
 int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *wrench)
 {
-    const int now = port->step.stage;
+    const int now = port ? port->step.stage : MSFP_NO_STEP;
     if (now < 0 || stage < 1 || (stage != now && (stage != now + 1 || !port->step.solved)) || stage >= port->step.stages.method->stages ||
         !wrench)
         return MSFP_E_ARGUMENT;
@@ -156,26 +164,28 @@ int msfp_api_port_stage(msfp_port *port, int stage, const double *ends, double *
 
 int msfp_api_port_stage_derivative(msfp_port *port, double *derivative)
 {
-    if (port->step.stage < 1 || !port->step.solved || !derivative)
+    if (!port || port->step.stage < 1 || !port->step.solved || !derivative)
         return MSFP_E_ARGUMENT;
     return msfp_port_stage_derivative(port, derivative);
 }
 
 int msfp_api_port_step_end(msfp_port *port, double *error, double *share)
 {
-    const msfp_port_step *step = &port->step;
-    if (step->stage < 1 || step->stage != step->stages.method->stages - 1 || !step->solved || !error || !share)
+    const msfp_port_step *step = port ? &port->step : NULL;
+    if (!step || step->stage < 1 || step->stage != step->stages.method->stages - 1 || !step->solved || !error || !share)
         return MSFP_E_ARGUMENT;
     return msfp_port_step_end(port, error, share);
 }
 
 int msfp_api_port_step_commit(msfp_port *port, double time)
 {
-    return time > port->committed.now.t && time < INFINITY ? msfp_port_step_commit(port, time) : MSFP_E_ARGUMENT;
+    return port && time > port->committed.now.t && time < INFINITY ? msfp_port_step_commit(port, time) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_jump(msfp_port *port, const double *ends)
 {
+    if (!port)
+        return MSFP_E_ARGUMENT;
     if (port->committed.status)
         return port->committed.status;
     return !port->loaded && ends && msfp_valid_ends(ends, 0) ? msfp_port_jump(port, ends) : MSFP_E_ARGUMENT;
@@ -183,9 +193,9 @@ int msfp_api_port_jump(msfp_port *port, const double *ends)
 
 int msfp_api_port_cause(msfp_port *port, int status, msfp_progress *cause)
 {
-    msfp_run *run = &port->committed;
-    if (port->loaded || !cause)
+    if (!port || port->loaded || !cause)
         return MSFP_E_ARGUMENT;
+    msfp_run *run = &port->committed;
     status = run->status ? run->status : msfp_port_cause(port, status);
     *cause = (msfp_progress){ status, run->status_surface, run->status_value, run->now.t, run->h, 0 };
     return status;

@@ -108,6 +108,8 @@ const double *msfp_gradient_events(const msfp_run *run, size_t *count)
 
 void msfp_gradient_extremes(const msfp_run *run, int parameter, double *out)
 {
+    if (!run->gradients || parameter < 0 || parameter >= run->gradients->count)
+        return;
     const msfp_group *group = &run->gradients->group[parameter / C];
     for (size_t i = 0; i < sizeof(msfp_extremes) / sizeof(double); ++i)
         out[i] = group->extremes[i][parameter % C];

@@ -176,6 +176,8 @@ int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], d
         for (int i = 0; i < FREEDOMS; ++i)
             found[i * FREEDOMS + j] = (pair[1][i] - pair[0][i]) / (2.0 * step);
     }
+    if (!msfp_all_finite(found, FREEDOMS * FREEDOMS)) /* along a direction beyond all measure */
+        return MSFP_E_FINITE;
     memcpy(derivative, found, sizeof found);
     return MSFP_OK;
 }

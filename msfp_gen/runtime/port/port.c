@@ -1,6 +1,5 @@
 /* port.c: trials of a two-port, their wrenches, and its snapshots. */
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "port.h"
@@ -51,7 +50,9 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
 static int begin(msfp_port *port, const msfp_parameters *p, const msfp_options *options, const double *q,
                  const double *v, const double *f)
 {
+    const uint64_t identity = port->committed.identity;
     const int status = start(port, p, options, q, v, f);
+    port->committed.identity = identity;
     port->run = port->committed;
     port->run.rows = NULL;
     port->run.events = NULL;
@@ -313,7 +314,7 @@ void msfp_port_snapshot_write(const msfp_port *port, void *snapshot)
     memcpy(h.wrench, port->wrench, sizeof h.wrench);
     memcpy(h.moves, port->step.moves, sizeof h.moves);
     h.moved = port->step.moved;
-    const uint64_t sum = msfp_checksum(&h, sizeof h);
+    const uint64_t sum = msfp_hash(MSFP_HASH_START, &h, sizeof h);
     memcpy(snapshot, &h, sizeof h);
     memcpy((char *)snapshot + sizeof h, &sum, sizeof sum);
     msfp_snapshot_write(&port->committed, 1, (char *)snapshot + HEAD);
@@ -327,7 +328,7 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size)
         return MSFP_E_SNAPSHOT;
     memcpy(&h, snapshot, sizeof h);
     memcpy(&sum, (const char *)snapshot + sizeof h, sizeof sum);
-    if (sum != msfp_checksum(&h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
+    if (sum != msfp_hash(MSFP_HASH_START, &h, sizeof h) || !msfp_valid_ends(&h.from.of[0][0][0], port->loaded) ||
         !msfp_all_finite(h.wrench, MSFP_PORT_FREEDOMS) ||
         !msfp_all_finite(&h.moves[0][0], MSFP_DOF * MSFP_END_FREEDOMS))
         return MSFP_E_SNAPSHOT;

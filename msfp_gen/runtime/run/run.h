@@ -1,7 +1,6 @@
 /* run.h: what the files of run/ share. Private to the runtime. */
 #ifndef MSFP_RUN_H
 #define MSFP_RUN_H
-#include <stdint.h>
 #include "steppers.h"
 
 /* ---- run.c ---- */
@@ -76,8 +75,6 @@ int msfp_write_event(msfp_run *run, const msfp_state *s, int surface, int kind);
 
 /* Whether all of `count` numbers are finite; NULL counts as finite. */
 int msfp_all_finite(const double *values, size_t count);
-/* A number that tells damaged bytes from sound ones. */
-uint64_t msfp_checksum(const void *data, size_t size);
 
 /* ---- gradients: the hooks of models with them; those that return an int return a status ---- */
 #if MSFP_GRADIENTS

@@ -1,42 +1,27 @@
 /* snapshot.c: the state of a run as bytes that hold no pointer, and a run that continues from them.
  *
  * A snapshot is a header, the part of msfp_run from MSFP_SNAPSHOT_BEGIN to MSFP_SNAPSHOT_END, rows, and events. It is
- * read by the same build of the same model only. Nothing that is read is trusted: the checksum finds damage, and every
+ * read by a run of the same scene and the same build only. Nothing that is read is trusted: the checksum finds damage, and every
  * number that is used as an index, a count or a state is checked, so that a forged file cannot corrupt memory.
  */
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "run.h"
 
-#define VERSION 1
+#define VERSION 2
 
 static const char magic[8] = { 'M', 'S', 'F', 'P', 'S', 'N', 'A', 'P' };
 
 typedef struct {
     char magic[8];
-    uint64_t version, row_size, event_size; /* row and event tell layouts and effects apart */
+    uint64_t version, row_size, event_size;
+    uint64_t identity; /* of all that the run computes from */
     uint64_t state_size, row_count, event_count;
     uint64_t checksum; /* of all that follows */
 } header;
 
 static size_t state_size(void) { return MSFP_SNAPSHOT_END - MSFP_SNAPSHOT_BEGIN; }
-
-/* FNV-1a over words of eight bytes, then over the bytes that are left. */
-uint64_t msfp_checksum(const void *data, size_t size)
-{
-    const unsigned char *bytes = data;
-    uint64_t sum = 14695981039346656037u, word;
-    size_t i = 0;
-    for (; i + sizeof word <= size; i += sizeof word) {
-        memcpy(&word, bytes + i, sizeof word);
-        sum = (sum ^ word) * 1099511628211u;
-    }
-    for (; i < size; ++i)
-        sum = (sum ^ bytes[i]) * 1099511628211u;
-    return sum;
-}
 
 /* Rows that a snapshot holds: the last `most`, all where that is negative. */
 static size_t kept_rows(const msfp_run *run, long most)
@@ -56,7 +41,7 @@ size_t msfp_snapshot_size(const msfp_run *run, long rows)
 
 void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot)
 {
-    header h = { .version = VERSION, .row_size = sizeof(msfp_row), .event_size = sizeof(msfp_event) };
+    header h = { .version = VERSION, .row_size = sizeof(msfp_row), .event_size = sizeof(msfp_event), .identity = run->identity };
     unsigned char *body = (unsigned char *)snapshot + sizeof h, *to = body;
     memcpy(h.magic, magic, sizeof magic);
     h.state_size = state_size();
@@ -71,7 +56,7 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot)
     to += h.row_count * sizeof(msfp_row);
     if (h.event_count)
         memcpy(to, run->events, h.event_count * sizeof(msfp_event));
-    h.checksum = msfp_checksum(body, body_size(h.row_count, h.event_count));
+    h.checksum = msfp_hash(MSFP_HASH_START, body, body_size(h.row_count, h.event_count));
     memcpy(snapshot, &h, sizeof h);
 }
 
@@ -150,14 +135,16 @@ static void *copied(const unsigned char *items, size_t size)
     return copy;
 }
 
-static int valid_header(const header *h, const unsigned char *body, size_t size)
+static int valid_header(const header *h, uint64_t identity, const unsigned char *body, size_t size)
 {
+    if (identity && h->identity != identity)
+        return 0;
     if (memcmp(h->magic, magic, sizeof magic) || h->version != VERSION || h->state_size != state_size()
         || h->row_size != sizeof(msfp_row) || h->event_size != sizeof(msfp_event))
         return 0;
     if (h->row_count > size / sizeof(msfp_row) || h->event_count > size / sizeof(msfp_event)) /* no sum overflows */
         return 0;
-    return size == body_size(h->row_count, h->event_count) && msfp_checksum(body, size) == h->checksum;
+    return size == body_size(h->row_count, h->event_count) && msfp_hash(MSFP_HASH_START, body, size) == h->checksum;
 }
 
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
@@ -168,10 +155,11 @@ int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size)
     if (size < sizeof h)
         return MSFP_E_FINITE;
     memcpy(&h, snapshot, sizeof h);
-    if (!valid_header(&h, body, size - sizeof h))
+    if (!valid_header(&h, run->identity, body, size - sizeof h))
         return MSFP_E_FINITE;
     memcpy((char *)&found + MSFP_SNAPSHOT_BEGIN, body, state_size());
     body += state_size();
+    found.identity = h.identity;
     found.stop = found.span = 0; /* searches by time begin anew */
     found.rows = copied(body, h.row_count * sizeof(msfp_row));
     found.events = copied(body + h.row_count * sizeof(msfp_row), h.event_count * sizeof(msfp_event));

@@ -11,8 +11,11 @@
 #include <stddef.h>
 #include "msfp_symbols.h"
 #include "msfp.h"
+#include "msfp_hash.h"
 #include "msfp_math.h"
 
+#define MSFP_VERSION "0.2.0"
+#define MSFP_SPEC "2_1_0-planar-locked-inertial-rims-report-constant"
 #define MSFP_N 2            /* bodies, base included */
 #define MSFP_NB 1           /* moving bodies = sliding surfaces */
 #define MSFP_LANES 1        /* MSFP_NB rounded up to full vectors; spare lanes repeat the last surface */

@@ -11,8 +11,11 @@
 #include <stddef.h>
 #include "msfp_symbols.h"
 #include "msfp.h"
+#include "msfp_hash.h"
 #include "msfp_math.h"
 
+#define MSFP_VERSION "0.2.0"
+#define MSFP_SPEC "5_2_2-spatial-locked-inertial-rims-report-velocity"
 #define MSFP_N 5            /* bodies, base included */
 #define MSFP_NB 4           /* moving bodies = sliding surfaces */
 #define MSFP_LANES 4        /* MSFP_NB rounded up to full vectors; spare lanes repeat the last surface */

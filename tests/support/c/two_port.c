@@ -129,13 +129,13 @@ static void refusals(const msfp_scene *scene, msfp_port *port, const double *las
     api->port_free(NULL);
 }
 
-/* Functions of steps by stages where there is nothing to step. */
+/* Functions of steps by stages where there is nothing to step: nothing presses the faces of a bearing together. */
 static void failed_start(const msfp_scene *scene)
 {
     const double ends[36] = { 0.0 };
     msfp_progress cause;
     msfp_port *port;
-    const int status = api->port_new(scene, 1e300, &port, NULL);
+    const int status = api->port_new(scene, 0.0, &port, NULL);
     if (status == MSFP_OK || status >= MSFP_E_ARGUMENT || !port)
         puts("no failed start");
     else if (api->port_jump(port, ends) != status || api->port_cause(port, MSFP_E_NEWTON, &cause) != status ||
@@ -180,8 +180,12 @@ int main(void)
     }
     print(derivative, 144);
     refusals(&scene, port, ends);
+    msfp_bearing *weightless;
+    require(api->bearing_new(0.0, bodies, surfaces, top, &weightless, NULL));
+    scene.bearing = weightless;
     failed_start(&scene);
-    top[MSFP_5_2_2_TOP_MASS] = 1.0;
+    api->bearing_free(weightless);
+    top[MSFP_5_2_2_TOP_MASS] = top[MSFP_5_2_2_TOP_INERTIA_TRANSVERSE] = top[MSFP_5_2_2_TOP_INERTIA_AXIAL] = 1.0;
     msfp_bearing *loaded;
     require(api->bearing_new(gravity, bodies, surfaces, top, &loaded, NULL));
     scene.bearing = loaded;

@@ -203,7 +203,7 @@ def test_what_it_refuses_is_named(unit: Path) -> None:
         at_work.set("surface[2].radius", -1.0)
         with pytest.raises(FMICallException):
             at_work.start()
-        assert "parameters: surfaces: radius: give a number above 0 [m]" in at_work.messages[-1]
+        assert "parameters: surfaces: radius: give a finite number above 0 [m]" in at_work.messages[-1]
         at_work.set("surface[2].radius", 1.0)
         at_work.fmu.exitInitializationMode()
         with pytest.raises(FMICallException):
