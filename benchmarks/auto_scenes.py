@@ -173,4 +173,40 @@ def slow_test(seed: int, number: int) -> Scene:
     return Scene(bearing, motion, top, effects, Solver(), load=history, name=f"{what.bearing}, slow {number}")
 
 
+def demanding(seed: int, number: int) -> Scene:
+    """Scene `number` of a seed that needs most of what `Auto` may leave out: surfaces that heat at earthquake velocities,
+    rims, pulses of the load that open surfaces, heavy sliders.
+    """
+    draw = Draw(seed, number)
+    law = draw.one(["pv"] * 3 + ["velocity", "constant"])
+    what = Chosen(draw.one(["single-articulated-fp", "double-fp", "fenz-tfp"]), law, "report")
+    bearing = a_bearing(draw, what)
+    bearing = bearing.replace(mass=[draw.decades((1.0, 10.0)) * body.mass for body in bearing.bodies])
+    load = draw.decades((200.0, 3000.0)) * GRAVITY * sum(body.mass for body in bearing.bodies)
+    size = reach(bearing) * draw.one([0.2, 0.5, 0.8, 1.1])
+    frequency = min(draw.decades((0.1, 1.0)), FASTEST / (2 * pi * size), float(np.sqrt(STRONGEST / size)) / (2 * pi))
+    motion = Motion.harmonic(size, frequency, direction=draw.one([0.0, 0.7]), cycles=2.0)
+    if draw.chance(0.3):
+        motion = Motion.circle(size, 2 * pi * frequency, cycles=1.5, lead_in=1.0 / frequency)
+    top: Top = Top.rig(load, 1e3 * load, 0.05 * load, 10.0 * load, 0.01 * load)
+    bounce = draw.one([5.0, 10.0])  # of a sprung mass [Hz]
+    if draw.chance(0.5):
+        rate = 2 * pi * bounce
+        vertical = (load / GRAVITY * rate**2, 0.1 * load / GRAVITY * rate)
+        top = Top.mass(load / GRAVITY, 0.03 * load / GRAVITY, 0.5, 100.0 * load, 0.1 * load, *vertical)
+    history = a_pulse(draw, load, motion.duration, 0.5 / bounce) if draw.chance(0.4) else None
+    return Scene(bearing, motion, top, Auto(), Solver(), load=history, name=f"{what.bearing}, demanding {number}")
+
+
+def a_pulse(draw: Draw, load: float, duration: float, length: float) -> Load:
+    """An upward force [N] over `length` [s] within the run, of half to nearly all of the axial load.
+
+    A sprung mass answers with up to twice the force, so that some surfaces open without warning by the load itself.
+    """
+    begin = draw.flat(0.3, 0.6) * duration
+    size = draw.flat(0.5, 0.95) * load
+    times = [0.0, begin, begin + 0.2 * length, begin + 0.8 * length, begin + length, duration]
+    return Load.from_arrays(times, np.outer([0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, size]))
+
+
 KINDS = (scene, slow_test)
