@@ -175,7 +175,7 @@ def slow_test(seed: int, number: int) -> Scene:
 
 def demanding(seed: int, number: int) -> Scene:
     """Scene `number` of a seed that needs most of what `Auto` may leave out: surfaces that heat at earthquake velocities,
-    rims, pulses of the load that open surfaces, heavy sliders.
+    rims, varying loads, sprung masses that lift off in the course of the run, heavy sliders.
     """
     draw = Draw(seed, number)
     law = draw.one(["pv"] * 3 + ["velocity", "constant"])
@@ -188,25 +188,27 @@ def demanding(seed: int, number: int) -> Scene:
     motion = Motion.harmonic(size, frequency, direction=draw.one([0.0, 0.7]), cycles=2.0)
     if draw.chance(0.3):
         motion = Motion.circle(size, 2 * pi * frequency, cycles=1.5, lead_in=1.0 / frequency)
-    top: Top = Top.rig(load, 1e3 * load, 0.05 * load, 10.0 * load, 0.01 * load)
-    bounce = draw.one([5.0, 10.0])  # of a sprung mass [Hz]
+    effects = Auto(bouc_wen=what.hysteresis)
+    name = f"{what.bearing}, demanding {number}"
     if draw.chance(0.5):
-        rate = 2 * pi * bounce
-        vertical = (load / GRAVITY * rate**2, 0.1 * load / GRAVITY * rate)
-        top = Top.mass(load / GRAVITY, 0.03 * load / GRAVITY, 0.5, 100.0 * load, 0.1 * load, *vertical)
-    history = a_pulse(draw, load, motion.duration, 0.5 / bounce) if draw.chance(0.4) else None
-    return Scene(bearing, motion, top, Auto(), Solver(), load=history, name=f"{what.bearing}, demanding {number}")
+        top: Top = Top.rig(load, 1e3 * load, 0.05 * load, 10.0 * load, 0.01 * load)
+        return Scene(bearing, motion, top, effects, load=a_load(draw, top, motion.duration), name=name)
+    mass, rate = load / GRAVITY, 2 * pi * draw.one([5.0, 10.0])
+    top = Top.mass(mass, 0.03 * mass, 0.5, 100.0 * load, 0.1 * load, mass * rate**2, 0.1 * mass * rate)
+    if draw.chance(0.6):
+        motion += a_jolt(draw, motion.duration, rate)
+    return Scene(bearing, motion, top, effects, name=name)
 
 
-def a_pulse(draw: Draw, load: float, duration: float, length: float) -> Load:
-    """An upward force [N] over `length` [s] within the run, of half to nearly all of the axial load.
-
-    A sprung mass answers with up to twice the force, so that some surfaces open without warning by the load itself.
+def a_jolt(draw: Draw, duration: float, rate: float) -> Motion:
+    """Three vertical cycles of the base at the rate [rad/s] of a sprung mass, which answers with several times their
+    acceleration, so that surfaces may open although the motion itself does not announce it.
     """
-    begin = draw.flat(0.3, 0.6) * duration
-    size = draw.flat(0.5, 0.95) * load
-    times = [0.0, begin, begin + 0.2 * length, begin + 0.8 * length, begin + length, duration]
-    return Load.from_arrays(times, np.outer([0.0, 0.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, size]))
+    time = np.linspace(0.0, duration, 1 + int(20 * rate * duration / (2 * pi)))
+    phase = rate * (time - draw.flat(0.3, 0.6) * duration)
+    burst = np.where((phase > 0) & (phase < 6 * pi), np.sin(phase) * np.sin(phase / 6) ** 2, 0.0)
+    acceleration = draw.flat(0.1, 0.5) * GRAVITY
+    return Motion.from_arrays(time, np.outer(acceleration / rate**2 * burst, [0.0, 0.0, 1.0]))
 
 
 KINDS = (scene, slow_test)

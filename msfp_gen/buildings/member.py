@@ -101,6 +101,6 @@ class Member:
         at = RestartState.of_port(other.port)
         q, v, f = transferred_state(self.rest.bearing, self.model, at)
         law = self.effects.law
-        heat = at.heat if law is not None and law.depends_on_temperature else None
+        heat = at.temperature_parts if law is not None and law.depends_on_temperature else None
         state = {"origin": at.origin, "monitor_heat": at.monitor_heat, "foot": transferred_foot(at, q), "heat": heat}
         self.port.enter(at.time, q, v, f, ends, **state)

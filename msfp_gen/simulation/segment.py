@@ -104,8 +104,8 @@ def start_run(
         origin = out_of_plane(at.origin, at.azimuth, "vector") if becomes_spatial else at.origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
         options["foot"] = transferred_foot(at, q)
-        if at.heat is not None and model.effects.law is not None and model.effects.law.depends_on_temperature:
-            options["heat"] = at.heat
+        if model.effects.law is not None and model.effects.law.depends_on_temperature:
+            options["heat"] = at.temperature_parts
     run: Run = model.extension.Run(
         stack,
         *snapped(frame.motion.knots, frame.motion.coefficients, grid.stops),

@@ -112,7 +112,7 @@ MONITORS = (
     Word("rims", "a slider is beyond the capacity of its surface [m]"),
     Word("uplift", "a normal force is below its least value, or above its largest [N]"),
     Word("inertia", "inertial force of a slider over the normal force below it"),
-    Word("heat", "bound of the temperature rise of a surface [K]"),
+    Word("heat", "temperature rise of a surface [K]"),
     Word("law_speed", "slip velocity outside the range in which the friction law was checked [m/s]"),
     Word("law_load", "normal force outside that range [N]"),
     Word("law_temperature", "temperature outside that range [degC]"),

@@ -143,6 +143,8 @@ static int check_monitors(const msfp_scene *s, const char **message)
             "monitor_peak, monitor_inertia, monitor_time, monitor_rise, law_speed: give numbers of at least 0");
     for (int j = 0; s->monitor_heating && j < NB; ++j)
         REQUIRE(natural(s->monitor_heating[j], 1), "monitor_heating: give numbers of at least 0 [K s^1/2/J]");
+    for (int j = 0; s->monitor_reach && j < NB; ++j)
+        REQUIRE(natural(s->monitor_reach[j], 1), "monitor_reach: give numbers of at least 0 [m]");
     for (int i = 0; s->law_load && i < 2 * NB; ++i)
         REQUIRE(s->law_load[i] == s->law_load[i], "law_load: give numbers [N]");
     REQUIRE(s->law_temperature[0] <= s->law_temperature[1], "law_temperature: give a range of temperatures [degC]");
@@ -167,7 +169,7 @@ int msfp_check_scene(const msfp_scene *s, const char **message)
                 && msfp_all_finite(s->foot, 2) && msfp_all_finite(s->origin, 3),
             "q, v, f, foot, origin: give finite numbers");
     REQUIRE(MSFP_HEAT || !s->heat, "heat: the friction of this model does not depend on temperature; leave it NULL");
-    REQUIRE(msfp_all_finite(s->heat, NB * MSFP_HEAT) && msfp_all_finite(s->monitor_heat, 2 * NB),
+    REQUIRE(msfp_all_finite(s->heat, NB * MSFP_HEAT) && msfp_all_finite(s->monitor_heat, NB * MSFP_HEAT_STATES),
             "heat, monitor_heat: give finite numbers");
     return MSFP_OK;
 }
@@ -237,7 +239,7 @@ int msfp_check_entry(const msfp_port *port, const msfp_scene *state, const doubl
     const int finite = msfp_all_finite(state->q, size) && msfp_all_finite(state->v, size) &&
                        msfp_all_finite(state->f, 2 * NB) && msfp_all_finite(state->foot, 2) &&
                        msfp_all_finite(state->origin, 3) && msfp_all_finite(state->heat, NB * MSFP_HEAT) &&
-                       msfp_all_finite(state->monitor_heat, 2 * NB);
+                       msfp_all_finite(state->monitor_heat, NB * MSFP_HEAT_STATES);
     return finite ? MSFP_OK : MSFP_E_FINITE;
 }
 

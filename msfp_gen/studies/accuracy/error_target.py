@@ -209,7 +209,7 @@ class _Search:
     def loosest(self) -> int:
         """Index of the loosest tolerance that meets the target.
 
-        Raises RunError if none does, or if a run and its reference run both fail.
+        Raises RunError if none does, if a run and its reference run both fail, or if three reference runs do.
         """
         first = next(
             k
@@ -224,6 +224,8 @@ class _Search:
             if estimate is not None and estimate <= self.target:
                 return index
             self._check_model_error(index, first, *pair)
+            if sum(not reference.finished for reference in self.references.values()) > REFERENCE_OFFSET:
+                break
         raise RunError(self._target_missed(), status="accuracy")
 
     def _check_model_error(self, index: int, first: int, trial: Trial, reference: Trial) -> None:
@@ -302,11 +304,11 @@ class _Search:
         attempts = [self.attempt(k) for k in sorted(self.trials)]
         estimated = [attempt for attempt in attempts if attempt.estimate is not None]
         best = min(estimated, key=lambda a: a.estimate or 0.0, default=None)
-        failed = next((trial.message for trial in self.references.values() if not trial.finished), "")
-        so_far = "no error was estimated until then" + (f", since a reference run failed: {failed}" if failed else "")
+        failed = [trial.message for trial in self.references.values() if not trial.finished]
+        so_far = f"a run with every effect fails: {failed[-1]}" if failed else "no error was estimated until then"
         if best is not None:
             so_far = f"the best is rtol = {best.rtol:g}, an error of about {best.estimate:.2g} in {best.seconds:.2g} s"
         return (
-            f"an error of {self.target:g} was not reached in the time given: {so_far}; "
+            f"an error of {self.target:g} was not reached{'' if failed else ' in the time given'}: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
         )
