@@ -25,6 +25,7 @@ import promises
 from msfp_gen import Auto, Effects, RunError, Scene, load_scene, simulate
 from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import load_at_rest
+from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.file.loader import scene_from_table
 
 ROWS = 4000
@@ -83,10 +84,8 @@ def run(scene: Scene, method: str = "implicit") -> Result:
 
 def full(scene: Scene, auto: Result) -> Effects:
     """All effects that Auto may leave out; separation where the run of Auto had it at its end."""
-    words = auto.provenance["model"].split(", then ")[-1]
-    friction = "pvt" if scene.modelled.friction == "pv" else scene.modelled.friction
-    uplift = "-uplift" in words
-    return replace(scene.modelled, dimension="spatial", sliders="inertial", rims=True, uplift=uplift, friction=friction)
+    uplift = "-uplift" in auto.provenance["model"].split(", then ")[-1]
+    return replace(all_effects(scene), uplift=uplift)
 
 
 def difference(one: Result, reference: Result) -> Difference:

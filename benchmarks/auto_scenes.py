@@ -173,4 +173,42 @@ def slow_test(seed: int, number: int) -> Scene:
     return Scene(bearing, motion, top, effects, Solver(), load=history, name=f"{what.bearing}, slow {number}")
 
 
+def demanding(seed: int, number: int) -> Scene:
+    """Scene `number` of a seed that needs most of what `Auto` may leave out: surfaces that heat at earthquake velocities,
+    rims, varying loads, sprung masses that lift off in the course of the run, heavy sliders.
+    """
+    draw = Draw(seed, number)
+    law = draw.one(["pv"] * 3 + ["velocity", "constant"])
+    what = Chosen(draw.one(["single-articulated-fp", "double-fp", "fenz-tfp"]), law, "report")
+    bearing = a_bearing(draw, what)
+    bearing = bearing.replace(mass=[draw.decades((1.0, 10.0)) * body.mass for body in bearing.bodies])
+    load = draw.decades((200.0, 3000.0)) * GRAVITY * sum(body.mass for body in bearing.bodies)
+    size = reach(bearing) * draw.one([0.2, 0.5, 0.8, 1.1])
+    frequency = min(draw.decades((0.1, 1.0)), FASTEST / (2 * pi * size), float(np.sqrt(STRONGEST / size)) / (2 * pi))
+    motion = Motion.harmonic(size, frequency, direction=draw.one([0.0, 0.7]), cycles=2.0)
+    if draw.chance(0.3):
+        motion = Motion.circle(size, 2 * pi * frequency, cycles=1.5, lead_in=1.0 / frequency)
+    effects = Auto(bouc_wen=what.hysteresis)
+    name = f"{what.bearing}, demanding {number}"
+    if draw.chance(0.5):
+        top: Top = Top.rig(load, 1e3 * load, 0.05 * load, 10.0 * load, 0.01 * load)
+        return Scene(bearing, motion, top, effects, load=a_load(draw, top, motion.duration), name=name)
+    mass, rate = load / GRAVITY, 2 * pi * draw.one([5.0, 10.0])
+    top = Top.mass(mass, 0.03 * mass, 0.5, 100.0 * load, 0.1 * load, mass * rate**2, 0.1 * mass * rate)
+    if draw.chance(0.6):
+        motion += a_jolt(draw, motion.duration, rate)
+    return Scene(bearing, motion, top, effects, name=name)
+
+
+def a_jolt(draw: Draw, duration: float, rate: float) -> Motion:
+    """Three vertical cycles of the base at the rate [rad/s] of a sprung mass, which answers with several times their
+    acceleration, so that surfaces may open although the motion itself does not announce it.
+    """
+    time = np.linspace(0.0, duration, 1 + int(20 * rate * duration / (2 * pi)))
+    phase = rate * (time - draw.flat(0.3, 0.6) * duration)
+    burst = np.where((phase > 0) & (phase < 6 * pi), np.sin(phase) * np.sin(phase / 6) ** 2, 0.0)
+    acceleration = draw.flat(0.1, 0.5) * GRAVITY
+    return Motion.from_arrays(time, np.outer(acceleration / rate**2 * burst, [0.0, 0.0, 1.0]))
+
+
 KINDS = (scene, slow_test)

@@ -260,7 +260,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "law": law,
         "plastic": is_plastic(spec.effects.bouc_wen),
         "flows": spec.effects.permits_quasistatic_steps,
-        "heat": HEAT_KERNEL if law is not None and law.depends_on_temperature else (),
+        "heat": HEAT_KERNEL,
         "values": value_enums(spec.effects),
         "words": word_enums(),
         "row": rows.row(spec.effects),

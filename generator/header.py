@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from msfp_gen.specification import contract
 from msfp_gen.version import __version__
 
+from .heat import HEAT_KERNEL
 from .interface import ABI_VERSION, CALL_ERRORS
 
 if TYPE_CHECKING:
@@ -54,5 +55,11 @@ def environment() -> Environment:
 
 def public_header() -> str:
     """Text of `msfp.h`, the same for every model."""
-    context = {"version": __version__, "words": word_enums(), "abi": ABI_VERSION, "errors": CALL_ERRORS}
+    context = {
+        "version": __version__,
+        "words": word_enums(),
+        "abi": ABI_VERSION,
+        "errors": CALL_ERRORS,
+        "heat": HEAT_KERNEL,
+    }
     return environment().get_template("msfp.h.jinja").render(context, file="msfp.h")

@@ -103,5 +103,5 @@ class Member:
         q, v, f = transferred_state(*parts)
         origin, foot = transferred_heights(*parts)
         law = self.effects.law
-        heat = at.heat if law is not None and law.depends_on_temperature else None
+        heat = at.temperature_parts if law is not None and law.depends_on_temperature else None
         self.port.enter(at.time, q, v, f, ends, origin=origin, monitor_heat=at.monitor_heat, foot=foot, heat=heat)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.results.monitor_notes import RISING
 from msfp_gen.results.note import Note
 from msfp_gen.scene.plausibility import doubtful_values
 
@@ -32,13 +33,18 @@ def notes_of(result: BuildingData) -> tuple[Note, ...]:
 
 
 def _gathered(notes: Sequence[tuple[int, Note]]) -> list[tuple[int, Note]]:
-    """The notes; of those about friction, which many bearings get, the first of each kind stands for all."""
+    """The notes; of those about friction, which many bearings get, one of each kind stands for all.
+
+    It is the one with the largest value of those in `RISING`, and else the first.
+    """
     found = [pair for pair in notes if pair[1].kind not in GATHERED]
     for kind in GATHERED:
-        alike = sorted((pair for pair in notes if pair[1].kind == kind and not pair[1].action), key=_time)
+        alike = [pair for pair in notes if pair[1].kind == kind and not pair[1].action]
+        alike.sort(key=_falling_value if kind in RISING else _time)
         for index, note in alike[:1]:
             others = len({i for i, _ in alike}) - 1
             words = f"; the same holds for {others} other bearing{'s' * (others > 1)}"
+            words += ", with less" if kind in RISING else ""
             found.append((index, replace(note, text=note.text + (words if others else ""))))
         found += [pair for pair in notes if pair[1].kind == kind and pair[1].action]
     return found
@@ -46,6 +52,10 @@ def _gathered(notes: Sequence[tuple[int, Note]]) -> list[tuple[int, Note]]:
 
 def _time(pair: tuple[int, Note]) -> float:
     return pair[1].time
+
+
+def _falling_value(pair: tuple[int, Note]) -> float:
+    return -pair[1].value
 
 
 def value_notes(bearing: Bearing) -> tuple[Note, ...]:

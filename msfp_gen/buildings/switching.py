@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import reduce
 from typing import Any
 
 from msfp_gen.buildings.change import BearingNotes, Change, earlier_work
 from msfp_gen.buildings.compiled_run import BuildingRun
 from msfp_gen.buildings.member import Member
-from msfp_gen.results.monitor_notes import monitor_notes
+from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
 from msfp_gen.results.note import Note
 from msfp_gen.scene.effect_switching import next_effects
 from msfp_gen.specification.layout import Effects
@@ -27,30 +28,24 @@ def switch(run: BuildingRun) -> bool:
         after = next_effects(member.asked, ending)
         if after is None or after == member.effects:
             continue
-        before, known = _differences(member.effects, after), {note.kind for note in _earlier(run, index)}
-        notes = monitor_notes(ending, after)
-        kept = tuple(note for note in notes if note.action or note.kind not in known)
+        before, notes = _differences(member.effects, after), tuple(monitor_notes(ending, after))
         rows, work = run.run.row_count, member.work
         work = work + earlier_work(run.changes, index, (rows + 1, len(work)))[-1]
         new = Member.of(run.scene, index, after)
         new.continue_from(member, run.run.ends(index))
-        run.replace(new, Change(index, before, rows, work.tolist(), new.model.info.key, kept))
+        run.replace(new, Change(index, before, rows, work.tolist(), new.model.info.key, notes))
         changed = True
     return changed
 
 
 def notes_until_now(run: BuildingRun) -> BearingNotes:
     """The notes of the monitors of all bearings."""
-    found = [(change.bearing, note) for change in run.changes for note in change.notes]
+    found: list[tuple[int, Note]] = []
     for index, member in enumerate(run.members):
-        known = {note.kind for note in _earlier(run, index)}
-        found += [(index, each) for each in monitor_notes(member.ending("ok"), None) if each.kind not in known]
+        parts = [change.notes for change in run.changes if change.bearing == index]
+        notes = reduce(joined_notes, [*parts, monitor_notes(member.ending("ok"), None)], list[Note]())
+        found += [(index, note) for note in notes]
     return tuple(found)
-
-
-def _earlier(run: BuildingRun, bearing: int) -> list[Note]:
-    """Notes of earlier models of a bearing that changed nothing."""
-    return [n for change in run.changes if change.bearing == bearing for n in change.notes if not n.action]
 
 
 def _differences(before: Effects, after: Effects) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msfp_gen.results.note import Note
@@ -14,11 +16,12 @@ if TYPE_CHECKING:
 
 _MAX_VELOCITY = RANGES["v"][-1]
 TEXTS = {
-    "rims": "a slider is {value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
+    "rims": "a slider is {most}{value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
     "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
-    "inertia": "the inertial force of body {body} is {value:.2g} of N on surface {surface}; the model has none",
-    "heat": "friction may heat surface {surface} by {value:.3g} K; its friction law does not depend on temperature",
-    "law_speed": "the slip velocity of surface {surface} is {value:.3g} m/s; its friction law was checked up to "
+    "inertia": "the inertial force of body {body} is {most}{value:.2g} of N on surface {surface}; the model has none",
+    "heat": "friction may heat surface {surface} by {most}{value:.3g} K; its friction law does not depend on "
+    "temperature",
+    "law_speed": "the slip velocity of surface {surface} is {most}{value:.3g} m/s; its friction law was checked up to "
     f"{_MAX_VELOCITY:g} m/s",
     "law_load": "the normal force of surface {surface} is {value:.4g} N; its friction law was not checked there",
     "law_temperature": "surface {surface} is at {value:.4g} degC; its friction law was not checked there",
@@ -27,10 +30,15 @@ TEXTS = {
 }
 
 
-def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
-    """The notes of a run with one model, in order of time.
+RISING = ("rims", "inertia", "heat", "law_speed")
+"""Kinds of notes with one limit, from above."""
 
-    after: the effects with which it continues; None where it does not.
+
+def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
+    """The notes of a run with one model, in order of the time at which each monitor tripped first.
+
+    Where the run went on with the same model, the value is the one furthest beyond the limit since then. after: the
+    effects with which it continues; None where it does not.
     """
     trips, time, status = dict(ending.trips), ending.time, ending.status
     if after is not None and status == "ok":
@@ -41,15 +49,38 @@ def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
         trips["jammed"] = (time, ending.surface, ending.value)
     return [
         Note(
-            time,
+            tripped,
             kind,
             surface,
             value,
-            TEXTS[kind].format(surface=surface, value=value, body=surface + 1, status=status),
+            _text(kind, surface, value, status, went_on=tripped < time),
             ", ".join(_changes(kind, ending.effects, after)),
         )
-        for kind, (time, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
+        for kind, (tripped, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
     ]
+
+
+def _text(kind: str, surface: int, value: float, status: str, went_on: bool) -> str:
+    text = TEXTS[kind].format(
+        surface=surface, value=value, body=surface + 1, status=status, most="up to " if went_on else ""
+    )
+    return f"from here on, {text}" if went_on and kind not in ("plane", "jammed") else text
+
+
+def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
+    """The notes of a run, with those of its next model.
+
+    Of two of one kind that changed nothing the first stands for both, with the larger value of those in `RISING`.
+    """
+    notes = list(earlier)
+    for note in later:
+        alike = (i for i, each in enumerate(notes) if each.kind == note.kind and not (each.action or note.action))
+        index = next(alike, None)
+        if index is None:
+            notes.append(note)
+        elif note.kind in RISING and note.value > notes[index].value:
+            notes[index] = replace(note, time=notes[index].time)
+    return notes
 
 
 def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:

@@ -29,7 +29,8 @@ class RestartState:
     separations, their rates, and its friction state. foot: height of the foot of the supported mass and its rate, shape
     (2,) [m], [m/s]. force: interface forces, shape (n-1, 3) [N]; rim_force: size of the rim forces, shape (n-1,) [N].
     base_angles: shape (3,) [rad]. origin: displacement across the bearing at the start, shape (3,) [m]. monitor_heat,
-    heat: states of the monitor of heat and of the temperature. All but azimuth and planar come from a snapshot.
+    heat: parts of the temperature rise of every surface, those that the monitor of heat follows and those of a friction
+    law with temperature, shape (n-1, 14) [K]. All but azimuth and planar come from a snapshot.
     """
 
     time: float
@@ -56,6 +57,11 @@ class RestartState:
     def of_port(cls, port: Port) -> RestartState:
         """The committed state of a two-port, whose ends move in space."""
         return cls(azimuth=0.0, planar=False, **port.state())
+
+    @property
+    def temperature_parts(self) -> Array:
+        """Parts of the temperature rise of every surface, by the friction law or the monitor, shape (n-1, 14) [K]."""
+        return self.monitor_heat if self.heat is None else self.heat
 
     def contact_force(self, bearing: Bearing) -> Array:
         """Interface forces without those of the rims, shape (n-1, 3) [N]."""

@@ -273,6 +273,7 @@ typedef struct {
     double monitor_time;          /* time over which a change of velocity is averaged [s] */
     double monitor_rise;          /* largest rise in temperature [K] */
     double monitor_heating[MSFP_NB]; /* sqrt(D/pi)/k over the area of contact [K s^1/2/J] */
+    double monitor_reach[MSFP_NB]; /* sliding displacement up to which the contact covers the centre [m]; 0: any */
     /* Range in which the friction law was checked: velocity [m/s], normal forces [N], temperatures [degC]. */
     double law_speed, law_load[MSFP_NB][2], law_temperature[2];
 } msfp_options;
@@ -322,8 +323,9 @@ typedef struct {
 /* What the monitors know at the end of an accepted step. */
 typedef struct {
     double velocity[MSFP_NB][3];           /* of the bodies [m/s] */
-    double energy[MSFP_NB], peak[MSFP_NB]; /* integral and peak of the scaled heat flux [K s^1/2], [K/s^1/2] */
+    double heat[MSFP_NB][MSFP_HEAT_STATES], flux[MSFP_NB]; /* of the monitor of heat, as heat and flux of a state */
     msfp_trip trips[MSFP_MONITORS];
+    double shares[MSFP_MONITORS]; /* of the limit, or the distance from a range, of each trip */
 } msfp_monitor_state;
 
 struct msfp_run {

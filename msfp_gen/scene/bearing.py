@@ -106,20 +106,9 @@ class Body:
 
 
 _LISTS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
-<<<<<<< HEAD
-_SURFACE_ARRAYS = (
-    "radius",
-    "capacity",
-    "friction",
-    "yield_displacement",
-    "rim_stiffness",
-    "rim_damping",
-    "seat_damping",
-    "contact_damping",
+_SURFACE_ARRAYS = tuple(  # the stiffness of unilateral contacts depends on the top where it is not given
+    name for name in contract.names((*contract.SURFACE, *contract.SURFACE_UPLIFT)) if name != "seat_stiffness"
 )
-=======
-_SURFACE_ARRAYS = contract.names((*contract.SURFACE, *contract.SURFACE_UPLIFT))
->>>>>>> cchecks
 
 
 @dataclass(frozen=True)
@@ -239,11 +228,7 @@ class Bearing:
         """All values as float64 arrays.
 
         Per surface, shape (n-1,): radius, capacity, friction, yield_displacement, rim_stiffness, rim_damping,
-<<<<<<< HEAD
-        seat_damping, contact_damping. Per body, shape (n,), base first with mass and inertia 0: height,
-=======
-        contact_damping, seat_stiffness, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height,
->>>>>>> cchecks
+        contact_damping, seat_damping. Per body, shape (n,), base first with mass and inertia 0: height,
         centroid, mass, inertia_transverse, inertia_axial, rim_radius, rim_offset. And gravity, shape (). Units as in
         the fields.
         """

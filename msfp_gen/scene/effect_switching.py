@@ -1,4 +1,6 @@
-"""Effects of a run: those that a method supports; the monitors that end a segment, and the effects of the next one."""
+"""Effects of a run: those that a method supports; the monitors that end a segment, and the effects of the next one; all
+effects that may follow on each other.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
+    from msfp_gen.scene.parts import SceneParts
     from msfp_gen.scene.solver import Solver
 
 # The effects that a model needs after a monitor has tripped.
@@ -95,6 +98,20 @@ def next_effects(scene: Requested, ending: Ending) -> Effects | None:
         if name in ending.trips:
             extended = _extended(scene, extended, name) or extended
     return extended
+
+
+def all_effects(scene: SceneParts) -> Effects:
+    """The effects of a scene if nothing is left to monitors: every effect that one of them may add is modelled.
+
+    Those of which the scene fixes a field stay as they are, and so does a friction law without further parameters.
+    """
+    requested = scene.effects
+    if isinstance(requested, Effects):
+        return requested
+    effects = requested.resolve(friction=scene.law[0], top_rotation=(scene.top_rotation is not None) or None)
+    for name in REQUIRED_EFFECTS:
+        effects = _extended(scene, effects, name) or effects
+    return effects
 
 
 def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:

@@ -39,15 +39,16 @@ def thermal_softening(law: Law | None, bearing: Bearing) -> float:
     return max(slopes)
 
 
-def heating_factors(bearing: Bearing) -> list[float]:
-    """sqrt(D/pi)/k over the contact area of every surface, with the defaults of `HEAT` [K s^1/2/J].
+def heated_contacts(bearing: Bearing) -> list[tuple[float, float]]:
+    """sqrt(D/pi)/k over the contact area of every surface, with the defaults of `HEAT` [K s^1/2/J]; and the sliding
+    displacement up to which the contact covers the centre of the surface [m].
 
-    The factor is 0 where the contact area is not known.
+    Both are 0 where the contact area is not known.
     """
     out = []
     for index, surface in enumerate(bearing.surfaces):
         radius = surface.patch_radius or bearing.slider_rim_radius(index)
         given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
         found = derived_parameters({**given, "patch_radius": radius or None})
-        out.append(found["heating"] / found["area"] if radius else 0.0)
+        out.append((found["heating"] / found["area"], found["reach"]) if radius else (0.0, 0.0))
     return out

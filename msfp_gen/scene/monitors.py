@@ -15,7 +15,7 @@ from msfp_gen.scene.effect_selection import (
     slider_period,
 )
 from msfp_gen.scene.friction_parameters import checked_range
-from msfp_gen.scene.friction_selection import heating_factors, thermal_softening
+from msfp_gen.scene.friction_selection import heated_contacts, thermal_softening
 
 if TYPE_CHECKING:
     from msfp_gen.scene.parts import SceneParts
@@ -47,6 +47,7 @@ def monitor_options(
     }
     checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
     left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}
+    heating, reach = np.array(heated_contacts(scene.bearing)).T
     return checked | {
         "monitors": tuple(name for name, out in left_out.items() if out),
         "monitor_stop": tuple(stops),
@@ -55,5 +56,6 @@ def monitor_options(
         "monitor_inertia": inertia_limit(scene, selection.error),
         "monitor_time": slider_period(scene),
         "monitor_rise": _significant_rise(scene, effects, selection),
-        "monitor_heating": np.array(heating_factors(scene.bearing)),
+        "monitor_heating": np.ascontiguousarray(heating),
+        "monitor_reach": np.ascontiguousarray(reach),
     }

@@ -18,7 +18,7 @@ from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined
-from msfp_gen.results.monitor_notes import monitor_notes
+from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
 from msfp_gen.results.note import Note
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
@@ -173,9 +173,8 @@ class RunSequence:
         segment = _segment(self, progress, options)
         self.segments.append(segment)
         following = None if self.strict else next_effects(self.scene, segment.ending)
-        known_kinds = {note.kind for note in self.notes if not note.action}
         notes = monitor_notes(segment.ending, following)
-        self.notes += [note for note in notes if note.action or note.kind not in known_kinds]
+        self.notes = joined_notes(self.notes, notes)
         if self.parameters and following is not None:
             raise switching_error(segment, notes)
         self.effects = following

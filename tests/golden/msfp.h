@@ -98,7 +98,7 @@ enum msfp_monitor {
     MSFP_MONITOR_RIMS, /* a slider is beyond the capacity of its surface [m] */
     MSFP_MONITOR_UPLIFT, /* a normal force is below its least value, or above its largest [N] */
     MSFP_MONITOR_INERTIA, /* inertial force of a slider over the normal force below it */
-    MSFP_MONITOR_HEAT, /* bound of the temperature rise of a surface [K] */
+    MSFP_MONITOR_HEAT, /* temperature rise of a surface [K] */
     MSFP_MONITOR_LAW_SPEED, /* slip velocity outside the range in which the friction law was checked [m/s] */
     MSFP_MONITOR_LAW_LOAD, /* normal force outside that range [N] */
     MSFP_MONITOR_LAW_TEMPERATURE, /* temperature outside that range [degC] */
@@ -123,6 +123,8 @@ typedef struct {
     int begin; /* index of its first number */
     int rank, shape[2];
 } msfp_field;
+
+#define MSFP_HEAT_STATES 14 /* exponential states of the temperature of a surface */
 
 /* A function of time in six channels: piecewise polynomials. Knots and coefficients are not copied. */
 #define MSFP_DEGREE 5
@@ -179,7 +181,7 @@ typedef struct {
     const double *foot;          /* [2] as in msfp_inputs */
     const double *heat;          /* [nb][api->heat_states] parts of the temperature above the start [K] */
     const double *origin;        /* [3] r_01 - r_nn at which the displacement is zero [m]; NULL: that of the start */
-    const double *monitor_heat;  /* [2][nb] state of the monitor of heat: integral and peak of the scaled heat flux */
+    const double *monitor_heat;  /* [nb][MSFP_HEAT_STATES] parts of the temperature rise that the monitor of heat follows [K] */
     double start_time, end_time; /* [s] */
     /* The solver. */
     int method;                  /* enum msfp_method; default MSFP_METHOD_IMPLICIT */
@@ -206,6 +208,7 @@ typedef struct {
     double monitor_time;           /* time over which a change of velocity is averaged [s] */
     double monitor_rise;           /* largest rise in temperature [K] */
     const double *monitor_heating; /* [nb] sqrt(D/pi)/k over the area of contact [K s^1/2/J] */
+    const double *monitor_reach;   /* [nb] sliding displacement up to which the contact covers the centre [m]; 0: any */
     double law_speed;              /* range in which the friction law was checked: slip velocity up to [m/s], */
     const double *law_load;        /* [nb][2] normal force from, to [N], */
     double law_temperature[2];     /* temperature from, to [degC] */
@@ -218,11 +221,11 @@ typedef struct {
     double displacement[3], top_force[3]; /* across the bearing [m]; on the top support [N] */
 } msfp_event;
 
-/* The first detection of a monitor. value: see enum msfp_monitor. */
+/* What a monitor has detected. value: see enum msfp_monitor. */
 typedef struct {
-    double time; /* [s] */
-    double value;
-    int surface; /* counted from 1; 0: nothing detected */
+    double time;  /* of the first detection [s] */
+    double value; /* the one furthest beyond the limit until now, */
+    int surface;  /* and its surface, counted from 1; 0: nothing detected */
 } msfp_trip;
 
 /* How a run stands. */
@@ -246,7 +249,7 @@ typedef struct {
     double *rim_force;    /* [nb] size of the rim forces of that row [N] */
     double *base_angles;  /* [3] psi, theta, phi of the base in that row [rad] */
     double *origin;       /* [3] r_01 - r_nn at which the displacement is zero [m] */
-    double *monitor_heat; /* [2][nb] as in msfp_scene */
+    double *monitor_heat; /* [nb][MSFP_HEAT_STATES] as in msfp_scene */
 } msfp_run_state;
 
 /* Derivatives of everything that a run is given, [parameter] first: of gravity, of the values that bearing_new takes, of

@@ -5,8 +5,6 @@
 #include <string.h>
 #include "api.h"
 
-enum { NB = MSFP_NB };
-
 void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress)
 {
     *progress = (msfp_progress){ run->status, run->status_surface, run->status_value, run->now.t, run->h,
@@ -47,10 +45,7 @@ void msfp_api_run_state(const msfp_run *run, msfp_run_state *state)
     give(state->rim_force, last->rim, sizeof last->rim);
     give(state->base_angles, last->base + 3, 3 * sizeof *last->base);
     give(state->origin, run->start, sizeof run->start);
-    if (state->monitor_heat) {
-        memcpy(state->monitor_heat, run->monitor.energy, sizeof run->monitor.energy);
-        memcpy(state->monitor_heat + NB, run->monitor.peak, sizeof run->monitor.peak);
-    }
+    give(state->monitor_heat, run->monitor.heat, sizeof run->monitor.heat);
 }
 
 void msfp_api_run_hold_rows(msfp_run *run, size_t rows) { run->options.row_limit = rows; }

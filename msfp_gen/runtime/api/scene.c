@@ -36,6 +36,8 @@ static void copy_monitors(msfp_options *o, const msfp_scene *s)
     o->monitor_rise = s->monitor_rise;
     if (s->monitor_heating)
         memcpy(o->monitor_heating, s->monitor_heating, sizeof o->monitor_heating);
+    if (s->monitor_reach)
+        memcpy(o->monitor_reach, s->monitor_reach, sizeof o->monitor_reach);
     o->law_speed = s->law_speed;
     if (s->law_load)
         memcpy(o->law_load, s->law_load, sizeof o->law_load);
@@ -94,10 +96,8 @@ int msfp_api_run_new(const msfp_scene *scene, msfp_run **run, const char **messa
     msfp_run_start(made, &scene->bearing->parameters, &motion, &load, scene->jumps, scene->jump_count, &options, q, v,
                    f);
 #endif
-    if (scene->monitor_heat) {
-        memcpy(made->monitor.energy, scene->monitor_heat, sizeof made->monitor.energy);
-        memcpy(made->monitor.peak, scene->monitor_heat + NB, sizeof made->monitor.peak);
-    }
+    if (scene->monitor_heat)
+        memcpy(made->monitor.heat, scene->monitor_heat, sizeof made->monitor.heat);
     made->options.origin = made->options.foot = made->options.heat = NULL; /* need not outlive this call */
     made->identity = msfp_identity(scene);
     *run = made;

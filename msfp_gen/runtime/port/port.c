@@ -108,10 +108,8 @@ int msfp_port_enter(msfp_port *port, const msfp_options *options, const double *
     const int status = begin(port, &parameters, options, q, v, f);
     if (status == MSFP_OK)
         msfp_port_wrench_of(port, run, &port->from, port->wrench);
-    if (monitor_heat) {
-        memcpy(run->monitor.energy, monitor_heat, sizeof run->monitor.energy);
-        memcpy(run->monitor.peak, monitor_heat + NB, sizeof run->monitor.peak);
-    }
+    if (monitor_heat)
+        memcpy(run->monitor.heat, monitor_heat, sizeof run->monitor.heat);
     port->tried = port->ready = port->step.finished = port->step.moved = 0;
     port->step.stage = MSFP_NO_STEP;
     return status;

@@ -1,14 +1,17 @@
 /* monitors.c: checks of what a model leaves out (docs/effects.md): rims, uplift, inertia of the sliders, heat, and the
  * range of the friction law; and whether the model is valid at a state at all.
  *
- * A monitor checks every step before it is accepted and records the first time at which its limit is exceeded. Where
- * the run is to stop, that step is not accepted, and the present state is the last one for which the model is valid.
+ * A monitor checks every step before it is accepted. It records the first time at which its limit is exceeded, and the
+ * value furthest beyond it. Where the run is to stop, that step is not accepted, and the present state is the last one
+ * for which the model is valid.
  */
 #include <math.h>
 #include <string.h>
 #include "run.h"
 
 enum { NB = MSFP_NB };
+
+static const double lambda[MSFP_HEAT_STATES] = MSFP_HEAT_RATES, weight[MSFP_HEAT_STATES] = MSFP_HEAT_WEIGHTS;
 
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
 {
@@ -51,8 +54,8 @@ int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)
     return MSFP_OK;
 }
 
-/* The largest excess of a quantity over its limit: relative to the limit, its value, its surface counted from 1 (0:
- * none). */
+/* The largest excess of a quantity over its limit: its share of the limit, or the distance from a range; its value; its
+ * surface counted from 1 (0: none). */
 typedef struct {
     double share, value;
     int surface;
@@ -84,7 +87,7 @@ static finding unloaded(const msfp_run *run)
     for (int j = 0; j < NB && least > 0.0; ++j) {
         const double normal = run->work.contact[j][MSFP_CONTACT_N];
         if (normal < least && (!worst.surface || normal < worst.value))
-            worst = (finding){ 2.0, normal, j + 1 };
+            worst = (finding){ 2.0 - normal / least, normal, j + 1 };
     }
     for (int j = 0; j < NB && !worst.surface; ++j)
         consider(&worst, run->work.contact[j][MSFP_CONTACT_N], most, j + 1);
@@ -112,17 +115,35 @@ static finding inertial(msfp_run *run, double h)
     return worst;
 }
 
-/* Upper bound of the rise in temperature [K]. Of all histories of flux with energy E and peak q, the one that is at its
- * peak at the end and zero before gives the highest temperature: 2 sqrt(D/pi)/k q sqrt(E/q). */
-static finding hot(const msfp_run *run, double h, double energy[NB], double peak[NB])
+/* Heat flux of every surface times sqrt(D/pi)/k [K/s^1/2], where the contact covers the centre of the surface. */
+static void heat_flux(const msfp_run *run, const msfp_state *s, double flux[NB])
 {
-    finding worst = { 0.0, 0.0, 0 };
     for (int j = 0; j < NB; ++j) {
-        const double lost = msfp_friction_power(run->parameters.surface[j], run->work.contact[j]).lost;
-        const double flux = run->options.monitor_heating[j] * lost;
-        energy[j] = run->monitor.energy[j] + h * flux;
-        peak[j] = fmax(run->monitor.peak[j], flux);
-        consider(&worst, 2.0 * sqrt(peak[j] * energy[j]), run->options.monitor_rise, j + 1);
+        const double *par = run->parameters.surface[j], reach = run->options.monitor_reach[j],
+                     slid = par[MSFP_SURFACE_PARAMETERS_R] * msfp_hypot(s->q[j][0], s->q[j][1]);
+        const double heating = reach > 0.0 && slid > reach ? 0.0 : run->options.monitor_heating[j];
+        flux[j] = heating > 0.0 ? heating * msfp_friction_power(par, run->work.contact[j]).lost : 0.0;
+    }
+}
+
+/* Rise in temperature [K] by the states of heat.c, over a step of the mean flux; exp(-z) is taken as
+ * 1/(1 + z + z^2/2). */
+static finding hot(const msfp_run *run, double h, double heat[NB][MSFP_HEAT_STATES], double flux[NB])
+{
+    double decay[MSFP_HEAT_STATES], gain[MSFP_HEAT_STATES];
+    finding worst = { 0.0, 0.0, 0 };
+    for (int i = 0; i < MSFP_HEAT_STATES; ++i) {
+        const double z = h * lambda[i];
+        decay[i] = 1.0 / (1.0 + z + 0.5 * z * z);
+        gain[i] = h * (1.0 + 0.5 * z) * decay[i] * weight[i];
+    }
+    heat_flux(run, &run->next, flux);
+    for (int j = 0; j < NB; ++j) {
+        const double mean = 0.5 * (run->monitor.flux[j] + flux[j]);
+        double rise = 0.0;
+        for (int i = 0; i < MSFP_HEAT_STATES; ++i)
+            rise += heat[j][i] = decay[i] * run->monitor.heat[j][i] + gain[i] * mean;
+        consider(&worst, rise, run->options.monitor_rise, j + 1);
     }
     return worst;
 }
@@ -131,8 +152,9 @@ static finding hot(const msfp_run *run, double h, double energy[NB], double peak
 /* A value outside the range in which the friction law was checked. */
 static void outside(finding *worst, double value, const double range[2], int surface)
 {
-    if (!worst->surface && (value < range[0] || value > range[1]))
-        *worst = (finding){ 2.0, value, surface };
+    const double beyond = fmax(range[0] - value, value - range[1]);
+    if (beyond > fmax(worst->share, 0.0))
+        *worst = (finding){ beyond, value, surface };
 }
 
 /* Conditions outside the range in which the friction law was checked. */
@@ -155,26 +177,27 @@ static void outside_law(const msfp_run *run, finding *found)
 }
 #endif
 
-/* State of the monitors at the end of an accepted step. */
-static void store(msfp_run *run, const double energy[NB], const double peak[NB])
+static void record(msfp_run *run, int monitor, const finding *found, double time)
 {
-    memcpy(run->monitor.energy, energy, sizeof run->monitor.energy);
-    memcpy(run->monitor.peak, peak, sizeof run->monitor.peak);
-    for (int k = 1; k <= NB; ++k)
-        msfp_body_V_get(run->work.body[k], run->monitor.velocity[k - 1]);
+    msfp_trip *trip = &run->monitor.trips[monitor];
+    if (trip->surface && !(found->share > run->monitor.shares[monitor]))
+        return;
+    *trip = (msfp_trip){ trip->surface ? trip->time : time, found->value, found->surface };
+    run->monitor.shares[monitor] = found->share;
 }
 
 void msfp_monitor_begin(msfp_run *run)
 {
     for (int k = 1; k <= NB; ++k)
         msfp_body_V_get(run->work.body[k], run->monitor.velocity[k - 1]);
+    heat_flux(run, &run->now, run->monitor.flux);
 }
 
 int msfp_monitor_step(msfp_run *run, const double *gaps)
 {
     const msfp_options *o = &run->options;
     const double h = run->next.t - run->now.t;
-    double energy[NB] = { 0 }, peak[NB] = { 0 };
+    double heat[NB][MSFP_HEAT_STATES], flux[NB];
     finding found[MSFP_MONITORS] = { { 0.0, 0.0, 0 } };
     if (!o->monitors)
         return 0;
@@ -185,20 +208,24 @@ int msfp_monitor_step(msfp_run *run, const double *gaps)
     if (o->monitors & 1 << MSFP_MONITOR_INERTIA)
         found[MSFP_MONITOR_INERTIA] = inertial(run, h);
     if (o->monitors & 1 << MSFP_MONITOR_HEAT)
-        found[MSFP_MONITOR_HEAT] = hot(run, h, energy, peak);
+        found[MSFP_MONITOR_HEAT] = hot(run, h, heat, flux);
 #if MSFP_LAW
     outside_law(run, found);
 #endif
-    int tripped = 0;
-    for (int g = 0; g < MSFP_MONITORS; ++g) {
-        if (!found[g].surface || run->monitor.trips[g].surface)
-            continue;
-        run->monitor.trips[g] =
-            (msfp_trip){ o->monitor_stop & 1 << g ? run->now.t : run->next.t, found[g].value, found[g].surface };
-        tripped |= o->monitor_stop & 1 << g;
-    }
+    int tripped = 0; /* monitors that stop the run now: the step is not accepted, so that others record nothing */
+    for (int g = 0; g < MSFP_MONITORS; ++g)
+        if (found[g].surface && !run->monitor.trips[g].surface)
+            tripped |= o->monitor_stop & 1 << g;
+    for (int g = 0; g < MSFP_MONITORS; ++g)
+        if (found[g].surface && (!tripped || tripped & 1 << g))
+            record(run, g, &found[g], tripped ? run->now.t : run->next.t);
     if (tripped)
         return 1;
-    store(run, energy, peak);
+    if (o->monitors & 1 << MSFP_MONITOR_HEAT) {
+        memcpy(run->monitor.heat, heat, sizeof heat);
+        memcpy(run->monitor.flux, flux, sizeof flux);
+    }
+    for (int k = 1; k <= NB; ++k)
+        msfp_body_V_get(run->work.body[k], run->monitor.velocity[k - 1]);
     return 0;
 }

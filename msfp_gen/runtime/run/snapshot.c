@@ -97,7 +97,7 @@ static int valid_integers(const msfp_run *run)
 static int valid_numbers(const msfp_run *run)
 {
     const double t = run->now.t, start = run->options.start_time, end = run->options.duration;
-    int valid = FINITE(run->now) && FINITE(run->start) && FINITE(run->monitor.energy) && FINITE(run->monitor.peak);
+    int valid = FINITE(run->now) && FINITE(run->start) && FINITE(run->monitor.heat) && FINITE(run->monitor.flux);
     valid = valid && t >= start && t <= end + msfp_smallest_step(end);
     if (run->status != MSFP_OK && run->status != MSFP_STOPPED)
         return valid;

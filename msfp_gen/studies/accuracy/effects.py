@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msfp_gen.errors import InputError
+from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
@@ -27,14 +27,10 @@ def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
 
 
 def with_all_effects(scene: Scene) -> Scene:
-    """The scene with every effect that effect selection may leave out, to measure the error of the selection.
+    """The scene with every effect that it has parameters for and does not fix, to measure the error of a selection.
 
     A scene whose effects are given (`Effects`) is returned unchanged.
     """
     if isinstance(scene.effects, Effects):
         return scene
-    effects = replace(scene.modelled, dimension="spatial", sliders="inertial", rims=True)
-    try:
-        return replace(scene, effects=effects)
-    except InputError:  # the bearing has no data of rims
-        return replace(scene, effects=replace(effects, rims=False))
+    return replace(scene, effects=all_effects(scene))

@@ -13,6 +13,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any, cast
 
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.simulation.simulate import Progress, simulate
 from msfp_gen.studies.accuracy.attempt import Attempt
@@ -36,7 +37,7 @@ SAFETY = 1.5  # factor on the difference from the reference run, which has an er
 DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
-METHOD = "implicit"
+METHOD: Final = "implicit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class Within:
         chosen: tolerance, cost and estimated error of `result`.
         next_step: the same for the next tighter candidate tolerance; None if there is none or no time was left.
         attempts: all candidate tolerances that were tried, loosest first.
-        seconds: wall time of everything, search included [s].
+        seconds: wall time of the search and the run [s].
         left_out: what the estimate does not include, in words; empty if nothing.
         reasons: why these settings were chosen, in words.
         explained: whether `tables` lists attempts and reasons.
@@ -108,7 +109,7 @@ def simulate_within(
         scene: the scene; its method and tolerance are chosen here.
         error: bound of the RMS error over time and of the error of the peak, of the horizontal force on the top and of
             sliding, each relative to its peak [-], such as 0.005.
-        budget: wall time of the search [s].
+        budget: wall time of the search [s], without the time to build models.
         explain: also measure the cost of `dopri5`, the method of PEER 2017/07.
         progress: as for `simulate`, called during the final run.
 
@@ -117,9 +118,12 @@ def simulate_within(
         RunError: the error is not reached within the budget, or the runs fail.
     """
     check_target(error, budget)
-    begin = time.perf_counter()
+    scene = replace(scene, solver=replace(scene.solver, method=METHOD))
     effects, effect_reasons = effects_for(scene, error)
     scene = replace(scene, effects=effects)
+    for each in (scene, with_all_effects(scene)):
+        build_model(each.bearing.layout, each.modelled)  # once, and not within the budget
+    begin = time.perf_counter()
     search = _Search(scene, METHOD, error, begin + budget)
     try:
         index = search.loosest()
@@ -205,7 +209,7 @@ class _Search:
     def loosest(self) -> int:
         """Index of the loosest tolerance that meets the target.
 
-        Raises RunError if none does, or if a run and its reference run both fail.
+        Raises RunError if none does, if a run and its reference run both fail, or if three reference runs do.
         """
         first = next(
             k
@@ -219,13 +223,22 @@ class _Search:
             estimate = self.attempt(index).estimate
             if estimate is not None and estimate <= self.target:
                 return index
-            self._check_model_error(index, first)
+            self._check_model_error(index, first, *pair)
+            if sum(not reference.finished for reference in self.references.values()) > REFERENCE_OFFSET:
+                break
         raise RunError(self._target_missed(), status="accuracy")
 
-    def _check_model_error(self, index: int, first: int) -> None:
-        """Raise _ModelErrorTooLargeError if two tighter tolerances did not reduce the error of the selected effects."""
+    def _check_model_error(self, index: int, first: int, trial: Trial, reference: Trial) -> None:
+        """Raise _ModelErrorTooLargeError if the selected effects keep a run from its end, or from the target.
+
+        The latter is so if two tighter tolerances did not reduce the error.
+        """
+        if self.reference_scene is self.scene:
+            return
+        if not trial.finished:
+            raise _ModelErrorTooLargeError(f"a run with them ends early: {trial.message}")
         known = [self.attempt(k).estimate for k in range(max(first, index - REFERENCE_OFFSET), index + 1)]
-        if self.reference_scene is self.scene or len(known) <= REFERENCE_OFFSET or None in known:
+        if len(known) <= REFERENCE_OFFSET or None in known:
             return
         if (known[-1] or 0.0) > STAGNATION_RATIO * (known[0] or 0.0):
             raise _ModelErrorTooLargeError(f"they leave an error of {known[-1]:.2g} at any tolerance")
@@ -291,10 +304,11 @@ class _Search:
         attempts = [self.attempt(k) for k in sorted(self.trials)]
         estimated = [attempt for attempt in attempts if attempt.estimate is not None]
         best = min(estimated, key=lambda a: a.estimate or 0.0, default=None)
-        so_far = "no error was estimated until then"
+        failed = [trial.message for trial in self.references.values() if not trial.finished]
+        so_far = f"a run with every effect fails: {failed[-1]}" if failed else "no error was estimated until then"
         if best is not None:
             so_far = f"the best is rtol = {best.rtol:g}, an error of about {best.estimate:.2g} in {best.seconds:.2g} s"
         return (
-            f"an error of {self.target:g} was not reached in the time given: {so_far}; "
+            f"an error of {self.target:g} was not reached{'' if failed else ' in the time given'}: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
         )

@@ -125,9 +125,12 @@ def families() -> dict[str, str]:
 def without_stop(scene: Scene) -> Scene:
     """The scene without its stop condition, which SciPy's integrators do not have, ending where the stop would end it.
 
-    All effects are modelled, so that no run changes them on its way and every method can run the scene.
+    All effects are modelled, so that no run changes them on its way; uplift only where `Auto` selects it at the start,
+    since most of the methods have none: a run in which a surface opens then fails.
     """
-    scene = with_all_effects(scene)
+    every = with_all_effects(scene)
+    if every is not scene:
+        scene = replace(every, effects=replace(every.modelled, uplift=scene.modelled.uplift))
     if scene.stop is None:
         return scene
     end = float(simulate(replace(scene, output_step=None)).history.time[-1])

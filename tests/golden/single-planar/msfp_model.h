@@ -37,7 +37,9 @@
 #define MSFP_PLASTIC 0 /* friction is elastic-perfectly plastic */
 #define MSFP_LAW 0 /* mu = constant */
 #define MSFP_LAW_VALUES 0 /* numbers of the friction law, the last ones of a surface */
-#define MSFP_HEAT 0 /* exponential states of the temperature of a surface */
+#define MSFP_HEAT 0 /* states of the temperature of a surface */
+#define MSFP_HEAT_RATES { 6000.0, 1683.2329748, 472.21220791, 132.47385991, 37.16406155, 10.425962313, 2.9248872599, 0.82054444726, 0.23019457849, 0.064578517522, 0.018116781693, 0.0050824607238, 0.0014258275806, 0.0004 }
+#define MSFP_HEAT_WEIGHTS { 120.78817073, 28.458871434, 15.622216602, 8.3021979222, 4.3187491334, 2.3486816271, 1.2081621465, 0.65997556553, 0.33852067045, 0.18581755062, 0.093342760085, 0.057161762604, 0.010537004578, 0.042786061899 }
 
 /* +1: the surface is concave up, -1: concave down. */
 #define MSFP_SIGNS { 1 }

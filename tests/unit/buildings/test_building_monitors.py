@@ -12,8 +12,9 @@ from msfp_gen import Auto, Effects, RunError, simulate
 from msfp_gen.buildings import effects as selection
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.switching import switch
+from msfp_gen.buildings.switching import notes_until_now, switch
 from msfp_gen.results.restart_state import RestartState
+from msfp_gen.scene import monitors
 
 
 @pytest.fixture
@@ -90,6 +91,24 @@ def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fi
     assert caught.value.status == "uplift" and [note.text[:10] for note in notes] == ["bearing 3:", "bearing 2:"]
     assert all(0 < note.value < 0.05 * LOAD * 1.2 and not note.action for note in notes)
     assert notes[0].time < found.time[-1] + 0.01 and not any(each.model_changes for each in found.bearings)
+
+
+@pytest.mark.usefixtures("unforeseen")
+def test_notes_of_heat_give_the_peak_over_all_models_of_a_bearing(monkeypatch):
+    """Two of the bearings change their model after the limit of heat, here a hundredth of the usual one, is passed."""
+    monkeypatch.setattr(monitors, "NOTED_SOFTENING", 5e-4)
+    run, highest = start_run(rocking(None)), np.zeros(4)
+    while run.run.advance(10) or switch(run):
+        parts = [RestartState.of_port(member.port).monitor_heat for member in run.members]
+        highest = np.maximum(highest, [each.sum(axis=1).max() for each in parts])
+    notes = {index: note for index, note in notes_until_now(run) if note.kind == "heat"}
+    assert sorted(notes) == [0, 1, 2, 3]
+    for index, note in notes.items():
+        assert highest[index] <= note.value < 1.05 * highest[index] and note.time < 0.5 * run.time
+    assert {change.bearing for change in run.changes} == {1, 2}
+    for change in run.changes:
+        before = next(note for note in change.notes if note.kind == "heat")
+        assert before.time == notes[change.bearing].time and before.value < notes[change.bearing].value
 
 
 def test_a_damaged_change_of_models_is_refused():

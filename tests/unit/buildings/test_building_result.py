@@ -169,8 +169,8 @@ def test_notes_of_monitors_name_the_bearing():
     found = replace(result(), monitored=(*heat[::-1], (0, uplift), (2, replace(uplift, time=0.3, action=""))))
     assert [note.line for note in found.notes] == [
         "t = 0.14 s: bearing 1 (A): it is unloaded; continued with uplift = True",
-        "t = 0.2 s: bearing 1 (A): it is hot; the same holds for 2 other bearings",
         "t = 0.3 s: bearing 3: it is unloaded",
+        "t = 2.2 s: bearing 3: it is hot; the same holds for 2 other bearings, with less",
     ]
     assert found.bearings[0].model_changes == (uplift,) and found.bearings[2].model_changes == ()
     assert "notes" in repr(found)

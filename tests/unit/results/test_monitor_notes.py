@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects
-from msfp_gen.results.monitor_notes import monitor_notes
+from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending
 
 
@@ -23,6 +23,26 @@ def test_a_switch_for_heat_is_no_answer_to_the_law() -> None:
         "heat": "friction = pvt",
         "uplift": "uplift = True, sliders = inertial",
     }
+
+
+def test_a_note_gives_the_largest_value_since_its_time() -> None:
+    """Of the model that goes on, and of the next one; a note of a switch stays as it is."""
+    effects = Effects(dimension="planar", rims=False, sliders="massless")
+    first = Ending(effects, "ok", 2.0, 0, 0.0, {"heat": (0.5, 1, 12.0), "rims": (1.0, 2, 0.01)})
+    second = first._replace(
+        effects=Effects(rims=False), time=4.0, trips={"heat": (2.1, 3, 65.0), "rims": (2.2, 1, 0.002)}
+    )
+    notes = joined_notes(monitor_notes(first, second.effects), monitor_notes(second, None))
+    assert [(note.kind, note.time, note.surface, note.value) for note in notes] == [
+        ("heat", 0.5, 3, 65.0),
+        ("rims", 1.0, 2, 0.01),
+        ("plane", 2.0, 0, 0.0),
+    ]
+    assert notes[0].text.startswith("from here on, friction may heat surface 3 by up to 65 K")
+    (stopped,) = monitor_notes(first._replace(status="guard", trips={"rims": (2.0, 2, 0.01)}), None)
+    assert stopped.text.startswith("a slider is 0.01 m beyond the capacity of surface 2")
+    switched = replace(notes[0], action="friction = pvt")
+    assert joined_notes([switched], [notes[0]]) == [switched, notes[0]]
 
 
 @pytest.mark.parametrize("status", ["newton", "irregular"])

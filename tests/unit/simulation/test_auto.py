@@ -26,6 +26,7 @@ from msfp_gen import (
 )
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.result import Result
+from msfp_gen.results.restart_state import RestartState
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, next_effects
 from msfp_gen.scene.explain import explain
@@ -33,6 +34,7 @@ from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
+from msfp_gen.simulation.simulate import RunSequence
 
 FULL = Effects()
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
@@ -299,13 +301,40 @@ def test_heat_without_numbers_is_noted() -> None:
     assert result.summary["notes"] == [note.line for note in result.notes]
 
 
-def test_a_watch_bounds_the_heat_from_above() -> None:
-    """The bound holds against the temperature that the law of Kumar et al. itself computes."""
-    full = simulate(replace(kumar(), effects=Effects(friction="pvt")))
-    noted = next(note for note in simulate(kumar()).notes if note.kind == "heat")
+def test_the_temperatures_of_the_monitor_are_those_of_the_law() -> None:
+    """Of the law of Kumar et al. where heat does not change friction; the run is handed over with them."""
+    scene = kumar()
+    cold = replace(scene, bearing=scene.bearing.replace(temperature_ratio=1.0), effects=Auto(friction="pv"))
+    full = simulate(replace(cold, effects=Effects(friction="pvt")))
+    run = RunSequence.of(cold)
+    run.run_segment(None)
+    at = RestartState.of(run.segments[0].model, run.segments[0].run, 0.0)
     assert full.history.temperature is not None
-    before = full.history.time <= noted.time
-    assert full.history.temperature[before].max() - 20.0 <= noted.value
+    np.testing.assert_allclose(at.temperature_parts.sum(axis=1), full.history.temperature[-1] - 20.0, rtol=0.03)
+
+
+def test_the_note_of_heat_gives_the_peak(tmp_path: Any, monkeypatch: Any) -> None:
+    """The limit is passed at 0.6 s, the peak is that of the last of two models; streamed and resumed runs agree."""
+    time = np.linspace(0.0, 12.0, 601)
+    moved = np.zeros((601, 3))
+    moved[:, 0] = 0.012 * np.minimum(time, 7.0) * np.sin(np.pi * time)
+    moved[:, 1] = 0.02 * np.sin(np.pi * np.clip(time - 8.0, 0.0, None) / 4.0) ** 3
+    scene = replace(kumar(), motion=Motion.from_arrays(time, moved), effects=Auto(friction="pv"))
+    result = simulate(scene)
+    (note,) = (note for note in result.notes if note.kind == "heat")
+    full = simulate(
+        replace(scene, bearing=scene.bearing.replace(temperature_ratio=1.0), effects=Effects(friction="pvt"))
+    )
+    assert full.history.temperature is not None and kinds(result) == ["plane"]
+    rise = full.history.temperature - 20.0
+    assert rise[full.history.time < 2.0].max() < 0.2 * rise.max() and note.time < 2.0
+    assert note.value == pytest.approx(rise.max(), rel=0.03) and note.surface == rise.max(axis=0).argmax() + 1
+    assert f"from here on, friction may heat surface {note.surface} by up to {note.value:.3g} K" in note.line
+    assert note in simulate(scene, stream=tmp_path / "rows.nc").notes
+    monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
+    with pytest.raises(RunError, match="interrupted"):
+        simulate(scene, progress=stopping_at(6.0), checkpoint=tmp_path / "run.ck", every=0.0)
+    assert note in simulate(scene, checkpoint=tmp_path / "run.ck", every=0.0, resume=True).notes
 
 
 # ---- going on -----------------------------------------------------------------------------------------
