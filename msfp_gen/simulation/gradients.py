@@ -37,7 +37,7 @@ UNDAMPED = f"surface {{surface}} has no contact damping, and ringing of its slid
 RINGS_AT_RIM = (
     "surface {surface} met its rim, and sliders ring after it: contact_damping = {damping:.3g} s is below their "
     "critical damping ({critical:.2g} s), so that gradients contain the phase of the ringing and may not converge as "
-    "solver.rtol falls; give contact_damping = 1e-3"
+    "solver.rtol falls; give contact_damping = {advised:.2g}"
 )
 
 LARGEST_ERROR = 0.05  # without a note
@@ -128,9 +128,9 @@ def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gra
 
 
 def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Result:
-    """The result with the errors of its derivatives, or with a note where they cannot be measured or are large.
+    """The result with the errors of its derivatives, and with a note where they cannot be measured or are large.
 
-    run: of a scene, with the same derivatives.
+    run: of a scene, with the same derivatives. Raises RunError where it is interrupted.
     """
     scene, gradients = result.scene, result.gradients
     assert gradients is not None
@@ -140,6 +140,8 @@ def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Resu
     try:
         error = measured_errors(result, run(replace(scene, solver=tenth)))
     except (InputError, RunError) as failure:
+        if isinstance(failure, RunError) and failure.status == "interrupted":
+            raise
         note = Note(contact.time, "gradient", contact.surface, 0.0, NOT_MEASURED.format(failure=failure))
         return replace(result, notes=(*result.notes, note))
     largest, path = max((_of_peaks(error, gradients, i), p.path) for i, p in enumerate(gradients.parameters))
@@ -174,5 +176,6 @@ def gradient_notes(sequence: RunParts, events: Sequence[Event]) -> tuple[Note, .
     critical = slider_period(sequence.given) / pi  # T omega/2 = 1
     if contact is None or effects.sliders == "massless" or damping >= critical:
         return ()
-    text = RINGS_AT_RIM.format(surface=contact.surface, damping=damping, critical=critical)
+    advised = max(1e-3, 1.2 * critical)
+    text = RINGS_AT_RIM.format(surface=contact.surface, damping=damping, critical=critical, advised=advised)
     return (Note(contact.time, "ringing", contact.surface, damping, text),)
