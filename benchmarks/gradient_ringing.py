@@ -34,7 +34,7 @@ def means(damping: float, rtol: float) -> list[float]:
     """Mean derivative of the force with respect to the friction of surface 1 in each window [kN]."""
     scene = sampled(damping)
     scene = replace(scene, solver=replace(scene.solver, rtol=rtol))
-    result = simulate(scene, gradients=[PARAMETER])
+    result = simulate(scene, gradients=[PARAMETER], gradient_errors=False)
     at, force = result.history.time, result.gradient.top_force.values[0, :, 0]
     return [1e-3 * float(force[(at > first) & (at < last)].mean()) for first, last in WINDOWS]
 
@@ -44,7 +44,8 @@ def small_changes() -> None:
     scene = sampled(DAMPING[0])
     solver = replace(scene.solver, rtol=1e-10, method="esdirk4", max_step=1.5e-5)
     scene, row = replace(scene, solver=solver, duration=6.8), 6799
-    print(f"gradient: {simulate(scene, gradients=[PARAMETER]).gradient.tilt.values[0, row, 2, 1]:.3f}", flush=True)
+    result = simulate(scene, gradients=[PARAMETER], gradient_errors=False)
+    print(f"gradient: {result.gradient.tilt.values[0, row, 2, 1]:.3f}", flush=True)
     for change in (1e-6, 1e-5):
         tilts = []
         for sign in (1, -1):

@@ -15,6 +15,7 @@ from msfp_gen.results.history import LABELS
 from msfp_gen.results.peaks import gradients_of_extremes
 
 if TYPE_CHECKING:
+    from msfp_gen.results.gradient import Gradients
     from msfp_gen.results.run_data import RunData
     from msfp_gen.scene.parameters import Parameter
 
@@ -22,6 +23,7 @@ WITHOUT = {
     "rims_met": "it is a list of surfaces, which jumps where another rim is met",
     "transitions": "they are read from rows",
     "counters": "they count the work of the solver",
+    "error": "errors are measured where a slider meets its rim",
     "energy": "its terms are integrals over the run, which simulate(..., energy_gradients=True) differentiates",
 }
 """Keys of the summary that have no derivative, or only where it was asked for, with the reason."""
@@ -40,27 +42,31 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
 
     Keys: peak_displacement, peak_top_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
     maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary; and of runs with
-    `energy_gradients` energy, those of the terms of `History.energy` at the end. Raises InputError where the run
-    computed no derivatives, and for a key whose value jumps (`WITHOUT`).
+    `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors were measured, error:
+    that of each derivative, with the same keys. Raises InputError where the run computed no derivatives, and for a key
+    whose value jumps (`WITHOUT`).
     """
     gradients = gradients_of(result)
     recorded = result.recorded_extremes
     assert recorded is not None  # a run that computed derivatives has recorded its extremes
     slopes = gradients_of_extremes(gradients, result.history, recorded)
-    return {
-        parameter.path: _summary(result, i, {name: values[i] for name, values in slopes.items()})
-        for i, parameter in enumerate(gradients.parameters)
-    }
+    found = dict[str, dict[str, Any]]()
+    for i, parameter in enumerate(gradients.parameters):
+        own = {name: values[i] for name, values in slopes.items()}
+        found[parameter.path] = _summary(gradients, i, own, _ratio_slope(result, parameter, float(own["top_force"][3])))
+        if gradients.error is not None:
+            own, load = gradients.error.extremes[i].arrays, axial_load(result)
+            ratio = float(own["top_force"][3]) / load if load else None
+            found[parameter.path]["error"] = _summary(gradients.error, i, own, ratio)
+    return found
 
 
-def _summary(result: RunData, index: int, slopes: dict[str, Array]) -> SummaryGradient:
-    gradients = gradients_of(result)
+def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: float | None) -> SummaryGradient:
     names = (*LABELS["axis"], "radial")
-    force = slopes["top_force"]
     found = SummaryGradient(
         peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
-        peak_top_force=dict(zip(names, force.tolist(), strict=True)),
-        peak_force_ratio=_ratio_slope(result, gradients.parameters[index], float(force[3])),
+        peak_top_force=dict(zip(names, slopes["top_force"].tolist(), strict=True)),
+        peak_force_ratio=ratio,
         peak_sliding=slopes["sliding"].tolist(),
         minimum_gap=slopes["gap"].tolist(),
         minimum_normal_force=slopes["least_normal"].tolist(),

@@ -80,8 +80,13 @@ class Extremes:
     @property
     def table(self) -> dict[str, list[float]]:
         """As plain data; what was not recorded is left out."""
+        return {name: value.tolist() for name, value in self.arrays.items()}
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """What was recorded, by name."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {name: value.tolist() for name, value in values.items() if value is not None}
+        return {name: value for name, value in values.items() if value is not None}
 
     def __or__(self, other: Extremes) -> Extremes:
         """Extremes of both."""

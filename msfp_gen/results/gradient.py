@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 CONSTANT = ("time", "lift", "separation", "temperature", "energy")  # fields of `History` that are treated apart
 ENERGIES = ("kinetic", "potential", "restraint", "rim_stored")  # terms of the state; the others are integrals
 WITH_INTEGRALS = tuple(name for name in ENERGY if not name.startswith("seat_"))  # which only models with uplift have
+ERROR = "_error"  # ends the name of the variable with the error of a derivative
 EVENT = 7  # numbers of an event: time, displacement, top force
 
 
@@ -34,6 +35,7 @@ class Gradients:
         energy: the same of energies, shape (k, T): of those that the state determines, or also of the integrals.
         event_time, event_displacement, event_top_force: shape (k, e), (k, e, 3), (k, e, 3).
         extremes: k of them, of `RunData.extremes`.
+        error: errors of all of these, measured where a rim was met (`results.gradient_error`); None: not measured.
     """
 
     parameters: tuple[Parameter, ...]
@@ -43,6 +45,7 @@ class Gradients:
     event_displacement: Array
     event_top_force: Array
     extremes: tuple[Extremes, ...]
+    error: Gradients | None = None
 
     @classmethod
     def of_run(

@@ -9,7 +9,7 @@ import numpy as np
 
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import coordinates_of, named_columns
-from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.gradient import ERROR, Gradients
 from msfp_gen.results.history import ENERGY
 from msfp_gen.results.run_data import RunData
 
@@ -30,6 +30,7 @@ def gradients_of(result: RunData) -> Gradients:
 def to_gradient_dataset(result: RunData) -> xr.Dataset:
     """Derivatives of the variables of the dataset of a run, under their names, with the first dimension `parameter`.
 
+    Where the errors of the derivatives were measured, each has a variable `..._error` beside it.
     Attributes of a variable: `units`, those of the quantity over `parameter_unit`, which differs between parameters;
     coordinate `parameter_unit`: unit of each parameter; `parameter_value`: its value in the scene.
     """
@@ -41,8 +42,21 @@ def to_gradient_dataset(result: RunData) -> xr.Dataset:
         f"{PARAMETER}{suffix}": (PARAMETER, np.array([getattr(p, name) for p in gradients.parameters], kind))
         for name, suffix, kind in about
     }
-    variables = dict([*_rows(gradients), *_energies(gradients), *_events(gradients)])
+    variables = dict(_variables(gradients))
+    if gradients.error is not None:
+        for name, (dims, values, meaning) in _variables(gradients.error):
+            variables[f"{name}{ERROR}"] = (
+                dims,
+                values,
+                meaning | {"long_name": f"error of the {meaning['long_name']}"},
+            )
     return xr.Dataset(variables, coordinates_of(result.history) | coordinates)
+
+
+def _variables(gradients: Gradients) -> Variables:
+    yield from _rows(gradients)
+    yield from _energies(gradients)
+    yield from _events(gradients)
 
 
 def _derivative(unit: str, meaning: str) -> dict[str, str]:

@@ -92,4 +92,6 @@ def gradient_group(result: RunData, gradients: Gradients) -> xr.Dataset:
     dataset = to_gradient_dataset(result)
     dataset.attrs["parameters"] = json.dumps([asdict(parameter) for parameter in gradients.parameters])
     dataset.attrs["extremes"] = json.dumps([each.table for each in gradients.extremes])
+    if gradients.error is not None:
+        dataset.attrs["extremes_error"] = json.dumps([each.table for each in gradients.error.extremes])
     return dataset

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS, Gradients
+from msfp_gen.results.gradient import ENERGIES, ERROR, WITH_INTEGRALS, Gradients
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.parameters import Parameter
 
@@ -26,12 +26,9 @@ def from_group(root: StoredGroup, rows: int, surfaces: int, events: int) -> tupl
     rows, surfaces, events: their number in the run. Raises ValueError where something is not as expected.
     """
     group = root.group(GROUP)
-    about = group.attributes(lambda name: name in ("parameters", "extremes"))
+    about = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
     parameters = tuple(_parameter(given) for given in json.loads(str(about["parameters"])))
-    extremes = tuple(Extremes.of_table(given) for given in json.loads(str(about["extremes"])))
     count, read = len(parameters), dict[str, Any](about)
-    if len(extremes) != count or not count:
-        raise ValueError("the derivatives of the extremes are not those of the parameters")
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
 
     def array(name: str, *shape: int) -> Array:
@@ -41,20 +38,26 @@ def from_group(root: StoredGroup, rows: int, surfaces: int, events: int) -> tupl
         read[name] = values
         return values
 
-    found = {}
-    for field, quantity in quantities().items():
-        parts = quantity.names or (field,)
-        if field == "time" or not any(name in group for name in parts):
-            continue
-        dims = quantity.dims[:-1] if len(parts) > 1 else quantity.dims
-        columns = [array(name, rows, *(sizes[dim] for dim in dims)) for name in parts if name in group]
-        found[field] = columns[0] if len(parts) == 1 else np.stack(columns, axis=-1)
-    energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
-    energy = {name: array(f"energy_{name}", rows) for name in energies}
-    time, displacement, force = (
-        array(name, events, *shape) for name, shape in zip(EVENT_ARRAYS, ((), (3,), (3,)), strict=True)
-    )
-    return Gradients(parameters, found, energy, time, displacement, force, extremes), read
+    def gradients(suffix: str = "", error: Gradients | None = None) -> Gradients:
+        extremes = tuple(Extremes.of_table(given) for given in json.loads(str(about[f"extremes{suffix}"])))
+        if len(extremes) != count or not count:
+            raise ValueError("the derivatives of the extremes are not those of the parameters")
+        found = {}
+        for field, quantity in quantities().items():
+            parts = [f"{name}{suffix}" for name in quantity.names or (field,)]
+            if field == "time" or not any(name in group for name in parts):
+                continue
+            dims = quantity.dims[:-1] if len(parts) > 1 else quantity.dims
+            columns = [array(name, rows, *(sizes[dim] for dim in dims)) for name in parts if name in group]
+            found[field] = columns[0] if len(parts) == 1 else np.stack(columns, axis=-1)
+        energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
+        energy = {name: array(f"energy_{name}{suffix}", rows) for name in energies}
+        time, displacement, force = (
+            array(f"{name}{suffix}", events, *shape) for name, shape in zip(EVENT_ARRAYS, ((), (3,), (3,)), strict=True)
+        )
+        return Gradients(parameters, found, energy, time, displacement, force, extremes, error)
+
+    return gradients(error=gradients(ERROR) if f"extremes{ERROR}" in about else None), read
 
 
 def _parameter(given: dict[str, Any]) -> Parameter:

@@ -69,6 +69,9 @@ typedef struct {
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
     double settlement_ratio;    /* compliance of spring and unilateral contacts over that of the spring alone */
     double weight;              /* of the moving bodies and the supported mass [N] */
+#if MSFP_GRADIENTS
+    int held_rim; /* surface, from 1, whose rim pulls too while a step to its release is differentiated; 0: none */
+#endif
 } msfp_parameters;
 
 /* Fill `p`. gravity [m/s^2]; bodies [MSFP_NB + 1][MSFP_BODY_VALUES]; surfaces [MSFP_NB][MSFP_SURFACE_VALUES];

@@ -51,6 +51,7 @@ def simulate(
     stream: str | Path | None = None,
     gradients: Sequence[str] = (),
     energy_gradients: bool = False,
+    gradient_errors: bool = True,
 ) -> Result: ...
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import pi
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from msfp_gen.errors import InputError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS, Gradients
+from msfp_gen.results.gradient_error import measured_errors
 from msfp_gen.results.note import Note
 from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.parameters import Parameter, parameters_of
@@ -18,6 +20,7 @@ from msfp_gen.simulation.settling import needs_settling
 from msfp_gen.specification.layout import ModelSpec
 
 if TYPE_CHECKING:
+    from msfp_gen.result import Result
     from msfp_gen.results.history import Event
     from msfp_gen.scene.scene import Scene
     from msfp_gen.simulation.segment import Segment
@@ -34,8 +37,17 @@ UNDAMPED = f"surface {{surface}} has no contact damping, and ringing of its slid
 RINGS_AT_RIM = (
     "surface {surface} met its rim, and sliders ring after it: contact_damping = {damping:.3g} s is below their "
     "critical damping ({critical:.2g} s), so that gradients contain the phase of the ringing and may not converge as "
-    "solver.rtol falls; give contact_damping = 1e-3"
+    "solver.rtol falls; give contact_damping = {advised:.2g}"
 )
+
+LARGEST_ERROR = 0.05  # without a note
+PEAKS = ("displacement", "top_force", "sliding")
+LARGE_ERROR = (
+    "surface {surface} met its rim, and derivatives of peaks with respect to {path} have errors of up to {share:.0%}: "
+    "gradient_summary[path]['error'] and the variables ..._error of the gradient state them; a smaller solver.rtol "
+    "reduces them"
+)
+NOT_MEASURED = "the errors of the gradients are not known, since the run at a tenth of the tolerance failed: {failure}"
 
 CONTACT_IN_LONG_STEP = (
     "energy_gradients = True: at {time:.4g} s surface {surface} meets or leaves its rim in quasi-static steps, whose "
@@ -115,6 +127,35 @@ def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gra
     return found
 
 
+def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Result:
+    """The result with the errors of its derivatives, and with a note where they cannot be measured or are large.
+
+    run: of a scene, with the same derivatives. Raises RunError where it is interrupted.
+    """
+    scene, gradients = result.scene, result.gradients
+    assert gradients is not None
+    solver, atol = scene.solver, scene.solver.atol_angle
+    tenth = replace(solver, rtol=solver.rtol / 10, atol_angle=None if atol is None else atol / 10)
+    contact = next(event for event in result.events if event.kind == "rim_contact")
+    try:
+        error = measured_errors(result, run(replace(scene, solver=tenth)))
+    except (InputError, RunError) as failure:
+        if isinstance(failure, RunError) and failure.status == "interrupted":
+            raise
+        note = Note(contact.time, "gradient", contact.surface, 0.0, NOT_MEASURED.format(failure=failure))
+        return replace(result, notes=(*result.notes, note))
+    largest, path = max((_of_peaks(error, gradients, i), p.path) for i, p in enumerate(gradients.parameters))
+    text = LARGE_ERROR.format(surface=contact.surface, path=path, share=largest)
+    notes = (Note(contact.time, "gradient", contact.surface, largest, text),) if largest > LARGEST_ERROR else ()
+    return replace(result, gradients=replace(gradients, error=error), notes=(*result.notes, *notes))
+
+
+def _of_peaks(error: Gradients, gradients: Gradients, index: int) -> float:
+    """The largest error of the derivative of a peak, over the largest derivative of peaks of its kind."""
+    errors, slopes = (each.extremes[index].arrays for each in (error, gradients))
+    return max(float(errors[name].max() / (np.abs(slopes[name]).max() or np.inf)) for name in PEAKS)
+
+
 def undamped_surfaces(scene: Scene, effects: Effects) -> list[int]:
     """Surfaces (1..n-1) whose slider rings undamped while it is stuck."""
     if effects.sliders == "massless":
@@ -135,5 +176,6 @@ def gradient_notes(sequence: RunParts, events: Sequence[Event]) -> tuple[Note, .
     critical = slider_period(sequence.given) / pi  # T omega/2 = 1
     if contact is None or effects.sliders == "massless" or damping >= critical:
         return ()
-    text = RINGS_AT_RIM.format(surface=contact.surface, damping=damping, critical=critical)
+    advised = max(1e-3, 1.2 * critical)
+    text = RINGS_AT_RIM.format(surface=contact.surface, damping=damping, critical=critical, advised=advised)
     return (Note(contact.time, "ringing", contact.surface, damping, text),)

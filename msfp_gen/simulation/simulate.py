@@ -34,7 +34,13 @@ from msfp_gen.simulation.checkpoint import (
     segment_file,
 )
 from msfp_gen.simulation.gradient_inputs import start_gradients
-from msfp_gen.simulation.gradients import gradient_notes, gradient_parameters, run_gradients, switching_error
+from msfp_gen.simulation.gradients import (
+    gradient_notes,
+    gradient_parameters,
+    run_gradients,
+    switching_error,
+    with_gradient_errors,
+)
 from msfp_gen.simulation.memory import outgrown, require_room
 from msfp_gen.simulation.notes import history_notes, landing_notes
 from msfp_gen.simulation.outcome import extremes_of, message_of, provenance_of
@@ -67,6 +73,7 @@ def simulate(
     stream: str | Path | None = None,
     gradients: Sequence[str] = (),
     energy_gradients: bool = False,
+    gradient_errors: bool = True,
 ) -> Result:
     """Integrate a scene.
 
@@ -93,6 +100,9 @@ def simulate(
         Paths of parameters (`bearing.surfaces[*].friction`) by which the run is differentiated: docs/gradients.md.
     energy_gradients
         Whether the energies that are integrals over the run are differentiated too, at up to four fifths more cost.
+    gradient_errors
+        Whether the errors of the derivatives of a run that meets a rim are measured, by another run at a tenth of its
+        tolerance.
 
     Returns
     -------
@@ -127,6 +137,19 @@ def simulate(
     result = sequence.result()
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
+    if gradient_errors and parameters and any(event.kind == "rim_contact" for event in result.events):
+
+        def again(changed: Scene) -> Result:
+            return simulate(
+                changed,
+                progress=progress,
+                strict=strict,
+                gradients=gradients,
+                energy_gradients=energy_gradients,
+                gradient_errors=False,
+            )
+
+        return with_gradient_errors(result, again)
     return result
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from support import scene_of
+from support import Array, scene_of
 from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
 
-from msfp_gen import Effects, Motion, Scene, load_scene, simulate
+from msfp_gen import Effects, Motion, Result, Scene, load_scene, simulate
 from msfp_gen.results.gradient import WITH_INTEGRALS
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 
@@ -183,6 +184,100 @@ def test_times_of_rim_events_of_massless_bodies(method: str, rtol: float) -> Non
         found, noise = derivative([np.array(run.events[index].time) for run in runs], step)
         assert noise <= 1e-3 * abs(found)
         assert given[index] == pytest.approx(float(found), rel=1e-3)
+
+
+def slow_contact() -> Scene:
+    """Test 5 of PEER 2017/07 with damped contacts: a slider approaches its rim at 4 mm/s."""
+    scene = scene_of("fenz-test5", duration=24.0, output_step=0.1)
+    return replace(scene, bearing=scene.bearing.replace(**DAMPED), stop=None, motion_table=None)
+
+
+def massless_contacts() -> Scene:
+    """Four contacts of a massless single pendulum."""
+    scene = rims_single()[0]
+    return replace(scene, solver=replace(scene.solver, max_step=None), output_step=0.02)
+
+
+def fast_contacts() -> Scene:
+    """The triple pendulum of PEER 2017/07 at 0.5 Hz: a rim is met and left twice, and sliders ring."""
+    scene = scene_of("fenz-test2", duration=2.0, output_step=0.02, stop=None, motion_table=None)
+    scene = replace(scene, bearing=scene.bearing.replace(**DAMPED))
+    return replace(scene, motion=Motion.harmonic(0.12, 0.5, cycles=1.0))
+
+
+CAPACITY = "bearing.surfaces[0].capacity"
+RINGING = {slow_contact: 0.7, massless_contacts: 0.01, fast_contacts: 0.1}
+"""Time after an event in which differences contain the phase of ringing [s]."""
+Runs = Callable[[float, str], Result]
+
+
+@cache
+def reference(scene: Callable[[], Scene]) -> tuple[Runs, Result, Array]:
+    """Runs of a scene by tolerance and method, with derivatives by a capacity; a tight one; rows away from events."""
+
+    @cache
+    def run(rtol: float, method: str, capacity: float | None = None) -> Result:
+        given = scene()
+        changed = replace(given, solver=replace(given.solver, rtol=rtol, method=method))
+        if capacity is None:
+            return simulate(changed, gradients=[CAPACITY])
+        (parameter,) = parameters_of(changed, [CAPACITY])
+        return simulate(changed_parameters(changed, {parameter: capacity}))
+
+    tight = run(1e-10, "esdirk4")
+    time = tight.history.time
+    since = time - np.array([[event.time] for event in tight.events])
+    rows = ~np.any((since > -0.02) & (since < RINGING[scene]), axis=0) & (time > 0)
+    value = scene().bearing.surfaces[0].capacity
+    above, below = (run(1e-10, "esdirk4", value * (1 + sign * 1e-4)).history.sliding[rows] for sign in (1, -1))
+    found, exact = (above - below) / (2e-4 * value), tight.gradient.sliding.values[0][rows]
+    assert np.abs(found - exact).max() <= (1e-2 if scene is fast_contacts else 1e-4) * np.abs(found).max()
+    return run, tight, rows
+
+
+@pytest.mark.parametrize(
+    ("scene", "method", "limits"),
+    [(slow_contact, "implicit", {1e-4: 1e-4, 1e-5: 3e-5, 1e-6: 5e-6}),
+     (slow_contact, "esdirk4", {1e-5: 3e-4, 1e-6: 3e-5}),
+     (massless_contacts, "implicit", {1e-4: 1e-5}),
+     (massless_contacts, "esdirk4", {1e-4: 1e-4, 1e-6: 1e-5})],
+)  # fmt: skip
+def test_derivatives_after_rim_contacts_are_as_exact_as_the_run(
+    scene: Callable[[], Scene], method: str, limits: dict[float, float]
+) -> None:
+    """The time of the contact, and rows in steps that move with it, cost no accuracy at ordinary tolerances."""
+    run, tight, rows = reference(scene)
+    exact = tight.gradient.sliding.values[0][rows]
+    for rtol, limit in limits.items():
+        result = run(rtol, method)
+        error = np.abs(result.gradient.sliding.values[0][rows] - exact).max()
+        assert error <= limit * np.abs(exact).max(), (method, rtol)
+        times = result.gradient.event_time.values / tight.gradient.event_time.values
+        assert np.abs(times - 1).max() <= 1e-3, (method, rtol)
+
+
+@pytest.mark.parametrize(
+    ("scene", "least"),
+    [(slow_contact, 0.95), (massless_contacts, 0.95), pytest.param(fast_contacts, 0.85, marks=slow)],
+)
+def test_the_stated_error_covers_the_true_one(scene: Callable[[], Scene], least: float) -> None:
+    """Of 95 of 100 rows, and the largest error of sliding displacements in every run.
+
+    Of forces while sliders ring, which both runs filter, of 85 of 100.
+    """
+    run, tight, rows = reference(scene)
+    covered = dict[str, list[Array]](sliding=[], top_force=[])
+    for method in ("implicit", "esdirk4"):
+        for rtol in (1e-4, 1e-5, 1e-6):
+            gradient = run(rtol, method).gradient
+            for name, of_runs in covered.items():
+                exact, stated = tight.gradient[name].values[0][rows], gradient[f"{name}_error"].values[0][rows]
+                noise = 1e-6 * np.abs(exact).max()  # of the tight run
+                error = np.abs(gradient[name].values[0][rows] - exact)
+                of_runs.append(np.ravel(error <= stated + noise))
+                assert name == "top_force" or error.max() <= stated.max() + noise, (method, rtol)
+    assert np.mean(np.concatenate(covered["sliding"])) >= 0.95
+    assert np.mean(np.concatenate(covered["top_force"])) >= least
 
 
 def sampled_contact(rtol: float, method: str, max_step: float | None = None) -> Scene:

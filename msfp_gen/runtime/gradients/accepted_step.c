@@ -5,6 +5,8 @@
 
 #if MSFP_GRADIENTS
 enum { NB = MSFP_NB, NQ = MSFP_NQ, DOF = MSFP_DOF, C = MSFP_COLUMNS };
+static const double shortest_settling = 0.02, longest_settling = 0.1; /* of what follows a rim contact [s] */
+static const double slight_pull = 1e-3; /* of the normal force: a pull that does not change the motion */
 
 /* Whether the row of the end of the step enters what is recorded. */
 static int end_is_recorded(const msfp_run *run)
@@ -46,80 +48,121 @@ static int rim_at_end(const msfp_run *run, const double *before, const double *a
     return -1;
 }
 
-/* Whether the end of the step is a time that does not depend on the parameters. Other steps keep their length, so that
- * all steps after an event move with it: their errors then depend on the time since the event, which does not change. */
+/* Whether the end of the step is a time that does not depend on the parameters. Steps that follow an event keep their
+ * length, so that they move with it: their errors then depend on the time since the event, which does not change. Once
+ * the event has settled, and steps have grown with the time since it, they move no longer: errors of long steps, and of
+ * rows inside them, depend on where the steps are. The step that ends the motion must itself be short. */
 static int ends_at_fixed_time(const msfp_run *run)
 {
     const msfp_options *o = &run->options;
-    const double t = run->next.t;
-    return t == o->duration || (run->stop < o->stop_count && t == o->stops[run->stop]) ||
+    const double t = run->next.t, since_event = t - run->gradients->event_time;
+    const double share = (t - run->now.t) / since_event;
+    const int settled = since_event > longest_settling ||
+                        (since_event > shortest_settling && share > 0.1 && share < 0.5);
+    return settled || t == o->duration || (run->stop < o->stop_count && t == o->stops[run->stop]) ||
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
 }
 
-/* The first stage with the damping force of a rim that the step only just meets; 0: none. This force begins at the end
- * of the step and must not count as an acceleration of a longer step. */
-static int stage_in_new_contact(const msfp_run *run, int rim, const double *before)
+/* Gap of surface j at the end of the step [m], and its rate [m/s]. */
+static double gap_at_end(const msfp_run *run, int j, double *rate)
 {
-    const int stages = rim >= 0 && before[rim] > 0.0 ? msfp_tableau_of(run->options.method)->stages : 0;
-    for (int i = 1; i < stages; ++i)
-        if (run->gradients->trail.work[i].rim_active[rim])
-            return i;
-    return 0;
+    static const msfp_parameter_columns constant;
+    msfp_columns rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
+    double sliding[NB][MSFP_GAP_SIZE];
+    memset(v, 0, sizeof v);
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < NQ; ++i)
+            v[k][i][0] = run->next.v[k][i];
+    msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, sliding, rates);
+    *rate = rates[j][MSFP_GAP_G][0];
+    return sliding[j][MSFP_GAP_G];
 }
 
 void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt)
 {
-    static const msfp_parameter_columns constant;
-    msfp_columns gaps[NB][MSFP_GAP_SIZE], rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
-    double sliding[NB][MSFP_GAP_SIZE];
-    const double *now = msfp_rates_of_stage(run, msfp_last_stage(run));
-    memset(v, 0, sizeof v);
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < NQ; ++i)
-            v[k][i][0] = now[k * NQ + i];
+    msfp_columns gaps[NB][MSFP_GAP_SIZE];
+    double sliding[NB][MSFP_GAP_SIZE], rate;
     msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, sliding, gaps);
-    msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, sliding, rates);
-    const double rate = rates[j][MSFP_GAP_G][0];
+    gap_at_end(run, j, &rate);
     for (int c = 0; c < C; ++c)
         dt[c] = rate != 0.0 ? -gaps[j][MSFP_GAP_G][c] / rate : 0.0;
 }
 
-/* Columns of the accepted step. rim: the surface whose rim is met or left at its end, -1: none. */
-static int step_columns(msfp_run *run, int rim, int prescribed)
+/* Columns of the state at the end of the step, whose length has the columns group->h. */
+static void step_columns(msfp_run *run, msfp_group *group)
+{
+    group->end_known = 0;
+    msfp_step_columns(run, group);
+    for (int c = 0; c < C; ++c)
+        group->next.t[c] = group->now.t[c] + group->h[c];
+}
+
+/* Columns of the accepted step, and of the rows inside it. rim: the surface whose rim is met or left at its end, -1:
+ * none. The step then ends where the gap is zero, so that its length depends on the parameters, but not its rows. */
+static int accepted_columns(msfp_run *run, int rim, int fixed)
 {
     struct msfp_gradients *g = run->gradients;
-    const int fixed = prescribed || ends_at_fixed_time(run);
-    const int status = factorise(run);
+    int status = factorise(run);
     if (status)
         return status;
     for (int i = 0; i < g->groups; ++i) {
-        msfp_group *group = &g->group[i];
         for (int c = 0; c < C; ++c)
-            group->h[c] = fixed ? -group->now.t[c] : 0.0;
-        group->end_known = 0;
-        msfp_step_columns(run, group);
-        if (rim >= 0) { /* the step ends where the gap is zero, so that its length depends on the parameters */
-            msfp_columns dt;
-            msfp_event_time_columns(run, group, rim, dt);
-            msfp_add_columns(&group->h, (const msfp_columns *)&dt, 1.0, 1);
-            msfp_step_columns(run, group);
-        }
-        for (int c = 0; c < C; ++c)
-            group->next.t[c] = group->now.t[c] + group->h[c];
+            g->group[i].h[c] = fixed ? -g->group[i].now.t[c] : 0.0;
+        step_columns(run, &g->group[i]);
     }
-    return MSFP_OK;
+    status = msfp_record_rows_columns(run);
+    for (int i = 0; i < g->groups && rim >= 0; ++i) {
+        msfp_columns dt;
+        msfp_event_time_columns(run, &g->group[i], rim, dt);
+        msfp_add_columns(&g->group[i].h, (const msfp_columns *)&dt, 1.0, 1);
+        step_columns(run, &g->group[i]);
+    }
+    return status;
 }
 
-/* The same of massless bodies whose step only just meets a rim. Their rates jump there, within the last stages, and the
- * columns of positions with them: those of the step are those without the rim. */
-static int step_before_rim(msfp_run *run, int rim)
+/* Take the step once more, to where the gap of rim j is zero while the contact is as it was before: without this rim,
+ * or with a rim that holds the slider. Into run->next and the trail; returns a status. */
+static int take_step_to_event(msfp_run *run, int j, int meets)
 {
-    double *par = run->parameters.surface[rim];
-    const double stiffness = par[MSFP_SURFACE_PARAMETERS_KC], damping = par[MSFP_SURFACE_PARAMETERS_CC];
-    par[MSFP_SURFACE_PARAMETERS_KC] = par[MSFP_SURFACE_PARAMETERS_CC] = 0.0;
-    const int status = step_columns(run, rim, 0);
-    par[MSFP_SURFACE_PARAMETERS_KC] = stiffness;
-    par[MSFP_SURFACE_PARAMETERS_CC] = damping;
+    const double tolerance = 1e-9 * run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_SC];
+    double error, rate, gap = INFINITY, h = run->next.t - run->now.t;
+    if (meets)
+        run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KC] =
+            run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_CC] = 0.0;
+    else
+        run->parameters.held_rim = j + 1;
+    for (int i = 0; i < 4 && fabs(gap) > tolerance; ++i) {
+        const int status = msfp_step_implicit(run, h, &error);
+        if (status)
+            return status;
+        gap = gap_at_end(run, j, &rate);
+        if (meets ? rate >= 0.0 : rate <= 0.0)
+            return MSFP_E_STEP;
+        h = fmax(0.5 * h, h - gap / rate);
+    }
+    const double pull = fmax(0.0, run->work.rim[j][MSFP_RIM_FC]);
+    return pull > slight_pull * run->work.contact[j][MSFP_CONTACT_N] ? MSFP_E_STEP : MSFP_OK;
+}
+
+/* Columns of a step at whose end a rim is met or left. The run finds the event to the tolerance of the gap, and the
+ * last stages of its step may be beyond it, where rates of light sliders and of massless bodies have changed. The
+ * columns are therefore those of a step that ends at the event, with the contact as it was before; where the damper of
+ * a rim that is left would pull, those of the step as it was taken. */
+static int columns_to_event(msfp_run *run, int rim, int fixed, int meets)
+{
+    struct msfp_gradients *g = run->gradients;
+    int status;
+    double error;
+    g->own = *run;
+    status = take_step_to_event(run, rim, meets);
+    if (status) {
+        *run = g->own;
+        status = msfp_step_implicit(run, run->next.t - run->now.t, &error);
+    }
+    if (!status)
+        status = accepted_columns(run, rim, fixed);
+    *run = g->own;
+    g->event_time = run->next.t;
     return status;
 }
 
@@ -133,9 +176,12 @@ int msfp_gradients_step(msfp_run *run, const double *before, const double *after
         return MSFP_OK;
     const int prescribed = g->step_count > 0 || msfp_is_quasistatic(run);
     const int rim = prescribed ? -1 : rim_at_end(run, before, after);
-    g->trail.meets_rim = stage_in_new_contact(run, rim, before);
-    const int jumps = MSFP_MASSLESS && g->trail.meets_rim;
-    const int status = jumps ? step_before_rim(run, rim) : step_columns(run, rim, prescribed);
-    return status ? status : msfp_record_step_columns(run);
+    const int fixed = prescribed || ends_at_fixed_time(run);
+    int status = rim < 0 ? accepted_columns(run, rim, fixed) : columns_to_event(run, rim, fixed, before[rim] > 0.0);
+    if (!status)
+        status = msfp_record_extremes_columns(run);
+    for (int i = 0; i < g->groups && rim >= 0; ++i)
+        g->group[i].end_known = 0; /* the next step starts after the event */
+    return status;
 }
 #endif

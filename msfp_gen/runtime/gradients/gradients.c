@@ -1,4 +1,5 @@
 /* gradients.c: the derivatives of a run: their inputs, the hooks in the loop of the run. */
+#include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,6 +70,7 @@ int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)
     g->count = in->count;
     g->groups = (in->count + C - 1) / C;
     g->energies = in->energies;
+    g->event_time = -INFINITY;
     g->steps = in->steps;
     g->step_count = in->step_count;
     g->group = calloc(g->groups ? (size_t)g->groups : 1, sizeof *g->group);

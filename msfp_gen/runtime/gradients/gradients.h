@@ -140,7 +140,6 @@ typedef struct {
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
-    int meets_rim;  /* the first stage with the force of a rim that the step only just meets; 0: none */
     double power[MSFP_STAGES][MSFP_WORKS], prescribed[MSFP_STAGES];
     int ringing; /* whether the step integrates its works as where rates ring (refine_integrals of implicit.c) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
@@ -176,6 +175,8 @@ struct msfp_gradients {
     size_t event_count, event_capacity;
     msfp_extremes extremes; /* before the step */
     double outward_rate;    /* likewise */
+    double event_time;      /* of the last rim contact or release [s] */
+    msfp_run own;           /* the run, while a step to an event is taken once more */
 };
 
 /* ---- accepted_step.c ---- */
@@ -244,13 +245,6 @@ MSFP_INLINE int msfp_last_stage(const msfp_run *run)
 {
     return msfp_is_quasistatic(run) ? 1 : msfp_tableau_of(run->options.method)->stages - 1;
 }
-/* Stage whose rates and powers stand for those of stage j where the length of the step changes: the last one before the
- * contact, where the step ends at a rim contact and stage j has the force of the rim already. */
-MSFP_INLINE int msfp_stage_before_contact(const msfp_trail *trail, int j)
-{
-    return trail->meets_rim > 0 && j >= trail->meets_rim ? trail->meets_rim - 1 : j;
-}
-
 /* Columns of base motion and load at time t [s], whose columns are dt, into `dat`. */
 void msfp_inputs_columns(msfp_run *run, msfp_group *group, double t, const double *dt, msfp_point_columns *dat);
 /* Solve factors x = columns [MSFP_DOF][MSFP_COLUMNS], in place. */
@@ -260,9 +254,6 @@ void msfp_friction_columns(const msfp_work_columns *d, msfp_columns df[MSFP_NB][
 /* Columns of accelerations and rates that are consistent with the present state, after those of q, v, f and the foot;
  * first: at the start of the run, where the columns of the foot follow too. Returns a status. */
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
-/* Rates of the bodies [MSFP_NB][MSFP_NQ] at stage j, by which the state grows with the length of the step. Those of
- * massless bodies jump at a rim: they are those before a contact at the end of the step. */
-const double *msfp_rates_of_stage(const msfp_run *run, int j);
 /* Columns of the accepted step, whose stages are in the trail; group->h is given. */
 void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
@@ -308,8 +299,9 @@ void msfp_extremes_of_step(msfp_run *run, msfp_group *group);
 /* Record the columns of the present state, and those of the extremes of a first row. Returns MSFP_OK or
  * MSFP_E_MEMORY. */
 int msfp_record_present_columns(msfp_run *run, int first);
-/* Columns of the rows that the accepted step recorded, and of the extremes that it changed. Returns MSFP_OK or
- * MSFP_E_MEMORY. */
-int msfp_record_step_columns(msfp_run *run);
+/* Columns of the rows that the accepted step recorded. Returns MSFP_OK or MSFP_E_MEMORY. */
+int msfp_record_rows_columns(msfp_run *run);
+/* Columns of its events and of the extremes that it changed. Returns MSFP_OK or MSFP_E_MEMORY. */
+int msfp_record_extremes_columns(msfp_run *run);
 #endif
 #endif

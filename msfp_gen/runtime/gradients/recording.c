@@ -96,25 +96,35 @@ static const msfp_columns *row_columns(msfp_run *run, msfp_group *group, double 
     return (const msfp_columns *)d;
 }
 
-int msfp_record_step_columns(msfp_run *run)
+int msfp_record_rows_columns(msfp_run *run)
 {
     struct msfp_gradients *g = run->gradients;
-    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE) ||
-        reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT))
+    if (reserve(g, &g->rows, run->row_count, &g->row_capacity, MSFP_ROW_SIZE))
+        return MSFP_E_MEMORY;
+    for (int i = 0; i < g->groups; ++i) {
+        g->recording.columns_known = 0;
+        for (size_t r = g->row_count; r < run->row_count; ++r)
+            store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, &g->group[i], run->rows[r].time));
+    }
+    g->row_count = run->row_count;
+    return MSFP_OK;
+}
+
+int msfp_record_extremes_columns(msfp_run *run)
+{
+    struct msfp_gradients *g = run->gradients;
+    if (reserve(g, &g->events, run->event_count, &g->event_capacity, EVENT))
         return MSFP_E_MEMORY;
     for (int i = 0; i < g->groups; ++i) {
         msfp_group *group = &g->group[i];
         msfp_columns event[EVENT];
-        g->recording.columns_known = 0;
         for (size_t e = g->event_count; e < run->event_count; ++e) {
             event_columns(run, group, run->events[e].surface - 1, g->recording.row, event);
             store(g, g->events, e, i, EVENT, (const msfp_columns *)event);
         }
-        for (size_t r = g->row_count; r < run->row_count; ++r)
-            store(g, g->rows, r, i, MSFP_ROW_SIZE, row_columns(run, group, run->rows[r].time));
+        g->recording.columns_known = 0;
         msfp_extremes_of_step(run, group);
     }
-    g->row_count = run->row_count;
     g->event_count = run->event_count;
     return MSFP_OK;
 }

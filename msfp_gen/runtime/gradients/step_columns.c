@@ -56,16 +56,14 @@ typedef struct {
     double rates[STAGES][NB][2]; /* of Y, Z */
 } stage_columns;
 
-const double *msfp_rates_of_stage(const msfp_run *run, int j)
+/* Rates of the bodies [MSFP_NB][MSFP_NQ] at stage j. */
+static const double *rates_v(const msfp_run *run, int j)
 {
-    j = MSFP_MASSLESS ? msfp_stage_before_contact(&run->gradients->trail, j) : j;
     return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
 }
 
-/* Its accelerations, by which the rates grow: those before a contact. */
 static const double *rates_a(const msfp_run *run, int j)
 {
-    j = msfp_stage_before_contact(&run->gradients->trail, j);
     return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
 }
 
@@ -92,7 +90,7 @@ MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const sta
         msfp_add_columns(&dat->f[0][0], &s->df[j][0][0], h * weight, 2 * NB);
         msfp_add_columns(dat->foot, s->foot[j], h * weight, 2);
         if (msfp_any_column(group->h)) {
-            msfp_add_scaled(&Q[0][0], msfp_rates_of_stage(run, j), group->h, weight, NB * NQ);
+            msfp_add_scaled(&Q[0][0], rates_v(run, j), group->h, weight, NB * NQ);
             msfp_add_scaled(&V[0][0], rates_a(run, j), group->h, weight, NB * NQ);
             msfp_add_scaled(&dat->f[0][0], &s->rates[j][0][0], group->h, weight, 2 * NB);
             msfp_add_scaled(dat->foot, rates_foot(run, j), group->h, weight, 2);
@@ -118,7 +116,7 @@ MSFP_INLINE void stage_point(const msfp_run *run, int i, msfp_columns (*restrict
             }
     if (!msfp_any_column(dat->beta))
         return;
-    msfp_add_scaled(dat->q[0], msfp_rates_of_stage(run, i), dat->beta, 1.0, NB * NQ);
+    msfp_add_scaled(dat->q[0], rates_v(run, i), dat->beta, 1.0, NB * NQ);
     msfp_add_scaled(dat->a[0], rates_a(run, i), dat->beta, -rate, NB * NQ);
 }
 
@@ -230,11 +228,7 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
     memcpy(s.rates[0], run->now.df, sizeof s.rates[0]);
     memset(dat, 0, sizeof *dat);
     for (int i = 1; i < method->stages; ++i) {
-        const int smooth = MSFP_MASSLESS ? msfp_stage_before_contact(trail, i) : i;
-        if (smooth == i)
-            msfp_friction_rates(&trail->work[i], s.rates[i]);
-        else
-            memcpy(s.rates[i], s.rates[smooth], sizeof s.rates[i]);
+        msfp_friction_rates(&trail->work[i], s.rates[i]);
         prepare(run, group, &s, method, i, h, Q, V, dat);
         for (int c = 0; c < C; ++c)
             dt[c] = now->t[c] + method->c[i] * group->h[c];

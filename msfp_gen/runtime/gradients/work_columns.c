@@ -25,13 +25,12 @@ static void refine(const msfp_run *run, const msfp_group *group, const msfp_tabl
 {
     const msfp_trail *trail = &run->gradients->trail;
     for (int j = 0; j < method->stages && method->order <= 3.0; ++j) {
-        const int before = msfp_stage_before_contact(trail, j);
         if (trail->ringing)
-            add_product(group, h, -method->e[j], trail->prescribed[before], group->power[j].prescribed,
+            add_product(group, h, -method->e[j], trail->prescribed[j], group->power[j].prescribed,
                         work[MSFP_WORK_INPUT]);
         for (int e = 0; e < WORKS && !trail->ringing; ++e)
             if (e != MSFP_WORK_FRICTION_STORED)
-                add_product(group, h, -method->e[j], trail->power[before][e], group->power[j].of[e], work[e]);
+                add_product(group, h, -method->e[j], trail->power[j][e], group->power[j].of[e], work[e]);
     }
 }
 
@@ -51,7 +50,7 @@ MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i)
     memcpy(work, group->now.work, sizeof group->now.work);
     for (int j = 0; j <= i; ++j) {
         const double weight = j == i ? method->gamma : method->a[i][j];
-        const double *power = trail->power[msfp_stage_before_contact(trail, j)];
+        const double *power = trail->power[j];
         for (int e = 0; e < WORKS; ++e)
             add_product(group, h, weight, power[e], group->power[j].of[e], work[e]);
     }

@@ -19,12 +19,16 @@ from msfp_gen import (
     Motion,
     Result,
     Rotation,
+    RunError,
     Scene,
     Stop,
     load_scene,
     simulate,
     simulate_batch,
 )
+from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.gradient_error import measured_errors
+from msfp_gen.simulation.gradients import with_gradient_errors
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
@@ -245,16 +249,118 @@ def test_undamped_ringing_is_noted_and_refused_where_it_is_resolved() -> None:
         simulate(replace(scene, solver=replace(scene.solver, max_step=2e-4)), gradients=PATHS)
 
 
+def contact(damping: float = 1e-3) -> Scene:
+    """A slider meets its rim at 0.1 s."""
+    scene = scene_of("fenz-test2", duration=0.2, output_step=0.05, stop=None, motion_table=None)
+    bearing = scene.bearing.replace(contact_damping=damping)
+    return replace(scene, motion=Motion.harmonic(0.12, 1.0), bearing=bearing)
+
+
+@cache
+def after_contact() -> Result:
+    return simulate(contact(), gradients=["motion.scale", "bearing.surfaces[0].capacity"])
+
+
+@cache
+def without_errors() -> Result:
+    return simulate(contact(), gradients=["motion.scale"], gradient_errors=False)
+
+
+def test_a_run_with_gradients_through_a_rim_contact_is_the_same_run() -> None:
+    plain = simulate(contact())
+    for name in plain.dataset.data_vars:
+        assert np.array_equal(plain.dataset[name].values, after_contact().dataset[name].values), name
+    assert plain.summary["counters"] == after_contact().summary["counters"]
+
+
+def test_each_derivative_has_its_error_where_a_rim_is_met(tmp_path: Path) -> None:
+    gradient = after_contact().gradient
+    derivatives = {str(name) for name in gradient.data_vars if not str(name).endswith("_error")}
+    assert set(gradient.data_vars) == derivatives | {f"{name}_error" for name in derivatives}
+    for name in derivatives:
+        error = gradient[f"{name}_error"]
+        assert error.dims == gradient[name].dims
+        assert error.attrs == {
+            "units": gradient[name].attrs["units"],
+            "long_name": f"error of the {gradient[name].attrs['long_name']}",
+        }
+        assert np.all(error >= 0)
+    assert 0 < gradient.sliding_error.max() < 0.1 * np.abs(gradient.sliding).max()
+    read = Result.from_netcdf(after_contact().to_netcdf(tmp_path / "run.nc"))
+    assert read.gradient.identical(gradient)
+    for parameter, summary in after_contact().gradient_summary.items():
+        assert set(summary["error"]) == set(summary) - {"error"}
+        assert summary["error"] == read.gradient_summary[parameter]["error"]
+        assert np.all(np.array(summary["error"]["peak_sliding"]) >= 0)
+
+
+def test_without_a_rim_contact_or_on_request_no_error_is_measured() -> None:
+    for found in (result(), without_errors()):
+        assert not [name for name in found.gradient.data_vars if str(name).endswith("_error")]
+        with pytest.raises(InputError, match="'error' has no derivative: errors are measured where a slider meets"):
+            found.gradient_summary["motion.scale"]["error"]
+
+
+def test_an_error_is_three_times_the_difference_until_the_next_event() -> None:
+    given = after_contact()
+    gradients = given.gradients
+    assert gradients is not None
+    before = given.history.time < given.events[0].time
+    sliding = gradients.rows["sliding"]
+    shifted = sliding + np.where(before, 1.0, -2.0)[:, None] * np.linspace(1.0, 0.0, len(before))[:, None]
+    other = replace(gradients, rows=gradients.rows | {"sliding": shifted})
+    error = measured_errors(given, replace(given, gradients=other)).rows["sliding"]
+    expected = 3 * np.where(before, 1.0, 2.0) * np.linspace(1.0, 0.0, len(before))
+    assert np.allclose(error, np.broadcast_to(expected[:, None], error.shape))
+    late = replace(gradients, rows=gradients.rows | {"sliding": sliding + np.linspace(0.0, 1.0, len(before))[:, None]})
+    error = measured_errors(given, replace(given, gradients=late)).rows["sliding"]
+    assert np.allclose(error[:, ~before], 3.0)
+    assert np.allclose(error[:, before], 3 * np.linspace(0.0, 1.0, len(before))[before][-1])
+
+
+def test_an_event_that_the_other_run_has_not_is_uncertain_as_a_whole() -> None:
+    given = after_contact()
+    assert given.gradients is not None
+    error = measured_errors(given, replace(given, events=()))
+    assert np.array_equal(error.event_time, np.abs(given.gradients.event_time))
+    assert np.all(measured_errors(given, given).event_time == 0)
+
+
+def test_a_large_error_is_noted_and_one_that_is_not_known() -> None:
+    given = without_errors()
+    assert given.gradients is not None
+    assert not [note for note in with_gradient_errors(given, lambda scene: given).notes if note.kind == "gradient"]
+    changed = [Extremes(**{name: 1.1 * values for name, values in e.arrays.items()}) for e in given.gradients.extremes]
+    rows = {name: 1.1 * values for name, values in given.gradients.rows.items()}
+    other = replace(given, gradients=replace(given.gradients, rows=rows, extremes=tuple(changed)))
+    (note,) = [note for note in with_gradient_errors(given, lambda scene: other).notes if note.kind == "gradient"]
+    assert note.value == pytest.approx(0.3)
+    assert "derivatives of peaks with respect to " in note.text
+    assert "30%" in note.text
+    assert (note.surface, note.time) == (1, given.events[0].time)
+
+    def failing(scene: Scene) -> Result:
+        assert scene.solver.rtol == given.scene.solver.rtol / 10
+        raise RunError("stopped at t = 0.1 s", status="step")
+
+    (note,) = [note for note in with_gradient_errors(given, failing).notes if note.kind == "gradient"]
+    assert note.text.endswith("since the run at a tenth of the tolerance failed: stopped at t = 0.1 s")
+
+    def interrupted(scene: Scene) -> Result:
+        raise RunError("interrupted at t = 0.1 s", status="interrupted")
+
+    with pytest.raises(RunError, match="interrupted at"):
+        with_gradient_errors(given, interrupted)
+
+
 def test_ringing_after_a_rim_contact_is_noted_unless_it_is_damped() -> None:
     """The critical damping of the sliders is 0.64 ms."""
-    scene = scene_of("fenz-test2", duration=0.2, output_step=0.05, stop=None, motion_table=None)
-    scene = replace(scene, motion=Motion.harmonic(0.12, 1.0))
     for damping, noted in ((1e-4, True), (1e-3, False)):
-        given = replace(scene, bearing=scene.bearing.replace(contact_damping=damping))
+        given = contact(damping)
         result = simulate(given, gradients=["motion.scale"])
         found = [note for note in result.notes if note.kind == "ringing"]
         assert [(note.surface, note.time) for note in found] == [(1, result.events[0].time)] * noted
-        assert all("give contact_damping = 1e-3" in note.text for note in found)
+        assert all("give contact_damping = 0.001" in note.text for note in found)
         assert not any(note.kind == "ringing" for note in simulate(given).notes)
 
 
