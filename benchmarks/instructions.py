@@ -16,10 +16,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import kernels
+from quick import parser, pick
 
 from msfp_gen import Layout, Scene, load_scene
 
-CALLS = 200
+CALLS = pick(200, 2)
 RUN = """
 from dataclasses import replace
 from msfp_gen import Effects, load_scene, simulate
@@ -61,10 +62,12 @@ def of_kernels(scene: Scene) -> list[float]:
 
 def main() -> None:
     """Print one row per run and kernel."""
+    parser(__doc__).parse_args()
     if not shutil.which("valgrind"):
-        raise SystemExit("valgrind is not installed")
+        print("left out, since valgrind is not installed: instructions of runs and kernels")
+        return
     print("| what | instructions |\n|---|---|")
-    for text, (name, effects, rtol) in RUNS.items():
+    for text, (name, effects, rtol) in pick(list(RUNS.items()), list(RUNS.items())[:1]):
         program = RUN.format(name=name, effects=effects, rtol=rtol)
         os.environ["MSFP_GEN_CFLAGS"] = AVX2  # of the processes that follow
         subprocess.run([sys.executable, "-c", program], check=True)  # builds the model

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
+
+from quick import parser, pick
 
 from msfp_gen import Effects, Load, Motion, RunError, Scene, Top, load_scene
 from msfp_gen.studies.accuracy.error_target import simulate_within
@@ -68,7 +71,7 @@ def truth(scene: Scene, tolerance: float) -> tuple[Trial, float]:
 def stated_and_true() -> Iterator[str]:
     """Rows of the table."""
     yield "| scene | stated | true, RMS | true, peaks | confirmed to | tolerance | left out |\n|---|---|---|---|---|---|---|"
-    for name, scene in scenes():
+    for name, scene in islice(scenes(), pick(None, 2)):
         try:
             found = simulate_within(scene, TARGET, budget=60.0)
         except RunError as error:
@@ -87,6 +90,7 @@ def stated_and_true() -> Iterator[str]:
 
 def main() -> None:
     """Print the table."""
+    parser(__doc__).parse_args()
     for line in stated_and_true():
         print(line, flush=True)
 

@@ -6,7 +6,6 @@ limited API of Python 3.11, so that the wheel serves that version and all later 
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
 import subprocess
@@ -20,6 +19,9 @@ from msfp_gen.jit.compiler import zig_program
 from msfp_gen.jit.driver import build_driver
 from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import parser, pick
+
 TAGS = ("cp311-abi3-manylinux_2_17_x86_64", "cp311-abi3-manylinux2014_x86_64")
 OPTIONS = (
     "cc", "-target", "x86_64-linux-gnu.2.17", "-fno-sanitize=undefined", "-s", "-DPy_LIMITED_API=0x030B0000",
@@ -30,10 +32,12 @@ PROCESSORS = {1: "x86_64", 3: "x86_64_v3"}
 
 def main() -> None:
     """Write the wheel with models into the folder of -o."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("wheel", type=Path, help="pure wheel, such as `python -m build --wheel` writes")
-    parser.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
-    given = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument(
+        "wheel", nargs=pick(None, "?"), type=Path, help="pure wheel, such as `python -m build --wheel` writes"
+    )
+    options.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
+    given = options.parse_args()
     zig = zig_program()
     if zig is None:
         raise SystemExit("error: ziglang is not installed: pip install 'msfp-gen[wheels]'")
