@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass, replace
+from datetime import date
 from os import getloadavg
 from pathlib import Path
 
@@ -328,7 +329,7 @@ def page(folder: Path, cases: list[Case], share: float) -> None:
         "promises": estimate_table(),
         **peer_method_section(share),
     }
-    filled["share"], filled["load"] = f"{share:g}", f"{getloadavg()[2]:.1f}"
+    filled["share"], filled["load"], filled["date"] = f"{share:g}", f"{getloadavg()[2]:.1f}", f"{date.today()}"
     filled["minutes"] = f"{(time.perf_counter() - begin) / 60:.1f}"
     text = (HERE / "accuracy.md.in").read_text(encoding="utf-8")
     for name, value in filled.items():

@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import date
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -227,7 +228,11 @@ def versions() -> str:
 def page(rows: list[Case]) -> str:
     """Text of docs/validation.md."""
     text = TEMPLATE.read_text(encoding="utf-8")
-    for name, value in {"table": table(HEAD, [line(case) for case in rows]), "programs": versions()}.items():
+    for name, value in {
+        "table": table(HEAD, [line(case) for case in rows]),
+        "programs": versions(),
+        "date": f"{date.today()}",
+    }.items():
         text = text.replace(f"{{{name}}}", value)
     return text
 

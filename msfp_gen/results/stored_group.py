@@ -23,10 +23,8 @@ EXPANSION = 1100  # bytes of an array over its bytes in the file, at most; defla
 SMALLEST_CHUNK = 2**20  # [bytes]; a chunk, which HDF5 allocates whole, may be larger than a smaller array
 BLOCK = 256  # texts read at once
 SEAL = b"msfp-gen seal 1\n"  # mark before the sha256 at the end of a file
-HEAP, OBJECT = (
-    rb"GCOL\x01",
-    16,
-)  # of HDF5: signature and version of a global heap; header of it and of its objects [bytes]
+HEAP = rb"GCOL\x01"  # begin of a global heap of HDF5: signature and version
+OBJECT = 16  # size of its header, and of that of an object in it [bytes]
 Attribute = str | int | float
 
 
