@@ -6,6 +6,7 @@ STAMP  := $(VENV)/.installed
 RUNS   := $(VENV)/.runs
 SITE   := $(VENV)/.site
 ZIG    := $(VENV)/.zig
+PEERS  := $(VENV)/.peers
 
 .PHONY: demo test slow lint types package wheels bounds clang zig fuzz mutants figures docs clean
 
@@ -15,7 +16,8 @@ demo: $(RUNS)
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
 
-slow: $(STAMP)
+# With the programs that benchmarks compare with, where they exist for this machine.
+slow: $(PEERS)
 	$(BIN)/python -m pytest -q -n auto --dist loadfile -m slow
 
 lint: $(STAMP)
@@ -71,6 +73,10 @@ $(RUNS): pyproject.toml
 
 $(STAMP): $(RUNS)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[test]"
+	touch $@
+
+$(PEERS): $(STAMP)
+	-$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[peers]"
 	touch $@
 
 $(SITE): $(RUNS)

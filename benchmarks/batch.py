@@ -7,21 +7,21 @@ several rounds counts, to reduce the influence of other jobs. `--processes` uses
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import Scene, simulate, simulate_batch
 from msfp_gen.buildings.opening import changed_scene
 from msfp_gen.common.cores import usable_cores
 
 STUDIES = {
-    "ridgecrest-clc": ("motion.scale", np.linspace(0.3, 1.1, 16)),
-    "becker-eight-125": ("top.axial_load", np.linspace(0.9e5, 1.3e5, 64)),
-    "fenz-test2": ("motion.amplitude", np.linspace(0.015, 0.035, 256)),
+    "ridgecrest-clc": ("motion.scale", np.linspace(0.3, 1.1, pick(16, 2))),
+    "becker-eight-125": ("top.axial_load", np.linspace(0.9e5, 1.3e5, pick(64, 2))),
+    "fenz-test2": ("motion.amplitude", np.linspace(0.015, 0.035, pick(256, 2))),
 }
 
 
@@ -40,10 +40,10 @@ def seconds(work: Callable[[], object]) -> float:
 
 def main() -> None:
     """Print one row per study."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=9, help="rounds, of which the best counts")
-    parser.add_argument("--processes", action="store_true", help="processes instead of threads")
-    given = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("--rounds", type=int, default=pick(9, 1), help="rounds, of which the best counts")
+    options.add_argument("--processes", action="store_true", help="processes instead of threads")
+    given = options.parse_args()
     workers = range(1, usable_cores() + 1)
     print(f"runs per second, and in brackets the ratio to the loop; best of {given.rounds} rounds")
     print("| study | one run [ms] | loop of `simulate` |" + "".join(f" workers: {count} |" for count in workers))

@@ -1,8 +1,8 @@
 """The condensed residual of a step in CasADi, whose generated C with a dense solver is compared with that of this project.
 
 The statements are those of the generator, translated to CasADi's graph body by body, so that both compute the same
-residual; CasADi differentiates it and writes C. Unknowns are the rates and Y, Z (16 for a triple pendulum), without the
-nested elimination of Y, Z.
+residual; CasADi differentiates it and writes C. Unknowns are the rates and the friction forces over mu N (16 for a triple
+pendulum), without the nested elimination of the latter.
 """
 
 from __future__ import annotations
@@ -118,14 +118,23 @@ class Stack:
         }
         none = {"Mx": 0.0, "My": 0.0, "Mz": 0.0}
         wrench = results(
-            run["top_wrench"], ca, par=self.block("top_parameters", 0), b=bodies[n], x=xs[n], fe=load, me=none
+            run["top_wrench"],
+            ca,
+            par=self.block("top_parameters", 0),
+            b=bodies[n],
+            x=xs[n],
+            y=dict.fromkeys(("y", "y1", "beta", "mobility", "share"), 0.0),  # no vertical spring
+            fe=load,
+            me=none,
         )
         forces, moments = [{k: wrench[k] for k in ("Fx", "Fy", "Fz")}], [{k: wrench[k] for k in ("Mx", "My", "Mz")}]
         for k in range(n, 0, -1):
             forces.insert(0, results(run["interface_force"], ca, par=pars[k - 1], b=bodies[k], up=forces[0]))
         friction = []
         for j in range(n - 1, -1, -1):
-            own = {"Y": f[2 * j], "Z": f[2 * j + 1]}
+            own, par = {"Y": f[2 * j], "Z": f[2 * j + 1]}, self.block("surface_parameters", j)
+            before = {name: self.parameter("fp", j, name) for name in ("Y", "Z")}
+            stage = {**before, "tau": beta + par["td"], "rest": par["td"] / (beta + par["td"])}
             local = results(
                 run["surface_local"],
                 ca,
@@ -136,9 +145,9 @@ class Stack:
                 tot=forces[j],
                 rim={"Fx": 0.0, "Fy": 0.0, "Fz": 0.0},
             )
-            touch = results(run["contact"], ca, par=self.block("surface_parameters", j), loc=local, f=own)
+            touch = results(run["contact"], ca, par=par, h=stage, loc=local, g=own)
             moments.insert(0, results(run["moment_to_world"], ca, b=bodies[j], loc={k: touch[k] for k in none}))
-            friction += [own[name] - self.parameter("fp", j, name) - beta * touch[f"d{name}"] for name in ("Y", "Z")]
+            friction += [touch[name] - before[name] - beta * touch[f"d{name}"] for name in ("Y", "Z")]
         rows = []
         for k in range(1, n + 1):
             balance = results(

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from accuracy import CASES, TOLERANCES, Case, markdown_table, percent, say
 from drawing import COLOURS, FAINT, drawn
+from quick import docs_folder, parser, pick
 
 from msfp_gen import Scene
 from msfp_gen.studies.accuracy import work_precision
@@ -24,7 +25,7 @@ from msfp_gen.studies.accuracy.study import Point, Study
 DAMPING = 1e-4  # [s]
 MARKERS = {"implicit": "o", "esdirk4": "s"}
 LIMIT = 4.0  # over that of the scene, so that references are tight
-CONFIRMING, PATIENCE = 1e-5, 300.0  # tolerance of Radau, and wall time after which it is cut off [s]
+CONFIRMING, PATIENCE = 1e-5, pick(300.0, 5.0)  # tolerance of Radau, and wall time after which it is cut off [s]
 DEFAULT, TARGET = 1e-3, 1e-3  # tolerance of a run without settings; largest RMS error of the last columns
 
 
@@ -85,7 +86,9 @@ def draw(pairs: list[tuple[Case, Study, Study]], path: Path) -> None:
 
 def main(words: list[str]) -> None:
     """Print the table and draw the figure."""
-    folder = Path(words[0]) if words else Path(__file__).resolve().parent.parent / "docs"
+    options = parser(__doc__)
+    options.add_argument("folder", nargs="?", type=Path, default=docs_folder())
+    folder = options.parse_args(words).folder
     pairs = [(case, studied(case, 0.0), studied(case, DAMPING)) for case in CASES]
     lines = [row(case, d, s) for case, *both in pairs for d, s in zip((0.0, DAMPING), both, strict=True)]
     head = (

@@ -6,13 +6,13 @@ Usage: python benchmarks/design.py [scan] [search]; five minutes; prints the tab
 from __future__ import annotations
 
 import json
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+from quick import docs_folder, parser, pick
 from scipy.optimize import minimize
 
 from msfp_gen import simulate_batch
@@ -20,10 +20,10 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.figures import COLOURS, INK, page
 
 ROOT = Path(__file__).resolve().parents[1]
-NOTEBOOK, FIGURE = ROOT / "examples" / "design.ipynb", ROOT / "docs" / "figures" / "design.png"
-STARTS = ((0.08, 0.946), (0.06, 0.7), (0.11, 0.9), (0.095, 1.5))
-WHOLE = np.arange(0.055, 0.1151, 0.005), np.arange(0.7, 1.801, 0.1)  # friction, radius [m]
-STEPS, AROUND = (0.0005, 0.01), 3  # of the scan about the optimum, and their number to each side
+NOTEBOOK = ROOT / "examples" / "design.ipynb"
+STARTS = pick(((0.08, 0.946), (0.06, 0.7), (0.11, 0.9), (0.095, 1.5)), ((0.08, 0.946),))
+WHOLE = np.arange(0.055, 0.1151, pick(0.005, 0.05)), np.arange(0.7, 1.801, pick(0.1, 0.5))  # friction, radius [m]
+STEPS, AROUND = (0.0005, 0.01), pick(3, 1)  # of the scan about the optimum, and their number to each side
 BATCH = 100  # runs at the same time; rows of more would fill the memory
 
 
@@ -78,7 +78,12 @@ def by_differences(names: dict[str, Any]) -> str:
     bounds = [(0.5, 1.2), (0.6, 1.8), (0.0, 5.0)]
     constraints = {"type": "ineq", "fun": margins}
     found = minimize(
-        lambda x: x[2], start, constraints=constraints, bounds=bounds, method="SLSQP", options={"ftol": 1e-6}
+        lambda x: x[2],
+        start,
+        constraints=constraints,
+        bounds=bounds,
+        method="SLSQP",
+        options={"ftol": 1e-6, "maxiter": pick(100, 1)},
     )
     friction, radius, shear = found.x * names["UNIT"]
     return f"{friction:.4f} | {radius:.3f} | {shear:.4f} | {runs} runs"
@@ -86,7 +91,7 @@ def by_differences(names: dict[str, Any]) -> str:
 
 def draw(names: dict[str, Any], found: Array, path: Array) -> None:
     """Shear over all designs, the limit of both displacements, and the way of the search."""
-    with page(7.4, 5.0, FIGURE) as figure:
+    with page(7.4, 5.0, docs_folder() / "figures" / "design.png") as figure:
         axes = figure.subplots()
         friction, radius = WHOLE
         field = axes.contourf(
@@ -134,7 +139,10 @@ def scan(names: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
+    options = parser(__doc__)
+    options.add_argument("parts", nargs="*", metavar="PART", help="scan, search; default: both")
+    given = options.parse_args()
     loaded = notebook()  # with the search from the first start
     print("| search | friction | radius [m] | shear | cost | CPU time |\n|---|---|---|---|---|---|")
-    for part in sys.argv[1:] or ("scan", "search"):
+    for part in given.parts or ("scan", "search"):
         {"scan": scan, "search": search}[part](loaded)

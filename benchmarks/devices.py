@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from quick import docs_folder, parser
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is that of the tests
@@ -229,4 +230,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs")
+    options = parser(__doc__)
+    options.add_argument("folder", nargs="?", type=Path, default=docs_folder())
+    main(options.parse_args().folder)

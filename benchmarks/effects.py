@@ -14,8 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, load_scene, presets, simulate
 from msfp_gen.generator import generate
@@ -23,7 +25,7 @@ from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.result import Result
 from msfp_gen.specification.layout import ModelSpec
 
-SCENE, REPEATS = "fenz-test2", 15
+SCENE, REPEATS = "fenz-test2", pick(15, 1)
 FULL = Effects()
 ALL = Effects(uplift=True)
 SMALL = Effects(dimension="planar", sliders="massless")
@@ -128,9 +130,9 @@ def differences(one: Result, other: Result) -> tuple[float, float]:
 def selection_table() -> None:
     """Print the comparison of all effects with selected effects."""
     print("\n| scene | modelled | everything [ms] | chosen [ms] | ratio | largest | RMS |\n|" + "---|" * 7)
-    for name, everything, chosen in pairs():
+    for name, everything, chosen in islice(pairs(), pick(None, 2)):
         largest, rms = differences(simulate(chosen), simulate(everything))
-        full, fewer = fastest([replace(scene, output_step=None) for scene in (everything, chosen)], 5)
+        full, fewer = fastest([replace(scene, output_step=None) for scene in (everything, chosen)], min(5, REPEATS))
         models = ", then ".join(_short(key) for key in fewer.provenance["model"].split(", then "))
         times = [result.counters.wall_time for result in (full, fewer)]
         print(
@@ -161,7 +163,7 @@ def errors(scene: Scene) -> Iterator[tuple[float, float, float]]:
     """Tolerance, largest error of the force over its peak in rows at even times, and wall time without such rows [s]."""
     rows = replace(scene, output_step=0.02)
     limit = simulate(replace(rows, solver=replace(scene.solver, method="esdirk4", rtol=1e-7)))
-    for rtol in (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6):
+    for rtol in pick((1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6), (1e-2, 1e-4)):
         solver = replace(scene.solver, rtol=rtol)
         largest, _ = differences(simulate(replace(rows, solver=solver)), limit)
         (timed,) = fastest([replace(scene, solver=solver)])
@@ -170,14 +172,15 @@ def errors(scene: Scene) -> Iterator[tuple[float, float, float]]:
 
 def cost_of_a_row(scene: Scene) -> float:
     """Wall time of one row at an even time [s], from runs with many of them."""
-    count = 20_000
+    count = pick(20_000, 200)
     few, many = (replace(scene, output_step=scene.end / rows) for rows in (count / 2, count))
-    times = [result.counters.wall_time for result in fastest([few, many], 5)]
+    times = [result.counters.wall_time for result in fastest([few, many], min(5, REPEATS))]
     return (times[1] - times[0]) / (count / 2)
 
 
 def main() -> None:
     """Print the tables, and the ratio of the full to the smallest model."""
+    parser(__doc__).parse_args()
     costs()
     selection_table()
     pair = [replace(load_scene(SCENE), effects=effects) for effects in (FULL, SMALL)]

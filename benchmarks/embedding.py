@@ -16,6 +16,7 @@ from time import process_time_ns
 
 import numpy as np
 from embedding_ports import doors, worked_example
+from quick import parser, pick
 
 from msfp_gen import Layout, build_model
 from msfp_gen.embedding import export_library, values
@@ -23,7 +24,7 @@ from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.specification.layout import ModelSpec
 
 HERE = Path(__file__).parent
-ROUNDS = 200
+ROUNDS = pick(200, 1)
 SPEC = ModelSpec(Layout.tfp())
 
 
@@ -70,6 +71,7 @@ def least(once: Callable[[], float]) -> float:
 
 def main() -> None:
     """Print the tables."""
+    parser(__doc__).parse_args()
     kept, callback, single = in_c()
     rows = {
         "C, rows kept": kept,

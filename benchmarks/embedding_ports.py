@@ -8,13 +8,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 from threading import Thread
 from time import process_time
 
 import fmu
 import numpy as np
+from quick import installed
 
 from msfp_gen import Effects, Layout, Solver, Top, TwoPort, presets
 from msfp_gen.coupling.server import Server
@@ -113,7 +113,7 @@ def doors() -> dict[str, list[float]]:
     """Nanoseconds of a committed step by door: without and with the tangent."""
     with tempfile.TemporaryDirectory() as name:
         found = compiled(Path(name)) | {"Python, `TwoPort`": in_python()}
-        return found | ({"FMU under FMPy": in_fmu(Path(name))} if find_spec("fmpy") else {})
+        return found | ({"FMU under FMPy": in_fmu(Path(name))} if installed("fmpy", "a unit under FMPy") else {})
 
 
 # ---- the worked example of docs/embedding.md and docs/opensees.md --------------------------------------------------
@@ -132,7 +132,7 @@ def worked_example() -> dict[str, float]:
     begin = process_time()
     exec(block("embedding.md", 1), names)
     found = {"Python, `TwoPort`": process_time() - begin}
-    if find_spec("openseespy"):
+    if installed("openseespy.opensees", "OpenSees as a client"):
         found |= by_opensees()
     return {name: 1e6 * time / ANALYSIS_STEPS for name, time in found.items()}
 

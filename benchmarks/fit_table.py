@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from quick import parser, pick
 from results_page import TABLE_42
 from scipy.optimize import least_squares
 from scipy.stats import t
@@ -90,6 +91,7 @@ def fitted(names: Sequence[str], free: Sequence[int]) -> Array:
         x_scale=start,
         xtol=1e-4,
         ftol=1e-4,
+        max_nfev=pick(None, 2),
     )
     freedom = len(PRINTED) - len(free)
     spread = spread_of(found.jac * found.x, 2 * found.cost / freedom, names)
@@ -108,6 +110,7 @@ def percent(residual: Array) -> str:
 
 
 if __name__ == "__main__":
+    parser(__doc__).parse_args()
     given = computed(simulate(push(load_scene("fenz-monotonic").bearing.arrays()["friction"])))
     four = fitted(("surface 1", "surface 2", "surface 3", "surface 4"), range(4))
     two = fitted(("surface 1", "surface 4"), (0, 3))

@@ -12,12 +12,13 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from quick import installed, parser, pick
 
 from msfp_gen import Motion, Scene, Top, TwoPort, presets
 from msfp_gen.fmu import write_fmu
 
 BEARING, LOAD = presets.bearing("fenz-tfp").replace(contact_damping=1e-4), 112e3
-STEP, COUNT, ROUNDS = 0.01, 200, 5
+STEP, COUNT, ROUNDS = 0.01, 200, pick(5, 1)
 STILL = Motion(np.array([0.0, 1.0]), np.zeros((1, 6, 6)))
 INPUTS = list(range(1, 37))
 
@@ -122,6 +123,9 @@ def exchange(path: Path) -> list[tuple[str, float, float]]:
 
 def main() -> None:
     """Print the rows of both tables."""
+    parser(__doc__).parse_args()
+    if not installed("fmpy", "both tables"):
+        return
     from fmpy import extract
 
     with tempfile.TemporaryDirectory() as name:

@@ -10,11 +10,13 @@ from dataclasses import replace
 from time import thread_time
 from typing import Any
 
+from quick import parser, pick
+
 from msfp_gen import Scene, load_scene, simulate
 from msfp_gen.result import Result
 
-SCENES = ("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc")
-REPEATS = 12
+SCENES = pick(("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc"), ("fenz-test2",))
+REPEATS = pick(12, 1)
 NEUTRAL = {"pressure_ratio": 1.0, "velocity_drop": 0.0, "temperature_ratio": 1.0}
 FORMULA = "mu * (1 - c1 * exp(-c2 * v))"
 
@@ -46,6 +48,7 @@ def timed(scene: Scene) -> tuple[float, Result]:
 
 def main() -> None:
     """Print the table. The laws are run in turns, so that other load on the machine affects all of them."""
+    parser(__doc__).parse_args()
     print("| scene | law | run [ms] | over constant | steps | Newton iterations | per iteration |\n|" + "---|" * 7)
     for name in SCENES:
         scenes = variants(load_scene(name))

@@ -10,7 +10,6 @@ fuzz_page.py fills the page.
 
 from __future__ import annotations
 
-import argparse
 import json
 import selectors
 import signal
@@ -24,6 +23,7 @@ from typing import Any
 
 from fuzz_combined import COMBINED
 from fuzz_scenes import SHORT, SPECS
+from quick import parser, pick
 from rich.progress import track
 
 from msfp_gen import Effects, Layout, build_model
@@ -157,13 +157,15 @@ def save(found: Row, path: Path | None) -> None:
 
 def main(words: list[str] | None = None) -> int:
     """Run the campaign and print its table; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--check", type=int, default=500, help="number of successes to compare with the second method")
-    parser.add_argument("--limit", type=float, default=LIMIT, help="wall time of one scene [s]")
-    parser.add_argument("--output", type=Path, help="JSON file for the table")
-    group = parser.add_mutually_exclusive_group()
+    options = parser(__doc__)
+    options.add_argument("--scenes", type=int, default=pick(10_000, 20))
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument(
+        "--check", type=int, default=pick(500, 2), help="number of successes to compare with the second method"
+    )
+    options.add_argument("--limit", type=float, default=LIMIT, help="wall time of one scene [s]")
+    options.add_argument("--output", type=Path, help="JSON file for the table")
+    group = options.add_mutually_exclusive_group()
     group.add_argument("--short", dest="which", action="store_const", const="short", help="only a few of the models")
     group.add_argument(
         "--combined",
@@ -173,8 +175,8 @@ def main(words: list[str] | None = None) -> int:
         help="combinations of public constructors, each run checked row by row and with half its longest step",
     )
     group.add_argument("--sensible", dest="which", action="store_const", const="sensible", help="only sensible scenes")
-    given = parser.parse_args(words)
-    which = given.which or "all"
+    given = options.parse_args(words)
+    which = given.which or pick("all", "short")
     build_all({"short": SHORT, "combined": COMBINED}.get(which, SPECS))
     begin, worker = time.perf_counter(), Worker(given.seed, given.limit, which)
     rows: list[Row] = []

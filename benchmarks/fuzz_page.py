@@ -1,18 +1,19 @@
 """Write the tables of the fuzz campaign in docs/stability.md from the JSON files of fuzz.py, one per seed.
 
-python benchmarks/fuzz_page.py benchmarks/results/fuzz-*.json
+python benchmarks/fuzz_page.py [FILE ...]; default: benchmarks/results/fuzz-*.json
 """
 
 from __future__ import annotations
 
 import json
 import re
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
-PAGE = Path(__file__).parents[1] / "docs" / "stability.md"
+from quick import docs_folder, parser
+
+RESULTS = Path(__file__).with_name("results")
 MARKS = ("<!-- fuzz -->\n", "<!-- end of fuzz -->\n")
 FALLBACKS = ("other_starts", "halved_newton_steps", "fresh_tangents", "newton_failures", "quasistatic_starts")
 
@@ -53,11 +54,14 @@ def tables(parts: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Write the tables between the marks of the page."""
-    parts = [json.loads(Path(name).read_text(encoding="utf-8")) for name in sys.argv[1:]]
-    text = PAGE.read_text(encoding="utf-8")
+    options = parser(__doc__)
+    options.add_argument("files", nargs="*", type=Path, default=sorted(RESULTS.glob("fuzz-*.json")))
+    parts = [json.loads(path.read_text(encoding="utf-8")) for path in options.parse_args().files]
+    page = docs_folder() / "stability.md"
+    text = page.read_text(encoding="utf-8")
     begin, end = (re.escape(mark) for mark in MARKS)
     whole = MARKS[0] + tables(parts) + MARKS[1]
-    PAGE.write_text(re.sub(begin + ".*" + end, lambda _: whole, text, flags=re.DOTALL), encoding="utf-8")
+    page.write_text(re.sub(begin + ".*" + end, lambda _: whole, text, flags=re.DOTALL), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from fuzz_balance import verified
 from fuzz_combined import case as combined_case
 from fuzz_scenes import case, load_of, sensible
 from fuzz_second import Second
+from quick import parser
 
 from msfp_gen import InputError, RunError, Scene, simulate
 from msfp_gen.result import Result
@@ -147,7 +148,11 @@ def main() -> None:
     """Read tasks from standard input, write lines of JSON to standard output."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    seed, which = int(sys.argv[1]), sys.argv[2]
+    options = parser(__doc__)
+    options.add_argument("seed", nargs="?", type=int, default=1)
+    options.add_argument("which", nargs="?", default="short")
+    given = options.parse_args()
+    seed, which = given.seed, given.which
     short = which == "short"
     for line in sys.stdin:
         task, number = line.split()[0], int(line.split()[1])

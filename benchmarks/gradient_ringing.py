@@ -6,15 +6,15 @@ The triple pendulum of PEER 2017/07 under one cycle of 120 mm, sampled at 200 ti
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import Motion, Scene, load_scene, simulate
 
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-DAMPING = (1e-4, 1e-3)  # contact damping [s]
+TOLERANCES = pick((1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-4,))
+DAMPING = pick((1e-4, 1e-3), (1e-4,))  # contact damping [s]
 FRICTION = (0.039, 0.0136, 0.0136, 0.107)
 PARAMETER = "bearing.surfaces[0].friction"
 WINDOWS = ((7.0, 7.4), (7.85, 8.1))  # [s]: after the second contact, and after the reversal that follows
@@ -57,7 +57,9 @@ def small_changes() -> None:
 
 def main() -> None:
     """Print one row per tolerance, or the derivatives while sliders ring."""
-    if "--small" in sys.argv:
+    options = parser(__doc__)
+    options.add_argument("--small", action="store_true", help="derivatives beside differences of tiny changes")
+    if options.parse_args().small:
         small_changes()
         return
     for rtol in TOLERANCES:

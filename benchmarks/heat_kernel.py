@@ -6,17 +6,16 @@ temperature computed by the sum and by the exact convolution.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from drawing import COLOURS, drawn, panels
 from numpy.typing import NDArray
+from quick import docs_folder, parser
 
 from msfp_gen.generator.heat import HEAT_ERROR, HEAT_KERNEL, LONGEST, SHORTEST
 
 Array = NDArray[np.float64]
-FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "heat-kernel.png"
 FASTEST, SLOWEST = 6.0, 0.4  # rates of the first and last term, over 1/SHORTEST and 1/LONGEST
 
 
@@ -54,7 +53,7 @@ def draw() -> None:
     t = np.geomspace(SHORTEST / 30, LONGEST * 30, 2000)
     strokes = np.linspace(0, 60, 60001)
     flux = np.abs(np.sin(2 * np.pi * 0.25 * strokes)) * (np.abs(np.cos(2 * np.pi * 0.25 * strokes)) < 0.7)
-    with drawn(FIGURE, 9.0, 3.2) as figure:
+    with drawn(docs_folder() / "figures" / "heat-kernel.png", 9.0, 3.2) as figure:
         error, rise = panels(figure, "relative error of the sum", "rise under strokes of a patch")
         error.semilogx(t, 100 * (summed(t) * np.sqrt(t) - 1), color=COLOURS[0])
         error.axvspan(SHORTEST, LONGEST, color=COLOURS[1], alpha=0.12, lw=0)
@@ -93,6 +92,7 @@ def marched(t: Array, flux: Array) -> Array:
 
 def main() -> Any:
     """Print the fit and draw the figure."""
+    parser(__doc__).parse_args()
     rates, weights, error = fit(len(HEAT_KERNEL))
     print(f"{len(rates)} terms, relative error {error:.3e} (table: {HEAT_ERROR:.1e})")
     for rate, weight in zip(rates, weights, strict=True):

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from drawing import COLOURS, MILLI, drawn, panels, ratio
+from quick import docs_folder, parser
 
 from msfp_gen import Scene, load_scene, simulate
 from msfp_gen.result import Result
 from msfp_gen.specification.friction_laws import law_parameter_names
 
 ROOT = Path(__file__).resolve().parents[1]
-FIGURE = ROOT / "docs" / "figures" / "heating.png"
 
 
 def without_law(scene: Scene) -> Scene:
@@ -26,7 +26,7 @@ def draw(heats: Result, constant: Result) -> None:
     """Draw the loops of both runs, and temperature and friction of the dish."""
     rows = heats.history
     assert rows.temperature is not None
-    with drawn(FIGURE, 11.0, 3.6) as figure:
+    with drawn(docs_folder() / "figures" / "heating.png", 11.0, 3.6) as figure:
         loop, warm, drop = panels(figure, "force over load", "temperature of the dish", "its friction, sliding fast")
         for run, colour, name in ((constant, COLOURS[1], "constant"), (heats, COLOURS[0], "pvt")):
             loop.plot(run.history.displacement[:, 0] * MILLI, ratio(run)[:, 0], color=colour, lw=0.9, label=name)
@@ -41,6 +41,7 @@ def draw(heats: Result, constant: Result) -> None:
 
 def main() -> None:
     """Run both scenes, draw them, and print the peak temperature and the ratio of the dissipated energies."""
+    parser(__doc__).parse_args()
     scene = load_scene(ROOT / "examples" / "heating.toml")
     heats, constant = simulate(scene), simulate(without_law(scene))
     draw(heats, constant)

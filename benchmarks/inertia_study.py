@@ -19,6 +19,7 @@ from typing import Literal
 
 import numpy as np
 from drawing import COLOURS, FAINT, INK, MILLI, Array, drawn, panels, tilts
+from quick import docs_folder, parser, pick
 
 from msfp_gen import RunError, Scene, Top, presets, simulate
 from msfp_gen.common.output import replacing
@@ -27,7 +28,7 @@ from msfp_gen.scene.parts import Stop
 
 WEIGHT = 9.24 * 9.81  # W [N] of PEER 2017/07, bodies 2..5
 LARGEST, TESTED, U_MAX = 1e6, 112e3, 0.140  # N_max [N], N of table 4.1 [N], [m]
-LOADS = np.geomspace(LARGEST, 1.0, 25)
+LOADS = np.geomspace(LARGEST, 1.0, pick(25, 3))
 GRID = np.linspace(0.0, U_MAX, 14_001)  # ground displacements [m]
 RTOL = 1e-6  # surfaces at yield accumulate small vibrations: runs at looser tolerances differ in the third digit of V
 
@@ -197,8 +198,8 @@ def draw(points: list[Point], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    target = Path(__file__).resolve().parents[1] / "docs" / "figures"
-    target.mkdir(parents=True, exist_ok=True)
+    parser(__doc__).parse_args()
+    target = docs_folder() / "figures"
     found = study()
     write(found, target)
     for point in failures(found):

@@ -17,6 +17,7 @@ from time import perf_counter
 import auto
 import auto_scenes
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import RunError, Scene, simulate
 from msfp_gen.scene.effect_selection import (
@@ -28,7 +29,7 @@ from msfp_gen.scene.effect_selection import (
 )
 from msfp_gen.scene.slider_response import motion_time_scale, response_time
 
-SLOW, SCENES = 200, 300
+SLOW, SCENES = pick((200, 300), (3, 4))
 BINS = (0.0, RESPONSE_SHARE, 2 * RESPONSE_SHARE, 4 * RESPONSE_SHARE, 8 * RESPONSE_SHARE, 32 * RESPONSE_SHARE)
 LIMIT = 10.0  # [s] of wall time of one run with given sliders
 
@@ -103,6 +104,7 @@ def failures() -> Iterator[str]:
 
 def main() -> None:
     """Print the tables."""
+    parser(__doc__).parse_args()
     for table in (response_table, failures):
         print("\n".join(table()), end="\n\n", flush=True)
 

@@ -5,14 +5,13 @@
 Mutants are drawn evenly from the parts of PARTS: generator, runtime (C), simulation and results. Each is made in a copy
 of the checkout. First the test files run that import the changed module, or those of CHOSEN for its folder or file, then
 those of its part, until the first failure. They are a choice of the fast suite, since a change of generator or runtime
-builds every model anew; --suite runs all of it, --quick only the first. Golden files are left out: they hold the text
+builds every model anew; --suite runs all of it, --near only the first. Golden files are left out: they hold the text
 of the generator, so that any change fails and none is judged. A mutant that survives and changes a number asks for a
 test; --output writes the list as JSON and goes on with one that was begun. The exit code is 1 if the tests fail without a mutant.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
 import json
 import os
@@ -28,6 +27,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
 from pathlib import Path
+
+from quick import QUICK, parser, pick
 
 ROOT = Path(__file__).parents[1]
 
@@ -270,18 +271,22 @@ class Copy:
 
 def main(words: list[str] | None = None) -> int:
     """Test a round of mutants and print those that survive; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--part", choices=list(PARTS), action="append", help="only this part; may be given again")
-    group = parser.add_mutually_exclusive_group()
+    options = parser(__doc__)
+    options.add_argument("--count", type=int, default=pick(100, 1))
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--part", choices=list(PARTS), action="append", help="only this part; may be given again")
+    group = options.add_mutually_exclusive_group()
     group.add_argument("--suite", action="store_true", help="the whole fast suite for every mutant")
-    group.add_argument("--quick", action="store_true", help="only the tests that import the changed module")
-    parser.add_argument("--list", action="store_true", help="print the mutants, and test none")
-    parser.add_argument("--limit", type=float, help="time of a stage of tests [s], in place of one measured beforehand")
-    parser.add_argument("--output", type=Path, help="JSON file for the mutants and how their tests ended")
-    given = parser.parse_args(words)
-    mutants = drawn(given.count, given.seed, given.part or list(PARTS))
+    group.add_argument(
+        "--near", action="store_true", default=QUICK, help="only the tests that import the changed module"
+    )
+    options.add_argument("--list", action="store_true", help="print the mutants, and test none")
+    options.add_argument(
+        "--limit", type=float, help="time of a stage of tests [s], in place of one measured beforehand"
+    )
+    options.add_argument("--output", type=Path, help="JSON file for the mutants and how their tests ended")
+    given = options.parse_args(words)
+    mutants = drawn(given.count, given.seed, given.part or pick(list(PARTS), ["results"]))
     if given.list:
         print(*mutants, sep="\n")
         return 0
@@ -294,7 +299,7 @@ def main(words: list[str] | None = None) -> int:
         for mutant in mutants:
             first, rest = near(mutant.path), PARTS[mutant.part].tests
             rest = tuple(name for name in rest if name not in first)
-            stages = [("tests",)] if given.suite else [first or rest] if given.quick else [first, rest]
+            stages = [("tests",)] if given.suite else [first or rest] if given.near else [first, rest]
             try:
                 rows.append({**asdict(mutant), "end": copy.end_of(mutant, stages)})
             except RuntimeError as error:

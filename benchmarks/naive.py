@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from quick import parser
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
@@ -207,6 +208,7 @@ CASES: list[Callable[[], str]] = [
 
 def main() -> None:
     """Print one line per case."""
+    parser(__doc__).parse_args()
     for case in CASES:
         print(f"{case.__name__:36s} {case()}", flush=True)
 

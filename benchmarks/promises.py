@@ -7,11 +7,12 @@ method confirms; the tables have the largest difference of the two.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import auto_scenes
+from quick import parser, pick
 
 from msfp_gen import Effects, Load, Motion, RunError, Scene, Top, load_scene
 from msfp_gen.scene.effect_switching import all_effects
@@ -103,7 +104,7 @@ def promise(name: str, scene: Scene, target: float = TARGET, budget: float = 60.
 def rows(scenes: Iterable[tuple[str, Scene]]) -> Iterator[str]:
     """Rows of a table."""
     yield "| scene | stated | true, RMS | true, peaks | confirmed to | tolerance | left out |\n|---|---|---|---|---|---|---|"
-    for name, scene in scenes:
+    for name, scene in islice(scenes, pick(None, 2)):
         try:
             found = promise(name, scene)
         except RunError as error:
@@ -124,9 +125,9 @@ def demanding(count: int) -> Iterator[tuple[str, Scene]]:
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=COUNT, help="number of random scenes")
-    for table in (scenes(), demanding(parser.parse_args().count)):
+    options = parser(__doc__)
+    options.add_argument("--count", type=int, default=COUNT, help="number of random scenes")
+    for table in (scenes(), demanding(options.parse_args().count)):
         for line in rows(table):
             print(line, flush=True)
         print()

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from quick import docs_folder, parser, pick
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests")]  # the closed form is that of the tests
@@ -27,7 +28,7 @@ MARKS = {"u_star": "u*", "u_star_star": "u**", "u_dr1": "u_dr1", "u_dr4": "u_dr4
 TESTS = tuple(f"fenz-test{number}" for number in range(1, 6))
 AMPLITUDES = (125, 88, 50, 25, 12, 5)  # [mm], section 4.3
 PLAIN = ("fenz-test2", "fenz-test5", "ridgecrest-clc")  # drawn as `msfp-gen run SCENE --plot` draws them
-ROWS = 4000  # rows per cycle
+ROWS = pick(4000, 200)  # rows per cycle
 U, F = "displacement across the bearing u = base − top [mm]", "force over axial load F / N"
 
 
@@ -181,4 +182,6 @@ def main(docs: Path = ROOT / "docs") -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    options = parser(__doc__)
+    options.add_argument("folder", nargs="?", type=Path, default=docs_folder())
+    main(options.parse_args().folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -170,6 +171,7 @@ def page(runs: Runs, points: list[Point]) -> str:
         quake_rims=", ".join(map(str, quake["rims_met"])) or "none",
         quake_energy=f"{quake['energy']['closure_error']:.2%}",
         quake_least=f"{min(quake['minimum_normal_force']) / 1e3:.0f}",
+        date=date.today(),
         **study_numbers(points),
     )
 

@@ -6,16 +6,17 @@ Builds go to a temporary cache. Every run is repeated and its fastest wall time 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-LAYOUTS = ("5 2 2", "7 3 3", "11 5 5")
-SCENES = ("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc", "ridgecrest-ccc")
-REPEATS = 5
+from quick import OPTIONS, parser, pick
+
+LAYOUTS = pick(("5 2 2", "7 3 3", "11 5 5"), ("5 2 2",))
+SCENES = pick(("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc", "ridgecrest-ccc"), ("fenz-test2",))
+REPEATS = pick(5, 1)
 
 WARM = """
 import msfp_gen, time
@@ -52,6 +53,7 @@ def warm_build(cache: str) -> float:
 
 def main() -> None:
     """Print both tables, then run the other scripts."""
+    parser(__doc__).parse_args()
     from msfp_gen import load_scene, simulate
 
     with tempfile.TemporaryDirectory() as cache:
@@ -70,10 +72,9 @@ def main() -> None:
         count = best.counters
         speed = best.history.time[-1] / count.wall_time
         print(f"| {name} | {count.wall_time:.4f} | {speed:.0f} | {count.steps} | {count.newton_iterations} |")
-    scripts = ["kernels.py", "runs.py", "batch.py"] + ["instructions.py"] * bool(shutil.which("valgrind"))
-    for script in scripts:
+    for script in ("kernels.py", "runs.py", "batch.py", "instructions.py"):
         print(flush=True)
-        subprocess.run([sys.executable, str(Path(__file__).with_name(script))], check=True)
+        subprocess.run([sys.executable, str(Path(__file__).with_name(script)), *OPTIONS], check=True)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ table in docs/studies.md. `kills` also measures the memory of an uninterrupted r
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import random
@@ -22,6 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
+from quick import installed, parser, pick
 
 import msfp_gen
 from msfp_gen import simulate
@@ -29,7 +29,7 @@ from msfp_gen.common.cores import usable_cores
 from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.studies import fragility, load_study, read_study
 
-KILLS = 5
+KILLS = pick(5, 2)
 PLANAR = {  # about 2 ms a run
     "bearing": "fenz-tfp",
     "motion": {"kind": "harmonic", "amplitude": 0.025, "frequency": 0.5, "cycles": 1.0},
@@ -70,7 +70,7 @@ class Memory:
 
     def between(self, low: float, high: float) -> float:
         """The largest value between two shares."""
-        return max(total for share, total in self.samples if low <= share <= high)
+        return max((total for share, total in self.samples if low <= share <= high), default=float("nan"))
 
 
 def _resident(pid: int) -> float:
@@ -120,8 +120,11 @@ def kills(folder: Path, runs: int) -> Iterator[str]:
         while parts(killed) < share * total and process.poll() is None:
             time.sleep(0.01)
         time.sleep(rng.uniform(0.0, 0.2))
-        victim = process.pid if index % 2 == 0 else _children(process.pid)[-1]  # the study, or one of its workers
-        os.kill(victim, signal.SIGKILL)
+        workers = _children(process.pid)
+        if index % 2 and workers and process.poll() is None:
+            os.kill(workers[-1], signal.SIGKILL)
+        else:
+            process.kill()
         process.wait()
     done = parts(killed)
     assert start(file, killed).wait() == 0
@@ -137,35 +140,37 @@ def kills(folder: Path, runs: int) -> Iterator[str]:
 def shards(folder: Path, runs: int) -> Iterator[str]:
     """Two shards at the same time against one run."""
     file, whole, halves = folder / "study.toml", folder / "whole", folder / "halves"
-    file.write_text(dumps(planar(runs // 10)), encoding="utf-8")
+    runs = max(runs // 10, 2)
+    file.write_text(dumps(planar(runs)), encoding="utf-8")
     assert start(file, whole).wait() == 0
     both = [start(file, halves, "--shard", f"{i}/2", "--workers", "1") for i in (1, 2)]
     assert [process.wait() for process in both] == [0, 0]
-    yield f"{runs // 10} runs in two shards at the same time | tables equal: {hash_of(whole) == hash_of(halves)}"
+    yield f"{runs} runs in two shards at the same time | tables equal: {hash_of(whole) == hash_of(halves)}"
 
 
 def dask(folder: Path, runs: int) -> Iterator[str]:
     """A Dask cluster of which a worker is killed against a local run."""
-    try:
-        from distributed import LocalCluster
-    except ImportError:
-        yield f"{runs // 10} runs on Dask, one worker killed | not run: distributed is not installed"
+    if not installed("distributed", "a study on Dask of which a worker is killed"):
         return
     from threading import Thread
 
-    table, whole, cluster_folder = planar(runs // 10, chunk=64), folder / "whole", folder / "dask"
+    from distributed import LocalCluster
+
+    runs = max(runs // 10, 2)
+    chunk = max(1, min(64, runs // 40))
+    table, whole, cluster_folder = planar(runs, chunk=chunk), folder / "whole", folder / "dask"
     msfp_gen.study(table, whole)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
         victim = next(iter(cluster.workers.values())).pid
 
         def kill() -> None:
-            while parts(cluster_folder) < 20:
+            while parts(cluster_folder) < min(20, runs // chunk // 2):
                 time.sleep(0.005)
             os.kill(victim, signal.SIGKILL)
 
         Thread(target=kill, daemon=True).start()
         msfp_gen.study(table, cluster_folder, dask=cluster.scheduler_address)
-    yield f"{runs // 10} runs on Dask, one worker killed | tables equal: {hash_of(whole) == hash_of(cluster_folder)}"
+    yield f"{runs} runs on Dask, one worker killed | tables equal: {hash_of(whole) == hash_of(cluster_folder)}"
 
 
 def rate(folder: Path) -> float:
@@ -179,9 +184,9 @@ def cores(folder: Path, _: int) -> Iterator[str]:
     """Runs per second on all cores over those on one, best of three rounds in turns."""
     count = usable_cores()
     file = folder / "study.toml"
-    file.write_text(dumps(ten_ms(1024, chunk=8)), encoding="utf-8")
+    file.write_text(dumps(ten_ms(pick(1024, 64), chunk=8)), encoding="utf-8")
     found: dict[int, list[float]] = {1: [], count: []}
-    for number in range(3):
+    for number in range(pick(3, 1)):
         for workers, rates in found.items():
             out = folder / f"{workers}-{number}"
             assert start(file, out, "--workers", str(workers)).wait() == 0
@@ -192,7 +197,7 @@ def cores(folder: Path, _: int) -> Iterator[str]:
 
 def overhead(folder: Path, _: int) -> Iterator[str]:
     """CPU time of a study on one worker over that of a loop of `simulate` with its scenes, best of rounds in turns."""
-    study = load_study(ten_ms(256, chunk=32))
+    study = load_study(ten_ms(pick(256, 32), chunk=32))
     scenes = [study.scene(run) for run in range(1, study.runs + 1)]
 
     def loop() -> None:
@@ -200,7 +205,7 @@ def overhead(folder: Path, _: int) -> Iterator[str]:
             simulate(scene)
 
     loops, studies = [], []
-    for number in range(5):
+    for number in range(pick(5, 1)):
         loops.append(_seconds(loop))
         studies.append(_seconds(lambda: msfp_gen.study(study, folder / str(number), threads=True, workers=1)))  # noqa: B023
     share = min(studies) / min(loops) - 1
@@ -222,7 +227,7 @@ def fragilities(folder: Path, _: int) -> Iterator[str]:
         "scale": {"distribution": "uniform", "low": 0.3, "high": 3.0},
     }
     held = {"median": 0, "dispersion": 0}
-    seeds = 20
+    seeds = pick(20, 1)
     for seed in range(seeds):
         sampling = {"samples": 300, "seed": seed, "method": "random"}
         table = planar(300, axes=axes, sampling=sampling, quantities={"ratio": "scale / capacity"})
@@ -245,12 +250,14 @@ PROOFS: dict[str, Callable[[Path, int], Iterator[str]]] = {
 
 def main() -> None:
     """Print the rows of the chosen proofs."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("proofs", nargs="*", metavar="PROOF", help=", ".join(PROOFS))
-    parser.add_argument("--runs", type=int, default=100_000, help="runs of `kills`; a tenth of them elsewhere")
-    given = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("proofs", nargs="*", metavar="PROOF", help=", ".join(PROOFS))
+    options.add_argument(
+        "--runs", type=int, default=pick(100_000, 200), help="runs of `kills`; a tenth of them elsewhere"
+    )
+    given = options.parse_args()
     if unknown := [name for name in given.proofs if name not in PROOFS]:
-        parser.error(f"{unknown[0]!r} is no proof; they are {', '.join(PROOFS)}")
+        options.error(f"{unknown[0]!r} is no proof; they are {', '.join(PROOFS)}")
     for name in given.proofs or PROOFS:
         with TemporaryDirectory() as folder:
             for row in PROOFS[name](Path(folder), given.runs):

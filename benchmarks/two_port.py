@@ -10,15 +10,16 @@ import sys
 import time
 
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import Effects, Motion, Scene, Top, TwoPort, presets, simulate
 from msfp_gen.common.arrays import Array
 
 BEARING = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
-LOAD, AMPLITUDE, PERIOD, DURATION = 112e3, 0.06, 2.0, 4.0
-STEPS = (0.01, 0.005, 0.002)  # of the analysis [s]
+LOAD, AMPLITUDE, PERIOD, DURATION = 112e3, 0.06, 2.0, pick(4.0, 0.4)
+STEPS = pick((0.01, 0.005, 0.002), (0.01,))  # of the analysis [s]
 STILL = np.zeros((3, 6))
-REPEATS = 3  # the fastest counts
+REPEATS = pick(3, 1)  # the fastest counts
 
 
 def end(at: float) -> Array:
@@ -58,6 +59,7 @@ def run_seconds(step: float) -> float:
 
 def main() -> None:
     """Print the table."""
+    parser(__doc__).parse_args()
     heads = (
         "step of the analysis",
         "trial, over the same time of a run",

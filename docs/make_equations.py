@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
+from msfp_gen.common.output import replacing
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
-TARGET = Path(__file__).with_name("equations.md")
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import docs_folder, parser
+
+TARGET = docs_folder() / "equations.md"
 ROWS = 6  # statements in one block; long blocks do not render everywhere
 
 INTRODUCTION = r"""# The equations, as the generator writes them
@@ -100,11 +105,11 @@ def text() -> str:
 
 
 def main() -> None:
-    """Write the page to a temporary file and rename it."""
-    part = TARGET.with_suffix(".part")
-    part.write_text(text(), encoding="utf-8")
-    part.replace(TARGET)
+    """Write the page, completely or not at all."""
+    with replacing(TARGET) as temporary:
+        temporary.write_text(text(), encoding="utf-8")
 
 
 if __name__ == "__main__":
+    parser(__doc__).parse_args()
     main()

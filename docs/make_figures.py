@@ -20,9 +20,12 @@ from msfp_gen.results.geometry.section import sections
 from msfp_gen.results.resample import at_times
 from msfp_gen.studies import fragility, ida, plot_fragility, plot_ida, read_study
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import docs_folder, parser, pick
+
 FOLDER = Path(__file__).resolve().parent / "figures"
 RECORD = "ridgecrest-2019-ci-clc"
-ROWS = 3000
+ROWS = pick(3000, 300)
 DEVICES = {  # preset scene -> name in docs/layouts.md
     "single-push": "single",
     "single-articulated-push": "single, articulated",
@@ -31,7 +34,7 @@ DEVICES = {  # preset scene -> name in docs/layouts.md
     "triple-push": "triple",
     "quintuple-push": "quintuple",
 }
-TOLERANCES = 10.0 ** -np.arange(2, 7)
+TOLERANCES = 10.0 ** -np.arange(2, pick(7, 4))
 
 
 def run(name: str, sliders: str = "inertial", **solver: Any) -> Result:
@@ -162,4 +165,6 @@ def main(folder: Path = FOLDER) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    options = parser(__doc__)
+    options.add_argument("folder", nargs="?", type=Path, default=docs_folder() / "figures")
+    main(options.parse_args().folder)

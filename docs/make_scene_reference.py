@@ -5,6 +5,7 @@ What a key takes and its default come from the rules that the reader of scene fi
 
 from __future__ import annotations
 
+import sys
 from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,8 @@ from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, NodeTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
 
-TARGET = Path(__file__).with_name("scene.md")
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import docs_folder, parser
 
 INTRODUCTION = """# Scene files: every key
 
@@ -340,5 +342,7 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    TARGET.write_text(page(), encoding="utf-8")
-    print(f"wrote {TARGET}")
+    parser(__doc__).parse_args()
+    target = docs_folder() / "scene.md"
+    target.write_text(page(), encoding="utf-8")
+    print(f"wrote {target}")

@@ -16,6 +16,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import QUICK, docs_folder, parser
+
 PAGE = Path(__file__).resolve().parent / "tutorial.md"
 PICTURES = ("tutorial.png", "tutorial-section.png")
 
@@ -74,7 +77,10 @@ def follow(folder: Path, run: Callable[[str, Path], str] = run, page: Path = PAG
 
 
 if __name__ == "__main__":
-    where = Path(sys.argv[1])
-    where.mkdir(parents=True, exist_ok=True)
-    for done in follow(where, page=Path(sys.argv[2]) if len(sys.argv) > 2 else PAGE):
+    options = parser(__doc__)
+    options.add_argument("folder", type=Path, **({"nargs": "?", "default": docs_folder()} if QUICK else {}))
+    options.add_argument("page", nargs="?", type=Path, default=PAGE)
+    given = options.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    for done in follow(given.folder, page=given.page):
         print(*(f"$ {command}" for command in done.commands), done.printed, sep="\n")

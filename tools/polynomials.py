@@ -6,9 +6,14 @@ in 60 digits, and has the least degree at which the relative error of the functi
 
 from __future__ import annotations
 
+import sys
 from itertools import count
+from pathlib import Path
 
 import mpmath as mp
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import parser, pick
 
 mp.mp.dps = 60
 BOUND, SAMPLES = mp.mpf("1e-17"), 60
@@ -69,5 +74,6 @@ def _horner(values: list[float]) -> str:
 
 
 if __name__ == "__main__":
-    for kind in RANGES:
+    parser(__doc__).parse_args()
+    for kind in pick(list(RANGES), ["sin"]):
         print(f"{kind}: {as_c(polynomial(kind))}")

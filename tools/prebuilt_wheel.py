@@ -6,9 +6,9 @@ limited API of Python 3.11, so that the wheel serves that version and all later 
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +20,10 @@ from msfp_gen.jit.compiler import zig_program
 from msfp_gen.jit.driver import build_driver
 from msfp_gen.jit.prebuilt import LEVELS, add_prebuilt, prebuilt_specs
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from quick import QUICK, parser, pick
+
+ROOT = Path(__file__).resolve().parents[1]
 TAGS = ("cp311-abi3-manylinux_2_17_x86_64", "cp311-abi3-manylinux2014_x86_64")
 OPTIONS = (
     "cc", "-target", "x86_64-linux-gnu.2.17", "-fno-sanitize=undefined", "-s", "-DPy_LIMITED_API=0x030B0000",
@@ -30,23 +34,37 @@ PROCESSORS = {1: "x86_64", 3: "x86_64_v3"}
 
 def main() -> None:
     """Write the wheel with models into the folder of -o."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("wheel", type=Path, help="pure wheel, such as `python -m build --wheel` writes")
-    parser.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
-    given = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument(
+        "wheel", nargs=pick(None, "?"), type=Path, help="pure wheel, such as `python -m build --wheel` writes"
+    )
+    options.add_argument("-o", "--output", type=Path, default=Path("wheels"), help="folder of the result")
+    given = options.parse_args()
     zig = zig_program()
+    if zig is None and QUICK:
+        print("left out, since ziglang is not installed (pip install 'msfp-gen[wheels]'): the wheel")
+        return
     if zig is None:
         raise SystemExit("error: ziglang is not installed: pip install 'msfp-gen[wheels]'")
-    given.output.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, TemporaryDirectory() as built:
+        output = Path(built) if QUICK else given.output
+        output.mkdir(parents=True, exist_ok=True)
         tool = [sys.executable, "-m", "wheel"]
-        subprocess.run([*tool, "unpack", given.wheel.absolute(), "-d", folder], check=True)
+        subprocess.run([*tool, "unpack", given.wheel or pure_wheel(Path(built)), "-d", folder], check=True)
         (unpacked,) = Path(folder).iterdir()
         check_sources(unpacked)
         with TemporaryDirectory() as cache:
             add_models(unpacked / "msfp_gen" / "prebuilt", zig, Path(cache))
         change_tags(unpacked)
-        subprocess.run([*tool, "pack", unpacked, "-d", given.output.absolute()], check=True)
+        subprocess.run([*tool, "pack", unpacked, "-d", output.absolute()], check=True)
+
+
+def pure_wheel(folder: Path) -> Path:
+    """The wheel of a copy of this checkout, for a quick run."""
+    copy = Path(shutil.copytree(ROOT, folder / "copy", ignore=shutil.ignore_patterns(".*", "build", "dist", "tests")))
+    command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, copy]
+    subprocess.run(command, check=True)
+    return next(folder.glob("*.whl"))
 
 
 def check_sources(unpacked: Path) -> None:
@@ -61,14 +79,14 @@ def check_sources(unpacked: Path) -> None:
 def add_models(root: Path, zig: Path, cache: Path) -> None:
     """Build every model for every level of the processor, and the drivers for all, and copy them to `root`."""
     os.environ.pop("MSFP_GEN_CFLAGS", None)
-    for level in LEVELS:
+    for level in LEVELS[: pick(None, 1)]:
         os.environ["CC"] = shlex.join([str(zig), *OPTIONS, f"-mcpu={PROCESSORS[level]}"])
         os.environ["MSFP_GEN_CACHE"] = str(cache / str(level))
-        for spec in prebuilt_specs():
+        for spec in prebuilt_specs()[: pick(None, 1)]:
             folder = add_prebuilt(level, prepare(spec, portable=True).folder, root)
             print(folder.name, spec.key, flush=True)
     for package in DRIVERS:  # compiled for the last level, which every processor reaches
-        print(add_prebuilt(LEVELS[-1], build_driver(package).folder, root).name, package, flush=True)
+        print(add_prebuilt(level, build_driver(package).folder, root).name, package, flush=True)
 
 
 def change_tags(unpacked: Path) -> None:

@@ -18,35 +18,25 @@ from msfp_gen.buildings.text import GROUP, ground_name, scene_from, shapes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.note import Note
-from msfp_gen.results.reading import DAMAGE, DIGEST, REMEDY, motion_in
-from msfp_gen.results.stored_group import ArrayDigest, StoredGroup, digest, stored_groups
+from msfp_gen.results.reading import DIGEST, REMEDY, R, motion_in, result_file, result_in
+from msfp_gen.results.stored_group import ArrayDigest, StoredGroup, digest
 from msfp_gen.scene.file.loader import toml_table
 
 Arrays = dict[str, Any]
 B = TypeVar("B", bound=BuildingData)
 
 
-def is_building(path: str | Path) -> bool:
-    """Whether a file is the result of a building; False for what cannot be read."""
-    try:
-        with stored_groups(Path(path)) as root:
-            return root.attributes(lambda name: name == "source").get("source") == SOURCE
-    except DAMAGE:
-        return False
-
-
 def read_building(path: str | Path, kind: type[B]) -> B:
     """The result in a file of `BuildingResult.to_netcdf`, as `kind`. Raises InputError for any other file."""
-    path = Path(path)
-    try:
-        if not path.is_file():
-            raise InputError("no such file; give the name of a result")
-        with stored_groups(path) as root:
-            return _read(root, kind)
-    except InputError as error:
-        raise InputError(f"path = {str(path)!r}: {error}") from None
-    except DAMAGE as error:
-        raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
+    with result_file(path) as root:
+        return _read(root, kind)
+
+
+def read_any(path: str | Path, bearing: type[R], building: type[B]) -> R | B:
+    """The result in a file, as one of a bearing or of a building. Raises InputError for any other file."""
+    with result_file(path) as root:
+        source = root.attributes(lambda name: name == "source").get("source")
+        return _read(root, building) if source == SOURCE else result_in(root, bearing)
 
 
 def _read(root: StoredGroup, kind: type[B]) -> B:

@@ -168,7 +168,12 @@ class BuildingScene:
         stiffness = self.building.stiffness + rows.T * springs @ rows
         # Horizontal motions meet no spring: the least of all solutions. Rounding is relative to each coordinate.
         scale = 1 / np.sqrt(np.maximum(np.diag(stiffness), 1e-9 * np.diag(stiffness).max()))
-        found = scale * np.linalg.lstsq(scale[:, None] * stiffness * scale, scale * self.weights, rcond=1e-12)[0]
+        scaled = scale[:, None] * stiffness * scale
+        if not (np.isfinite(scaled).all() and np.isfinite(scale * self.weights).all()):
+            raise InputError(
+                "scene.building: stiffness and weights give no finite loads of the bearings; give smaller ones"
+            )
+        found = scale * np.linalg.lstsq(scaled, scale * self.weights, rcond=1e-12)[0]
         loads: Array = -springs * (rows @ found)
         motions = self.building.rigid_motions
         left = motions.T @ (self.weights + rows.T @ loads)

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 def load_source(source: str) -> AnyResult | AnyScene:
     """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
-        from msfp_gen.buildings.reading import is_building
+        from msfp_gen.buildings.reading import read_any
         from msfp_gen.buildings.result import BuildingResult
         from msfp_gen.result import Result
 
-        return (BuildingResult if is_building(source) else Result).from_netcdf(source)
+        return read_any(source, Result, BuildingResult)
     from msfp_gen.buildings.opening import load_scene
 
     return load_scene(source)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
+from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,11 +17,10 @@ from msfp_gen.results.gradient import Gradients
 from msfp_gen.results.gradient_dataset import to_gradient_dataset
 from msfp_gen.results.reading import DIGEST, digest_of
 from msfp_gen.results.run_data import RunData
+from msfp_gen.results.stored_group import ArrayDigest, seal
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from msfp_gen.results.stored_group import ArrayDigest
 
 
 def write_netcdf(result: RunData, path: str | Path) -> Path:
@@ -38,7 +38,7 @@ def write_netcdf(result: RunData, path: str | Path) -> Path:
 
 
 def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset]) -> None:
-    """Write a dataset, and others as groups, as one netCDF-4 file, completely or not at all."""
+    """Write a dataset, and others as groups, as one sealed netCDF-4 file, completely or not at all."""
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
@@ -48,7 +48,7 @@ def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Datase
         dataset.dump_to_store(H5NetCDFStore(file), encoding=compressed_rows(dataset))
         for name, each in groups.items():
             each.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(each))
-    write_bytes(path, [content.getbuffer()])
+    write_bytes(path, [content.getbuffer(), seal(sha256(content.getbuffer()))])
 
 
 def _encoding(group: xr.Dataset) -> dict[Hashable, dict[str, Any]]:

@@ -11,11 +11,11 @@ class Note:
 
     time [s]: of the first detection. kind: "rims", "uplift", "inertia", "heat", "law_speed", "law_load",
     "law_temperature", "plane", "jammed", "energy", "tolerance", "damping", "creep", "peak", "rattle", "footprint",
-    "ringing", "gradient" or "value". surface: 1..n-1; 0: none. value: what the text gives, of a monitor the one furthest beyond its
-    limit: distance beyond the capacity [m], force [N], inertial over normal force [-], temperature rise [K], slip
-    velocity [m/s], temperature [degC], share of the energy [-], movement [m], distance of the normal force from the
-    axis [m], number of landings, error over the derivative [-], value of the scene. action: the effects with which the run continued; "": it continued
-    unchanged, or ended.
+    "ringing", "gradient" or "value". surface: 1..n-1; 0: none. value: what the text gives, of a monitor the one
+    furthest beyond its limit: distance beyond the capacity [m], force [N], inertial over normal force [-], temperature
+    rise [K], slip velocity [m/s], temperature [degC], share of the energy [-], movement [m], distance of the normal
+    force from the axis [m], number of landings, error over the derivative [-], value of the scene. action: the effects
+    with which the run continued; "": it continued unchanged, or ended.
     """
 
     time: float

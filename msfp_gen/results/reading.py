@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from hashlib import sha256
 from pathlib import Path
@@ -40,24 +42,39 @@ Arrays = dict[str, Any]
 
 def read_result(path: str | Path, kind: type[R]) -> R:
     """The result in a file of `Result.to_netcdf`, as an instance of `kind`. Raises InputError for any other file."""
-    path, about = Path(path), dict[str, Attribute]()
+    with result_file(path) as root:
+        return result_in(root, kind)
+
+
+@contextmanager
+def result_file(path: str | Path) -> Iterator[StoredGroup]:
+    """The root of the file of a result. Whatever is wrong with the file raises InputError with its path."""
+    path = Path(path)
     try:
         if not path.is_file():
             raise InputError("no such file; give the name of a result")
         with stored_groups(path) as root:
-            about |= root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
-            return _read(root, dict(about), kind)
+            yield root
+    except InputError as error:
+        raise InputError(f"path = {str(path)!r}: {error}") from None
+    except DAMAGE as error:
+        raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
+    except MemoryError:
+        raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
+
+
+def result_in(root: StoredGroup, kind: type[R]) -> R:
+    """The result of one bearing in a file. Raises InputError, or what `DAMAGE` lists, for any other content."""
+    about = root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
+    try:
+        return _read(root, dict(about), kind)
     except (InputError, *DAMAGE) as error:
         if about.get("source") == "msfp-gen" and about.get(EDITION) != edition():
             raise InputError(
-                f"path = {str(path)!r}: another version of msfp-gen wrote this result, which this one cannot read; run "
-                "its scene again (attribute scene)"
+                "another version of msfp-gen wrote this result, which this one cannot read; run its scene again "
+                "(attribute scene)"
             ) from error
-        if not isinstance(error, InputError):
-            raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
-        raise InputError(f"path = {str(path)!r}: {error}") from None
-    except MemoryError:
-        raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
+        raise
 
 
 def edition() -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 EXPANSION = 1100  # bytes of an array over its bytes in the file, at most; deflate reaches 1032
 SMALLEST_CHUNK = 2**20  # [bytes]; a chunk, which HDF5 allocates whole, may be larger than a smaller array
 BLOCK = 256  # texts read at once
+SEAL = b"msfp-gen seal 1\n"  # mark before the sha256 at the end of a file
+HEAP = rb"GCOL\x01"  # begin of a global heap of HDF5: signature and version
+OBJECT = 16  # size of its header, and of that of an object in it [bytes]
 Attribute = str | int | float
 
 
@@ -135,11 +139,49 @@ def _known_filters() -> set[int]:
 
 @contextmanager
 def stored_groups(path: Path) -> Iterator[StoredGroup]:
-    """The root of an HDF5 file. Raises OSError where the file is none."""
+    """The root of an HDF5 file. Raises OSError where the file is none, ValueError where its bytes are damaged."""
     import h5py
 
-    with h5py.File(path, "r") as file:
+    _check(path.read_bytes())
+    # Numbers that were changed may overflow before the digest is compared.
+    with h5py.File(path, "r") as file, np.errstate(all="ignore"):
         yield StoredGroup(file, path.stat().st_size)
+
+
+def seal(total: hashlib._Hash) -> bytes:
+    """What follows the bytes of a file: a mark, and their sha256, of which this is the state.
+
+    HDF5 does not read behind its own end, and cuts the seal off where it writes: a file that another program has
+    changed has none, and its digest tells whether a value is another one.
+    """
+    return SEAL + total.digest()
+
+
+def _check(content: bytes) -> None:
+    """Raise ValueError where the bytes of a sealed file are not those that were written: HDF5 must not see them."""
+    size = len(SEAL) + hashlib.sha256().digest_size
+    if content[-size:].startswith(SEAL) and content[-size:] != seal(hashlib.sha256(memoryview(content)[:-size])):
+        raise ValueError("it is damaged: its bytes are not those that were written")
+    _check_heaps(content)
+
+
+def _check_heaps(content: bytes) -> None:
+    """Raise ValueError for a damaged global heap (collection of texts), in which HDF5 may loop for ever.
+
+    HDF5 goes from object to object by their sizes, which have no checksum: free space (object 0) of size 0 leads to
+    itself (github.com/HDFGroup/hdf5/issues/1707). At most as many objects are visited as the file has room for.
+    """
+    room = len(content) // OBJECT
+    for heap in re.finditer(HEAP, content):
+        at, size = heap.start() + OBJECT, int.from_bytes(content[heap.end() + 3 : heap.end() + 11], "little")
+        end = min(heap.start() + size, len(content))
+        while at + OBJECT <= end:
+            index, size = (int.from_bytes(content[at + a : at + b], "little") for a, b in ((0, 2), (8, 16)))
+            step = (OBJECT + -(-size // 8) * 8 if index else size) % 2**64
+            room -= 1
+            if not step or room < 0:
+                raise ValueError("its texts are damaged")
+            at += step
 
 
 class ArrayDigest:

@@ -9,6 +9,7 @@ import io
 import os
 from collections.abc import Iterable
 from dataclasses import replace
+from hashlib import file_digest
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from msfp_gen.results.joining import taken
 from msfp_gen.results.netcdf import digest_of_dataset
 from msfp_gen.results.reading import DIGEST
 from msfp_gen.results.run_data import RunData
-from msfp_gen.results.stored_group import ArrayDigest
+from msfp_gen.results.stored_group import ArrayDigest, seal
 from msfp_gen.results.thinning import BLOCK
 
 
@@ -104,6 +105,9 @@ class _Disk(io.FileIO):
             raise self._failure
 
     def finish(self) -> None:
-        """Flush to the disk; raises OSError where that fails or an earlier write did."""
+        """Seal the file and flush it to the disk; raises OSError where that fails or an earlier write did."""
+        self.raise_failure()
+        self.seek(0)
+        self.write(seal(file_digest(self, "sha256")))
         self.raise_failure()
         os.fsync(self.fileno())

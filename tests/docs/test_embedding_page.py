@@ -10,11 +10,11 @@ import re
 import socket
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 from support import ROOT
+from support.peers import opensees_runs
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -42,7 +42,7 @@ def test_the_examples_in_python_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.strip() == promised("embedding.md")
 
 
-@pytest.mark.skipif(not find_spec("openseespy"), reason="OpenSeesPy is not installed")
+@pytest.mark.skipif(not opensees_runs(), reason="OpenSeesPy cannot be imported")
 def test_the_example_in_opensees_runs_with_the_command_that_serves(tmp_path: Path) -> None:
     """At a free port in place of the one of the page."""
     (tmp_path / "bearing.toml").write_text(blocks("opensees.md", "toml")[0], encoding="utf-8")

@@ -1,6 +1,6 @@
 """Buildings on bearings against OpenSees: with served bearings, and with its own triple pendulum.
 
-Skipped where OpenSeesPy is not installed: `pip install -e .[opensees]`.
+Skipped where OpenSeesPy cannot be imported: `pip install -e .[opensees]`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import pytest
 from support import ROOT, Array
 from support.buildings import BASE, BEARING, INTERFACE, PLACES, storey
 from support.generic_client import serving
+from support.peers import opensees_runs
 
 from msfp_gen import (
     BaseSlab,
@@ -36,9 +36,7 @@ from msfp_gen import (
 )
 from msfp_gen.studies.accuracy.series import Series
 
-pytestmark = pytest.mark.skipif(
-    not (find_spec("openseespy") or find_spec("openseespylinux")), reason="OpenSeesPy is not installed"
-)
+pytestmark = pytest.mark.skipif(not opensees_runs(), reason="OpenSeesPy cannot be imported")
 SAMPLE = 0.01  # of the record [s]
 DAMPING_TIME = 5e-4  # of the storeys, damping over stiffness [s]
 

@@ -1,6 +1,6 @@
 """Served bearings in OpenSees: a linear spring, its own triple pendulum, a frame on four bearings, a failure.
 
-Skipped where OpenSeesPy is not installed: `pip install -e .[opensees]`.
+Skipped where OpenSeesPy cannot be imported: `pip install -e .[opensees]`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,12 @@ from support import ROOT, Array, links
 from support.ends import BEARING, LOAD
 from support.generic_client import serving
 from support.links import WEIGHT
+from support.peers import opensees_runs
 
 from msfp_gen import Effects, Top, TwoPort, load_scene, presets
 from msfp_gen.studies.accuracy.series import Series
 
-pytestmark = pytest.mark.skipif(
-    not (find_spec("openseespy") or find_spec("openseespylinux")), reason="OpenSeesPy is not installed"
-)
+pytestmark = pytest.mark.skipif(not opensees_runs(), reason="OpenSeesPy cannot be imported")
 
 
 def analysis(name: str, **arguments: Any) -> tuple[Any, str]:

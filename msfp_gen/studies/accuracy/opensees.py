@@ -33,7 +33,12 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
     if find_spec("openseespy") is None:
         raise InputError("openseespy is not installed: pip install openseespy to compare with TripleFrictionPendulum")
     lower, upper, inner = _links(scene)
-    ops = import_module("openseespy.opensees")
+    try:
+        ops = import_module("openseespy.opensees")
+    except (ImportError, RuntimeError) as error:
+        raise InputError(
+            f"openseespy cannot be imported ({error}): see its page for the libraries that it needs"
+        ) from None
     times = np.linspace(0.0, scene.end, steps + 1)
     begin = time.perf_counter()
     try:

@@ -12,7 +12,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
-from msfp_gen.studies.study.chunks import parts_in, study_table
+from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
 from msfp_gen.studies.study.engines import require
 
 COMPLETE = "ok"  # the status of a run that reached its end
@@ -32,12 +32,15 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     parts = [str(folder / name) for name in sorted(parts_in(folder))]
     if not parts:
         raise InputError(f"{str(folder)!r}: the study has no rows yet; run it")
-    found = ds.dataset(parts, format="parquet")
+    checked = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
+    with readable_parts(folder):
+        found = ds.dataset(parts, format=ds.ParquetFileFormat(default_fragment_scan_options=checked))
     for name in columns or ():
         if name not in found.schema.names:
             raise unknown_column(name, found.schema.names)
     wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
-    rows = found.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
+    with readable_parts(folder):
+        rows = found.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
     rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in found.schema}
     return rows
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import cached_property
 from hashlib import sha256
@@ -160,6 +162,19 @@ def _text(value: Any) -> str:
 def parts_in(folder: Path) -> dict[str, int]:
     """Name -> number of the chunk, of every part in a folder."""
     return {path.name: int(found[1]) for path in folder.glob(PARTS) if (found := _NAME.fullmatch(path.name))}
+
+
+@contextmanager
+def readable_parts(path: Path) -> Iterator[None]:
+    """Raise InputError that names a part, or the folder of all, where reading shows that it is damaged."""
+    from pyarrow import ArrowException
+
+    try:
+        yield
+    except (ArrowException, OSError, LookupError, ValueError) as error:
+        raise InputError(
+            f"{str(path)!r}: a part of the study is damaged ({error}); remove it and run the study again"
+        ) from error
 
 
 def _read(folder: Path) -> dict[str, Any]:

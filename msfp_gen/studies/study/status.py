@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.study.chunks import parts_in, study_table
+from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
 
 RECENT = 50  # newest parts from which the rate is measured
 IDLE = 10  # times the mean interval between parts, after which a study counts as not running
@@ -88,10 +88,11 @@ def _without_pauses(times: list[tuple[float, int]]) -> list[tuple[float, int]]:
 
 
 def failures(part: Path) -> int:
-    """The number of failed runs of a part."""
+    """The number of failed runs of a part. Raises InputError where it is damaged."""
     import pyarrow.parquet as pq
 
-    return int((pq.read_schema(part).metadata or {})[b"failed"])
+    with readable_parts(part):
+        return int((pq.read_schema(part).metadata or {})[b"failed"])
 
 
 def status_table(found: Status) -> Table:

@@ -100,7 +100,7 @@ def _part(order: Order, rows: list[dict[str, Any]], failed: int) -> bytes:
     about = {"digest": order.digest, "failed": str(failed)}
     columns = [pa.array([row.get(field.name) for row in rows], field.type) for field in schema]
     content = BytesIO()
-    pq.write_table(pa.table(columns, schema=schema.with_metadata(about)), content)
+    pq.write_table(pa.table(columns, schema=schema.with_metadata(about)), content, write_page_checksum=True)
     return content.getvalue()
 
 

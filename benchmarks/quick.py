@@ -1,0 +1,55 @@
+"""The options that every script has: `--quick` runs it once through, with few and short runs. Its numbers mean nothing.
+
+A quick run writes no page and no figure of the checkout: what it would write there goes to a temporary folder.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from atexit import register
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from shutil import copytree, rmtree
+from typing import TypeVar
+
+T = TypeVar("T")
+QUICK = "--quick" in sys.argv[1:]
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+OPTIONS = ["--quick"] * QUICK  # of the scripts that a script starts
+
+
+def pick(whole: T, little: T) -> T:
+    """A setting of a script: the second one in a quick run."""
+    return little if QUICK else whole
+
+
+def parser(text: str | None) -> ArgumentParser:
+    """A parser with the option `--quick`; the script reads it here, when its settings are made."""
+    made = ArgumentParser(description=text, formatter_class=RawDescriptionHelpFormatter)
+    made.add_argument(
+        "--quick", action="store_true", help="once through, with few and short runs; numbers mean nothing"
+    )
+    return made
+
+
+@cache
+def docs_folder() -> Path:
+    """The pages and figures that a script reads and writes: those of this checkout, in a quick run a copy."""
+    if not QUICK:
+        return DOCS
+    folder = Path(tempfile.mkdtemp())
+    register(rmtree, folder, ignore_errors=True)
+    return Path(copytree(DOCS, folder / "docs", ignore=lambda *_: ["site"]))
+
+
+def installed(module: str, part: str) -> bool:
+    """Whether a program that a script compares with can be imported; if not, one line says what is left out."""
+    try:
+        import_module(module)
+    except Exception as error:  # OpenSeesPy raises RuntimeError where a library of the system is missing
+        print(f"left out, since {module} cannot be imported ({error}); make peers: {part}", flush=True)
+        return False
+    return True
