@@ -175,7 +175,7 @@ def test_a_changed_record_is_another_study(tmp_path: Path) -> None:
     }
     msfp_gen.study(table, tmp_path / "out", threads=True)
     record.write_text(record.read_text(encoding="utf-8").replace("0.300000", "0.310000"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"parts of another study .its records or the equations have changed"):
+    with pytest.raises(InputError, match=r"parts of another study .its files or the equations have changed"):
         msfp_gen.study(table, tmp_path / "out", threads=True)
 
 
