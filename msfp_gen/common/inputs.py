@@ -95,7 +95,7 @@ def _changed(path: Path, why: str) -> ChangedFileError:
 
 
 class Kept(Generic[T]):
-    """The values that were made last, by their keys, of at most so many bytes in all; for threads too."""
+    """The values that were made last, by their keys, of at most so much size in all; for threads too."""
 
     def __init__(self, most: int, size: Callable[[T], int]) -> None:
         self._most, self._size = most, size

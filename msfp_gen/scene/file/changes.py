@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Body, Surface
-from msfp_gen.scene.file.loader import complete_bearing, complete_part
+from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
 
 Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
@@ -84,6 +84,8 @@ def keys_of(path: str) -> list[Key]:
             raise InputError("no path of a field; give one such as motion.scale or bearing.surfaces[0].friction")
         found.append(step[1])
         found += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
+    if len(found) > MAX_DEPTH:
+        raise InputError("no path of a field: it leads deeper than any table of a scene")
     return found
 
 

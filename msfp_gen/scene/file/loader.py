@@ -5,11 +5,13 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from msfp_gen.common.fields import errors_at, ruled_fields
-from msfp_gen.common.inputs import is_input, read_input
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Kept, is_input, read_input
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
@@ -28,6 +30,7 @@ MAX_DEPTH = 16  # of nested tables and lists; a scene has six
 _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
+_complete: Kept[Table] = Kept(16, lambda _: 1)
 _PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
 
 
@@ -117,6 +120,10 @@ def complete_bearing(table: Mapping[str, Any]) -> Table:
 
     Coefficients of friction stay those of the table, also where they are at the pivot. Raises InputError.
     """
+    return dict(_complete.value(fingerprint(table), lambda: _completed(table)))
+
+
+def _completed(table: Mapping[str, Any]) -> Table:
     given = schema.validate_part("bearing", table)
     at = given.pop("friction_at", "surface")
     if at == "surface":
@@ -174,8 +181,7 @@ def effects_from_table(given: Mapping[str, Any]) -> Effects | Auto:
 def _bearing(given: Mapping[str, Any]) -> Bearing:
     changes = dict(given)
     if "preset" in changes:
-        preset = catalogue.bearing_table(changes.pop("preset"))
-        return bearing_from_table(preset).replace(**changes)
+        return _preset(changes.pop("preset")).replace(**changes)
     with errors_at("layout", "bearing.layout"):
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
@@ -184,6 +190,11 @@ def _bearing(given: Mapping[str, Any]) -> Bearing:
         return Bearing(**changes)
     bearing = Bearing(**changes)
     return bearing.replace(friction=[surface.friction for surface in bearing.surfaces], friction_at="pivot")
+
+
+@lru_cache(maxsize=16)
+def _preset(name: str) -> Bearing:
+    return bearing_from_table(catalogue.bearing_table(name))
 
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:

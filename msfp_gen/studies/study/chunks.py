@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from functools import cached_property
@@ -105,6 +106,10 @@ class Chunks:
         path = self.folder / STUDY_FILE
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             write_bytes(path, [text.encode()])
+
+    def started(self) -> None:
+        """Note that runs start now: the time of `study.toml`, from which their rate is counted."""
+        os.utime(self.folder / STUDY_FILE)
 
     def _check(self, present: dict[str, int]) -> None:
         chunks = self.study.chunks

@@ -127,6 +127,7 @@ def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progr
     _check_failures(study, failed, before, chunks.folder)
     if missing:
         _build(study)
+        chunks.started()
     if progress is not None:
         progress(before, total)
     done = 0

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.study_tables import rows_of
+from support.study_tables import rows_of, write_record
 
 import msfp_gen
 from msfp_gen import InputError
@@ -23,14 +22,6 @@ SHORT = {  # a run of a few milliseconds
     "effects": EFFECTS,
     "solver": {"rtol": 1e-2},
 }
-
-
-def write_record(path: Path, peak: float) -> Path:
-    """A second of a sine of acceleration along E1."""
-    rows = "".join(f"{0.02 * k:.2f},{peak * math.sin(math.pi * k / 25):.6f}\n" for k in range(51))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f"time [s], a1 [m/s^2]\n{rows}", encoding="utf-8")
-    return path
 
 
 def of_record(file: Path, **changes: Any) -> dict[str, Any]:
