@@ -19,14 +19,12 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
-from msfp_gen.scene.file.motion_tables import KINDS, resolved
+from msfp_gen.scene.file.motion_tables import KINDS, Paths, paths_in, resolved
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
 Table = dict[str, Any]
-MATRICES = ("mass", "stiffness", "damping")
-FILES = {"motion": ("file",), "building": MATRICES}  # table -> its keys that are paths of files
 
 
 @dataclass(frozen=True)
@@ -37,9 +35,9 @@ class FrameTable:
     damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency [Hz]: as in `Building.reduced`.
     """
 
-    mass: str | None = None
-    stiffness: str | None = None
-    damping: str | None = None
+    mass: Annotated[str | None, Paths()] = None
+    stiffness: Annotated[str | None, Paths()] = None
+    damping: Annotated[str | None, Paths()] = None
     damping_ratio: Annotated[float, Quantity("", least=0.0)] = 0.02
     rayleigh_frequencies: Annotated[tuple[float, float] | None, Quantity("Hz", above=0.0, shape=(2,))] = None
     highest_frequency: Annotated[float | None, Quantity("Hz", above=0.0)] = None
@@ -96,6 +94,8 @@ TABLES = {
     "solver": PARTS["solver"],
 }
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
+MATRICES = paths_in(FrameTable)
+FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files
 COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from msfp_gen.common.fields import Notes, Quantity, Text
+from msfp_gen.common.fields import Notes, Quantity, Text, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, digest_of, expecting, is_input
 from msfp_gen.errors import InputError
@@ -32,10 +32,14 @@ _ANGULAR = Quantity("rad/s", above=0.0)
 
 @dataclass(frozen=True)
 class Paths(Text):
-    """The path of a file, or a list of them."""
+    """The path of a file; several: or a list of them."""
+
+    several: bool = False
 
     def parse(self, value: object, *, text: bool = False) -> Any:
         """`value` itself, a list as a tuple; raises ValueError whose text is the remedy."""
+        if not self.several:
+            return super().parse(value, text=text)
         several = isinstance(value, list | tuple) and value and all(isinstance(item, str) for item in value)
         if not (isinstance(value, str) or several):
             raise ValueError("give a text in quotes, or a list of them: one file for each component")
@@ -160,7 +164,7 @@ class RecordMotion(MotionTable):
     """
 
     kind: ClassVar[str] = "record"
-    file: Annotated[str | tuple[str, ...] | None, Paths()] = None
+    file: Annotated[str | tuple[str, ...] | None, Paths(several=True)] = None
     bundled: str | None = None
     components: Annotated[tuple[str, ...] | None, Components()] = None
     rotated_by: Annotated[float | None, Quantity("rad")] = None
@@ -202,7 +206,7 @@ class Arrays(MotionTable):
     """`Motion.from_csv`: a file with columns of time and displacement or acceleration, units in its header."""
 
     kind: ClassVar[str] = "arrays"
-    file: str
+    file: Annotated[str, Paths()]
 
     def _motion(self) -> Motion:
         return Motion.from_csv(self.files[0], name=self.name)
@@ -274,6 +278,12 @@ def _resolved(file: str, folder: Path | None, name: str) -> str:
             f"in the environment variable {RECORDS}"
         )
     return str(path)
+
+
+def paths_in(*kinds: type) -> tuple[str, ...]:
+    """Names of the fields of dataclasses that are paths of files."""
+    rules = [(name, rule) for kind in kinds for name, rule, _ in ruled_fields(kind)]
+    return tuple(dict.fromkeys(name for name, rule in rules if isinstance(rule, Paths)))
 
 
 def _existing(file: str | None) -> Path:
