@@ -8,7 +8,6 @@ contact points of all preset scenes are compared with the faces of their sliders
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from msfp_gen.buildings.peaks import Peaks, along_time, padded
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.note import Note
 from msfp_gen.results.resample import checked_times, interpolated
 
@@ -62,6 +63,11 @@ class BuildingData:
     def peaks(self) -> Peaks:
         """Peaks over all steps, or of the rows where the run did not record them."""
         return self.recorded_peaks or peaks_of_rows(self)
+
+    @property
+    def identity(self) -> str:
+        """The sha256 of the scene, its motions and matrices included, as in checkpoints."""
+        return fingerprint(self.scene)
 
     @property
     def succeeded(self) -> bool:

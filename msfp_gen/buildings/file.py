@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,18 +13,18 @@ from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.soil import Soil
 from msfp_gen.buildings.storey import BaseSlab, Storey
 from msfp_gen.common.fields import Quantity, errors_at
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Kept, digest_of, expecting
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
-from msfp_gen.scene.file.motion_tables import KINDS, resolved
+from msfp_gen.scene.file.motion_tables import KINDS, Paths, paths_in, resolved
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
 Table = dict[str, Any]
-MATRICES = ("mass", "stiffness", "damping")
-FILES = {"motion": ("file",), "building": MATRICES}  # table -> its keys that are paths of files
 
 
 @dataclass(frozen=True)
@@ -34,9 +35,9 @@ class FrameTable:
     damping_ratio, rayleigh_frequencies [Hz]: as in `Building.shear`. highest_frequency [Hz]: as in `Building.reduced`.
     """
 
-    mass: str | None = None
-    stiffness: str | None = None
-    damping: str | None = None
+    mass: Annotated[str | None, Paths()] = None
+    stiffness: Annotated[str | None, Paths()] = None
+    damping: Annotated[str | None, Paths()] = None
     damping_ratio: Annotated[float, Quantity("", least=0.0)] = 0.02
     rayleigh_frequencies: Annotated[tuple[float, float] | None, Quantity("Hz", above=0.0, shape=(2,))] = None
     highest_frequency: Annotated[float | None, Quantity("Hz", above=0.0)] = None
@@ -92,6 +93,9 @@ TABLES = {
     "building.bearing.effects": PARTS["effects"],
     "solver": PARTS["solver"],
 }
+_buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
+MATRICES = paths_in(FrameTable)
+FILES = {"motion": paths_in(*KINDS.values()), "building": MATRICES}  # table -> its keys that are paths of files
 COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearings that have none of their own
 
 
@@ -115,12 +119,23 @@ def building_from_table(
 
 
 def _building(given: Table, folder: Path | None) -> Building:
+    """The building, made once for each frame and contents of its matrices, as long as it is among the last ones."""
+    frame = {name: value for name, value in given.items() if name not in (*COMMON, "bearing")}
+    named = [name for name in MATRICES if name in frame]
+    frame |= {name: resolved(frame[name], folder, f"building.{name}") for name in named}
+    with suppress(OSError):  # a file that cannot be read is an error of its reader
+        files = {str(frame[name]): digest_of(Path(frame[name])) for name in named}
+        with expecting(files):
+            return _buildings.value(fingerprint((frame, files)), lambda: _made(frame, named))
+    return _made(frame, named)
+
+
+def _made(given: Table, files: list[str]) -> Building:
     options: Table = {name: given[name] for name in ("damping_ratio", "rayleigh_frequencies") if name in given}
-    files = [name for name in MATRICES if name in given]
     frames = [name for name in ("base", "storey") if given.get(name)]
     if files and frames:
         raise InputError(f"building.{frames[0]}: not together with building.{files[0]}; give a frame or its matrices")
-    building = _of_matrices(given, folder, options) if files else _of_storeys(given, options)
+    building = _of_matrices(given, options) if files else _of_storeys(given, options)
     return building.reduced(given["highest_frequency"]) if "highest_frequency" in given else building
 
 
@@ -138,11 +153,11 @@ def _of_storeys(given: Table, options: Table) -> Building:
     return Building.shear(base, storeys, **options)
 
 
-def _of_matrices(given: Table, folder: Path | None, options: Table) -> Building:
+def _of_matrices(given: Table, options: Table) -> Building:
     for name in MATRICES[:2]:
         if name not in given:
             raise InputError(f"building.{name} is missing: give the path of a .mtx or .npz file")
-    files = {name: resolved(given[name], folder, f"building.{name}") if name in given else None for name in MATRICES}
+    files = {name: given.get(name) for name in MATRICES}
     nodes: dict[str, Any] = {}
     for index, row in enumerate(given.get("node", [])):
         if row["name"] in nodes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.buildings.node import FREEDOMS, MOTIONS, Node, rigid
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
+from msfp_gen.common.inputs import read_input
+from msfp_gen.errors import InputError, MsfpError
 
 MOST = 5000  # coordinates of a building, whose matrices are dense
 SYMMETRY = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
@@ -49,17 +51,17 @@ def matrix_of(source: Matrix, name: str) -> Array:
 def _read(path: Path, field: str, name: str) -> Any:
     try:
         if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as file:
+            with np.load(BytesIO(read_input(path)), allow_pickle=False) as file:
                 if name not in file:
                     raise InputError(f"{field} = {str(path)!r}: it has no array {name!r} but {', '.join(file)}")
                 return file[name]
         if path.suffix == ".mtx":
             from scipy.io import mmread
 
-            return mmread(path)
+            return mmread(BytesIO(read_input(path)))
     except OSError as error:
         raise InputError(f"{field} = {str(path)!r}: cannot be read ({error.strerror}); check the file") from None
-    except InputError:
+    except MsfpError:
         raise
     except Exception as error:  # readers raise several types of exception for a damaged file
         raise InputError(f"{field} = {str(path)!r}: {error}; check the file") from None

@@ -10,7 +10,7 @@ from typing import Any
 from msfp_gen.buildings.file import FILES, building_from_table
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.changes import changed_table
+from msfp_gen.scene.file.changes import changed_table, keys_of
 from msfp_gen.scene.file.loader import scene_from_table, scene_table
 from msfp_gen.scene.file.motion_tables import resolved
 from msfp_gen.scene.scene import Scene
@@ -50,23 +50,35 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> AnyScene:
         raise InputError(f"{path}: {error}") from None
 
 
-def scene_of(table: Mapping[str, Any], folder: Path | None = None) -> AnyScene:
-    """The scene of a plain table, as in a file; `folder`: as in `scene_from_table`. Raises InputError."""
-    return (building_from_table if "building" in table else scene_from_table)(table, folder)
+def scene_of(table: Mapping[str, Any], folder: Path | None = None, **given: Any) -> AnyScene:
+    """The scene of a plain table, as in a file; folder, given: as in `scene_from_table`. Raises InputError."""
+    return (building_from_table if "building" in table else scene_from_table)(table, folder, **given)
 
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     """The table of a scene with absolute paths of its files; `folder`: as in `scene_from_table`. Raises InputError."""
     found = deepcopy(dict(table))
     for place, inner, names in _with_files(found):
-        inner.update({name: resolved(inner[name], folder, f"{place}.{name}") for name in names if name in inner})
+        for name in names:
+            if name in inner and _are_texts(inner[name]):  # the schema refuses others
+                inner[name] = resolved(inner[name], folder, f"{place}.{name}")
     return found
 
 
-def files_of(table: Mapping[str, Any]) -> list[str]:
-    """The files that the table of a scene names, in its order."""
-    given = [inner[name] for _, inner, names in _with_files(table) for name in names if name in inner]
-    return [path for each in given for path in ([each] if isinstance(each, str) else each)]
+def located_value(path: str, value: Any, folder: Path | None) -> Any:
+    """A value for a path of a scene with absolute paths of its files; `folder`, errors: as of `with_absolute_paths`."""
+    keys = keys_of(path)
+    nested: Any = value
+    for key in reversed(keys):
+        nested = {key: nested} if isinstance(key, str) else [nested]
+    nested = with_absolute_paths(nested, folder)
+    for key in keys:
+        nested = nested[key if isinstance(key, str) else 0]
+    return nested
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, str) or (isinstance(value, list | tuple) and all(isinstance(item, str) for item in value))
 
 
 def _with_files(table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...]]]:

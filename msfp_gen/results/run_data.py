@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.history import Counters, Event, History
 
@@ -45,6 +46,11 @@ class RunData:
         """Extremes over all accepted steps and rows."""
         rows = Extremes.of_rows(self.history)
         return rows if self.recorded_extremes is None else rows | self.recorded_extremes
+
+    @property
+    def identity(self) -> str:
+        """The sha256 of the scene, motion included, as in checkpoints; provenance names the model and its version."""
+        return fingerprint(self.scene)
 
     @property
     def succeeded(self) -> bool:

@@ -12,12 +12,11 @@ import time
 import tomllib
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.simulation.row_file import RowFile, rows_beside
@@ -196,35 +195,6 @@ def read(path: Path) -> tuple[dict[str, Any], bytes]:
     if not 0 <= about["wall"] < float("inf"):
         raise ValueError("no wall time")
     return about, snapshot
-
-
-def fingerprint(value: object) -> str:
-    """The sha256 of all values in a scene; of its motion the polynomials, whatever their source."""
-    digest = hashlib.sha256()
-    for item in _leaves(value):
-        digest.update(b"%d:" % len(item) + item)
-    return digest.hexdigest()
-
-
-def _leaves(value: Any) -> Iterator[bytes]:
-    """The values in nested dataclasses, mappings and lists as bytes, with types and lengths; equal for equal scenes."""
-    if isinstance(value, np.ndarray):
-        yield f"{value.dtype}{value.shape}".encode()
-        yield (value + 0 if value.dtype.kind == "f" else value).tobytes()  # -0.0 equals 0.0
-    elif is_dataclass(value) and not isinstance(value, type):
-        yield type(value).__name__.encode()
-        for field in fields(value):
-            if field.compare:
-                yield field.name.encode()
-                yield from _leaves(getattr(value, field.name))
-    elif isinstance(value, Mapping):
-        yield from _leaves(sorted(value.items()))
-    elif isinstance(value, list | tuple):
-        yield b"%d" % len(value)
-        for item in value:
-            yield from _leaves(item)
-    else:
-        yield repr(value).encode()
 
 
 def _difference(then: str, now: str) -> str:

@@ -11,9 +11,10 @@ import numpy as np
 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.simulation import simulate as bearings
-from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, fingerprint, require_no_checkpoint
+from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from typing import Any
 Operations = Mapping[str, Callable[..., Any]]
 
 MAX_LENGTH = 500  # characters; a longer formula would not be readable
+MAX_DEPTH = 100  # operations inside each other: a tree is walked by recursion
 FUNCTIONS = {"exp": 1, "log": 1, "sqrt": 1, "tanh": 1, "Abs": 1, "Min": 2, "Max": 2}
 _BINARY: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
 
@@ -47,8 +48,8 @@ def parse(text: str, known: Iterable[str]) -> ast.expr:
         known: names of quantities that it may contain.
 
     Raises:
-        ValueError: the formula is too long, has a syntax error, or contains a name, an operation or a constant that is
-            not permitted.
+        ValueError: the formula is too long or too deep, has a syntax error, or contains a name, an operation or a
+            constant that is not permitted.
     """
     if len(text) > MAX_LENGTH:
         raise ValueError(f"a formula has at most {MAX_LENGTH} characters")
@@ -58,9 +59,20 @@ def parse(text: str, known: Iterable[str]) -> ast.expr:
         raise ValueError(
             "this is no formula; write one such as mu * (1 - c1 * exp(-c2 * v)), with ** for powers"
         ) from None
+    if _depth(tree) > MAX_DEPTH:
+        raise ValueError(f"a formula has at most {MAX_DEPTH} operations inside each other; write it in fewer")
     _check(tree, frozenset(known))
     _check_constants(tree)
     return tree
+
+
+def _depth(tree: ast.expr) -> int:
+    """Levels of the expressions in a tree, counted without recursion."""
+    depth, level = 0, [tree]
+    while level:
+        depth += 1
+        level = [part for node in level for part in ast.iter_child_nodes(node) if isinstance(part, ast.expr)]
+    return depth
 
 
 def names_in(tree: ast.expr) -> frozenset[str]:

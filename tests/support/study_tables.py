@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -29,3 +30,11 @@ def rows_of(folder: Path) -> pd.DataFrame:
     """All rows of a study, sorted by run."""
     parts = [pd.read_parquet(path) for path in sorted(folder.glob("part-*.parquet"))]
     return pd.concat(parts).sort_values("run", ignore_index=True)
+
+
+def write_record(path: Path, peak: float) -> Path:
+    """A second of a sine of acceleration along E1, of that peak [m/s^2]."""
+    rows = "".join(f"{0.02 * k:.2f},{peak * math.sin(math.pi * k / 25):.6f}\n" for k in range(51))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"time [s], a1 [m/s^2]\n{rows}", encoding="utf-8")
+    return path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import as_file, files
+from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from msfp_gen.motions.records.scaling import ScaleTo, asce7_spectrum, prepared
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
 from msfp_gen.motions.records.suite import ScaledSuite, scaled_suite
 from msfp_gen.motions.records.table import Table, read_table, write_csv
-from msfp_gen.motions.records.text import Lines, read_lines
+from msfp_gen.motions.records.text import Lines, lines_of, read_lines
 
 __all__ = [
     "BUNDLED",
@@ -80,8 +80,12 @@ def read_record(path: str | PathLike[str], *more: str | PathLike[str]) -> Record
         InputError: the format is unknown, the data are damaged, or the files are not of one recording. The message
             names file, line and reason.
     """
-    parts = [read_lines(Path(p)) for p in (path, *more)]
-    if not more and table.matches(parts[0]):
+    return _record_of([read_lines(Path(p)) for p in (path, *more)])
+
+
+def _record_of(parts: list[Lines]) -> Record:
+    """The record in the lines of one file, or of several."""
+    if len(parts) == 1 and table.matches(parts[0]):
         return table.read(parts[0])
     formats = [_format_of(lines) for lines in parts]
     for lines, each in zip(parts, formats, strict=True):
@@ -109,5 +113,5 @@ def bundled(name: str) -> Record:
     """
     if name not in BUNDLED:
         raise InputError(f"record: {name!r} does not come with the package; choose from {', '.join(BUNDLED)}")
-    with as_file(files(__package__) / "files" / f"{name}.v1.gz") as path:
-        return read_record(path)
+    file = files(__package__) / "files" / f"{name}.v1.gz"
+    return _record_of([lines_of(Path(file.name), file.read_bytes())])  # part of the package, and no input file

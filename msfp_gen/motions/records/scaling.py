@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -159,16 +160,23 @@ def prepared(
     `progress` reports the spectrum that `scale_to` needs, as of `response_spectrum`. Raises InputError.
     """
     require_type(record, Record, "record")
-    if correct:
-        corrected = baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
-    else:
-        corrected = uncorrected(record, start=start, duration=duration)
+    corrected = _corrected(record, start, duration, correct, corner, taper)
     if scale_to is None:
         return corrected, positive("scale", scale)
     if scale != 1:
         raise InputError(f"scale = {scale!r}: scale_to is given too; give one of them")
     metadata = {**corrected.metadata, "scaled_to": str(scale_to)}
     return replace(corrected, metadata=metadata), scale_to.factor(corrected, progress)
+
+
+@lru_cache(maxsize=8)  # records are equal only if they are the same
+def _corrected(
+    record: Record, start: float | None, duration: float | None, correct: bool, corner: float, taper: float
+) -> Corrected:
+    """The processed record, of which several scales are made."""
+    if correct:
+        return baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
+    return uncorrected(record, start=start, duration=duration)
 
 
 def asce7_spectrum(period: ArrayLike, sds: float, sd1: float, long_period: float = 8.0) -> Array:

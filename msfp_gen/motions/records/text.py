@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import re
 import zlib
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import NoReturn
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.inputs import read_input
 from msfp_gen.errors import InputError
 
 _WORD = re.compile(r"\S+")
@@ -150,16 +152,20 @@ def read_lines(path: Path) -> Lines:
     try:
         if path.exists() and not path.is_file():
             raise InputError(f"{path.name}: no file but a folder, pipe or device; give the path of a record")
-        with path.open("rb") as file:
-            content = file.read(_MAX_BYTES + 1)
+        content = read_input(path, _MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path.name}: cannot be read ({reason}); check the path") from None
+    return lines_of(path, content)
+
+
+def lines_of(path: Path, content: bytes) -> Lines:
+    """The lines of the bytes of a file; `path` names it in messages. Raises InputError as `read_lines`."""
     if content.startswith(_GZIP) and len(content) <= _MAX_BYTES:
         try:
-            with gzip.open(path) as compressed:
+            with gzip.open(io.BytesIO(content)) as compressed:
                 content = compressed.read(_MAX_BYTES + 1)
         except (OSError, EOFError, zlib.error):
             raise InputError(f"{path.name}: damaged gzip data; fetch it again") from None

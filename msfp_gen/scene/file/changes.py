@@ -3,33 +3,75 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from copy import deepcopy
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping
+from copy import copy, deepcopy
+from typing import Any, NamedTuple
 
+from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.loader import bearing_from_table, bearing_table
-from msfp_gen.scene.file.toml_text import plain_values
+from msfp_gen.scene.bearing import Body, Surface
+from msfp_gen.scene.file.loader import MAX_DEPTH, complete_bearing, complete_part
 
 Table = dict[str, Any]
 Key = str | int | None  # of a table, of a list, of all rows of a list
 _STEP = re.compile(r"([^\[\].]+)((?:\[(?:\d+|\*)\])*)")
-ROWS = ("surfaces", "bodies")
+ROWS = {"surfaces": Surface, "bodies": Body}
+_COLUMNS = {  # a field of surfaces or bodies -> their list, and whether one value is a list of numbers
+    name: (rows, isinstance(rule, Quantity) and bool(rule.shape))
+    for rows, kind in ROWS.items()
+    for name, rule, _ in ruled_fields(kind)
+}
 
 
-def changed_table(table: Mapping[str, Any], changes: Mapping[str, Any]) -> Table:
+class _Place(NamedTuple):
+    """A place in a table: what holds it, its key there, and the index and number of the row of a column."""
+
+    holder: Any
+    key: Any
+    row: tuple[int, int] | None = None
+
+
+class _Walk(NamedTuple):
+    """How a table is walked: from its root; whether bearings are made complete; to which surfaces (from 1), or all."""
+
+    root: Table
+    complete: bool = False
+    surfaces: Collection[int] | None = None
+
+
+def changed_table(
+    table: Mapping[str, Any], changes: Mapping[str, Any], surfaces: Collection[int] | None = None
+) -> Table:
     """A copy of a table with the fields at some paths set; the schema checks afterwards that they exist.
 
     `[i]` in a path is a row of a list, from 0; `[*]` stands for all rows. A bearing that a preset gives, or the name of
-    one in `[bearings]`, becomes a table of its own where a path leads into it. Raises InputError.
+    one in `[bearings]`, becomes a table of its own where a path leads into it. `bearing.friction` is a column: one
+    value for all surfaces or a list, in a complete bearing too. surfaces: of a column only these, from 1. Raises
+    InputError.
     """
-    changed = deepcopy(dict(table))
+    changed = dict(table)
     for path, value in changes.items():
         try:
-            for holder, key in _places(changed, changed, keys_of(path)):
-                holder[key] = deepcopy(value)
+            for place in _places(_Walk(changed, surfaces is not None, surfaces), path):
+                place.holder[place.key] = deepcopy(value if place.row is None else _of_row(place, value))
         except InputError as error:
             raise InputError(f"{path} = {value!r}: {error}") from None
+    return changed
+
+
+def multiplied_table(
+    table: Mapping[str, Any], path: str, factor: float, surfaces: Collection[int] | None = None
+) -> Table:
+    """A copy of a table with the numbers at a path multiplied; arguments and errors as of `changed_table`."""
+    changed = dict(table)
+    part = path.partition(".")[0]
+    try:
+        if part in ("top", "solver"):
+            changed[part] = complete_part(part, changed.get(part, {}))
+        for holder, key, _ in _places(_Walk(changed, True, surfaces), path):
+            holder[key] = _times(holder.get(key) if isinstance(holder, dict) else holder[key], factor)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return changed
 
 
@@ -42,23 +84,56 @@ def keys_of(path: str) -> list[Key]:
             raise InputError("no path of a field; give one such as motion.scale or bearing.surfaces[0].friction")
         found.append(step[1])
         found += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
+    if len(found) > MAX_DEPTH:
+        raise InputError("no path of a field: it leads deeper than any table of a scene")
     return found
 
 
-def _places(root: Table, inner: Any, keys: list[Key]) -> Iterator[tuple[Any, Any]]:
-    """Holder and key of every place to which `keys` lead from `inner`."""
+def _places(walk: _Walk, path: str) -> Iterator[_Place]:
+    """Every place to which a path leads. Raises InputError where surfaces are chosen and it is no column of them."""
+    keys = keys_of(path)
+    column = _COLUMNS.get(str(keys[-1]), ("", False))[0] if keys[-2:-1] == ["bearing"] else ""
+    if walk.surfaces is not None and column != "surfaces":
+        raise InputError("surfaces: this is no field of a surface; leave surfaces out")
+    return _inner_places(walk, walk.root, keys)
+
+
+def _inner_places(walk: _Walk, inner: Any, keys: list[Key]) -> Iterator[_Place]:
+    """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one."""
     key, *rest = keys
     for each in [key] if isinstance(key, str) else _rows(inner, key):
         if not rest:
-            yield inner, each
+            yield _Place(inner, each)
             continue
         if isinstance(each, str):
             inner.setdefault(each, {})
-        if each == "bearing":
-            inner[each] = _own_bearing(root, inner[each], rest[0])
+        inner[each] = _own_bearing(walk, inner[each], rest[0]) if each == "bearing" else copy(inner[each])
         if isinstance(rest[0], str) and not isinstance(inner[each], dict):
             raise InputError(f"{each} is {inner[each]!r} here, which has no fields to change")
-        yield from _places(root, inner[each], rest)
+        if each == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[each]:
+            yield from _column(walk, inner[each], str(rest[0]))
+        else:
+            yield from _inner_places(walk, inner[each], rest)
+
+
+def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:
+    """The places of a field of the surfaces or bodies of a complete bearing."""
+    rows = _COLUMNS[name][0]
+    bearing[rows] = [dict(row) for row in bearing.get(rows, [])]
+    for index, row in enumerate(bearing[rows]):
+        if walk.surfaces is None or index + 1 in walk.surfaces:
+            yield _Place(row, name, (index, len(bearing[rows])))
+
+
+def _of_row(place: _Place, value: Any) -> Any:
+    """The value of a column for one of its rows: one for all, or one of a list."""
+    assert place.row is not None
+    index, count = place.row
+    if not isinstance(value, list) or (_COLUMNS[place.key][1] and not any(isinstance(item, list) for item in value)):
+        return value
+    if len(value) != count:
+        raise InputError(f"there are {count} of them; give {count} values, or one for all")
+    return value[index]
 
 
 def _rows(inner: Any, index: int | None) -> list[int]:
@@ -69,12 +144,22 @@ def _rows(inner: Any, index: int | None) -> list[int]:
     return list(range(len(inner))) if index is None else [index]
 
 
-def _own_bearing(root: Table, given: Any, following: Key) -> Any:
+def _own_bearing(walk: _Walk, given: Any, following: Key) -> Any:
     """A bearing as a table that can be changed; complete where a row of its surfaces or bodies is."""
     if isinstance(given, str):
-        named = root.get("bearings", {})
-        given = deepcopy(named[given]) if isinstance(named, dict) and given in named else {"preset": given}
-        given = {"preset": given} if isinstance(given, str) else given
-    if following in ROWS and isinstance(given, dict) and "preset" in given:
-        return plain_values(bearing_table(bearing_from_table(given)))
-    return given
+        named = walk.root.get("bearings", {})
+        given = named[given] if isinstance(named, dict) and given in named else {"preset": given}
+    if isinstance(given, str):
+        given = {"preset": given}
+    if isinstance(given, dict) and (walk.complete or (following in ROWS and "preset" in given)):
+        return complete_bearing(given)
+    return copy(given)
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A number, or each of a list, times a factor."""
+    if isinstance(value, list):
+        return [_times(item, factor) for item in value]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{value!r} is no number to multiply; set it, or give a number of bearing, top or solver")
+    return value * factor

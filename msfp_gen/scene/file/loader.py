@@ -5,17 +5,20 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from msfp_gen.common.fields import errors_at, ruled_fields
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Kept, is_input, read_input
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import catalogue, schema
-from msfp_gen.scene.file.motion_tables import KINDS, Pieces, is_file, resolved
+from msfp_gen.scene.file.motion_tables import KINDS, Pieces, resolved
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.toml_text import dumps, plain_values
 from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
@@ -27,6 +30,7 @@ MAX_DEPTH = 16  # of nested tables and lists; a scene has six
 _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs few levels"
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
+_complete: Kept[Table] = Kept(16, lambda _: 1)
 _PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
 
 
@@ -39,7 +43,7 @@ def scene_table(source: str | Path) -> tuple[Table, Path | None]:
         if str(source) in catalogue.descriptions(kind):
             return table(str(source)), None
     path = Path(source)
-    if not is_file(path):
+    if not is_input(path):
         known = [*catalogue.descriptions("scene"), *catalogue.descriptions("building")]
         hint = catalogue.suggestion(str(source), known) or "; give the path of a TOML file or the name of a preset"
         raise InputError(f"scene = {str(source)!r}: no such file, and no preset of that name{hint}")
@@ -52,7 +56,7 @@ def scene_table(source: str | Path) -> tuple[Table, Path | None]:
 def toml_file(path: Path) -> Table:
     """The table of a TOML file; raises InputError, without the path, where it cannot be read or is not valid."""
     try:
-        return toml_table(path.read_text(encoding="utf-8-sig"))
+        return toml_table(read_input(path).decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); check the file") from None
     except UnicodeDecodeError as error:
@@ -76,11 +80,16 @@ def toml_table(text: str) -> Table:
     return table
 
 
-def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None) -> Scene:
+def scene_from_table(
+    table: Mapping[str, Any],
+    folder: Path | None = None,
+    motion: Motion | None = None,
+    motion_table: Mapping[str, Any] | None = None,
+) -> Scene:
     """The scene of a plain table, as in a scene file.
 
     folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
-    permitted. motion: replaces the `[motion]` table. Raises InputError.
+    permitted. motion: replaces the `[motion]` table; motion_table: that from which it was made. Raises InputError.
     """
     given = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
     made = dict(given["motion"])
@@ -98,12 +107,38 @@ def scene_from_table(table: Mapping[str, Any], folder: Path | None = None, motio
     parts["bearing"] = _bearing(given["bearing"])
     parts["top"] = _TOPS[top.pop("kind")](**top)
     parts["motion"] = _motion(made) if motion is None else motion
-    return Scene(**{**given, **parts, "motion_table": made if motion is None else None})
+    return Scene(**{**given, **parts, "motion_table": made if motion is None else motion_table})
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
     """The bearing of a `[bearing]` table: complete, or a preset with changes. Raises InputError."""
-    return _bearing(schema.validate_bearing(table))
+    return _bearing(schema.validate_part("bearing", table))
+
+
+def complete_bearing(table: Mapping[str, Any]) -> Table:
+    """A `[bearing]` table that states every surface and body, in SI units, of one that names a preset or is complete.
+
+    Coefficients of friction stay those of the table, also where they are at the pivot. Raises InputError.
+    """
+    return dict(_complete.value(fingerprint(table), lambda: _completed(table)))
+
+
+def _completed(table: Mapping[str, Any]) -> Table:
+    given = schema.validate_part("bearing", table)
+    at = given.pop("friction_at", "surface")
+    if at == "surface":
+        return dict(plain_values(bearing_table(_bearing(given))))
+    _bearing({**given, "friction_at": at})  # raises its errors
+    return {**plain_values(bearing_table(_bearing(given))), "friction_at": at}
+
+
+def complete_part(name: str, table: Mapping[str, Any]) -> Table:
+    """The table `[top]` or `[solver]` with all numbers, in SI units. Raises InputError."""
+    given = schema.validate_part(name, table)
+    if name == "solver":
+        return dict(plain_values(plain_table(Solver(**given))))
+    kind = given.pop("kind")
+    return {"kind": kind, **plain_values(plain_table(_TOPS[kind](**given)))}
 
 
 def bearing_table(bearing: Bearing) -> Table:
@@ -146,8 +181,7 @@ def effects_from_table(given: Mapping[str, Any]) -> Effects | Auto:
 def _bearing(given: Mapping[str, Any]) -> Bearing:
     changes = dict(given)
     if "preset" in changes:
-        preset = catalogue.bearing_table(changes.pop("preset"))
-        return bearing_from_table(preset).replace(**changes)
+        return _preset(changes.pop("preset")).replace(**changes)
     with errors_at("layout", "bearing.layout"):
         changes["layout"] = Layout(**changes["layout"])
     for name, kind, word in (("surfaces", Surface, "surface"), ("bodies", Body, "body")):
@@ -156,6 +190,11 @@ def _bearing(given: Mapping[str, Any]) -> Bearing:
         return Bearing(**changes)
     bearing = Bearing(**changes)
     return bearing.replace(friction=[surface.friction for surface in bearing.surfaces], friction_at="pivot")
+
+
+@lru_cache(maxsize=16)
+def _preset(name: str) -> Bearing:
+    return bearing_from_table(catalogue.bearing_table(name))
 
 
 def _row(kind: type, row: Mapping[str, Any], word: str, path: str) -> Any:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from msfp_gen.common.fields import Notes, Quantity, Text
+from msfp_gen.common.fields import Notes, Quantity, Text, ruled_fields
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Kept, digest_of, expecting, is_input
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.file.prescribed_tables import ROTATIONS, history_from
@@ -21,6 +22,7 @@ from msfp_gen.scene.file.prescribed_tables import ROTATIONS, history_from
 if TYPE_CHECKING:
     from msfp_gen.motions.records import Record
 
+MOST_BYTES = 128 << 20  # of the motions that are kept, and of the records
 RECORDS = "MSFP_GEN_RECORDS"  # environment variable: further folders, beside that of the scene file, with records
 _LENGTH = Quantity("m", above=0.0)
 _TIME = Quantity("s", above=0.0)
@@ -30,10 +32,14 @@ _ANGULAR = Quantity("rad/s", above=0.0)
 
 @dataclass(frozen=True)
 class Paths(Text):
-    """The path of a file, or a list of them."""
+    """The path of a file; several: or a list of them."""
+
+    several: bool = False
 
     def parse(self, value: object, *, text: bool = False) -> Any:
         """`value` itself, a list as a tuple; raises ValueError whose text is the remedy."""
+        if not self.several:
+            return super().parse(value, text=text)
         several = isinstance(value, list | tuple) and value and all(isinstance(item, str) for item in value)
         if not (isinstance(value, str) or several):
             raise ValueError("give a text in quotes, or a list of them: one file for each component")
@@ -61,7 +67,22 @@ class MotionTable(ABC):
     rotation: Mapping[str, Any] | None = None
 
     def build(self) -> Motion:
-        """The motion; raises InputError whose message starts with `motion`."""
+        """The motion; raises InputError whose message starts with `motion`.
+
+        It is made once for each table and contents of its files, as long as it is among those that were made last.
+        """
+        if isinstance(self, Pieces):
+            return self._build()
+        files = _digests(self.files)
+        with expecting(files):
+            return _motions.value(fingerprint((self, files)), self._build)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files from which the motion is read. Raises InputError where there is none at a path."""
+        return ()
+
+    def _build(self) -> Motion:
         try:
             motion = self._motion()
             motion = motion if self.hold is None else motion.held(self.hold)
@@ -143,7 +164,7 @@ class RecordMotion(MotionTable):
     """
 
     kind: ClassVar[str] = "record"
-    file: Annotated[str | tuple[str, ...] | None, Paths()] = None
+    file: Annotated[str | tuple[str, ...] | None, Paths(several=True)] = None
     bundled: str | None = None
     components: Annotated[tuple[str, ...] | None, Components()] = None
     rotated_by: Annotated[float | None, Quantity("rad")] = None
@@ -161,14 +182,23 @@ class RecordMotion(MotionTable):
         if (self.file is None) == (self.bundled is None):
             found = "neither is" if self.file is None else "both are"
             raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
-        files = [self.file] if isinstance(self.file, str) else self.file or ()
-        paths = [_existing(file) for file in files]
-        record = _record(self.bundled, tuple(paths), tuple(_stamp(path) for path in paths))
-        record = record if self.components is None else record.with_components(self.components)
-        record = record if self.rotated_by is None else record.rotated(self.rotated_by)
+        source = self.bundled or _digests(self.files)
+        record = _records.value(fingerprint((source, self.components, self.rotated_by)), self._record)
         target = None if self.scale_to is None else ScaleTo(**self.scale_to)
         values = self._values("file", "bundled", "components", "rotated_by", "scale_to")
         return Motion.from_record(record, scale_to=target, **values | {"name": self.name or None})
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files of the record; none where it comes with the package."""
+        return tuple(_existing(file) for file in ([self.file] if isinstance(self.file, str) else self.file or ()))
+
+    def _record(self) -> Record:
+        from msfp_gen.motions import records
+
+        record = records.bundled(self.bundled) if self.bundled is not None else records.read_record(*self.files)
+        record = record if self.components is None else record.with_components(self.components)
+        return record if self.rotated_by is None else record.rotated(self.rotated_by)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,10 +206,15 @@ class Arrays(MotionTable):
     """`Motion.from_csv`: a file with columns of time and displacement or acceleration, units in its header."""
 
     kind: ClassVar[str] = "arrays"
-    file: str
+    file: Annotated[str, Paths()]
 
     def _motion(self) -> Motion:
-        return Motion.from_csv(_existing(self.file), name=self.name)
+        return Motion.from_csv(self.files[0], name=self.name)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The file with the columns."""
+        return (_existing(self.file),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,18 +240,18 @@ class Pieces(MotionTable):
         return table | {name: value for name, value in rest.items() if value is not None}
 
 
-@lru_cache(maxsize=8)
-def _record(bundled: str | None, paths: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> Record:
-    """A record, read once for all scenes of a sweep; `stamps` tell a file that has changed since."""
-    from msfp_gen.motions import records
+def _digests(paths: Sequence[Path]) -> dict[str, str]:
+    """The sha256 of files by their absolute paths. Raises InputError."""
+    try:
+        return {str(path.absolute()): digest_of(path) for path in paths}
+    except OSError as error:
+        raise InputError(
+            f"motion.file = {error.filename!r}: cannot be read ({error.strerror}); check the file"
+        ) from None
 
-    return records.read_record(*paths) if bundled is None else records.bundled(bundled)
 
-
-def _stamp(path: Path) -> tuple[int, int]:
-    """Time of the last change [ns] and size [bytes] of a file."""
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size
+_motions: Kept[Motion] = Kept(MOST_BYTES, lambda motion: motion.coefficients.nbytes)
+_records: Kept[Record] = Kept(MOST_BYTES, lambda record: record.acceleration.nbytes)
 
 
 def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "motion.file") -> str | tuple[str, ...]:
@@ -245,18 +280,16 @@ def _resolved(file: str, folder: Path | None, name: str) -> str:
     return str(path)
 
 
-def is_file(path: Path) -> bool:
-    """Whether `path` is a regular file; False for devices, pipes and invalid names."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
+def paths_in(*kinds: type) -> tuple[str, ...]:
+    """Names of the fields of dataclasses that are paths of files."""
+    rules = [(name, rule) for kind in kinds for name, rule, _ in ruled_fields(kind)]
+    return tuple(dict.fromkeys(name for name, rule in rules if isinstance(rule, Paths)))
 
 
 def _existing(file: str | None) -> Path:
     """The path of an existing file; raises InputError for any other."""
     path = Path(str(file))
-    if not is_file(path):
+    if not is_input(path):
         raise InputError(f"motion.file = {str(path)!r}: no such file; paths are relative to the scene file")
     return path
 

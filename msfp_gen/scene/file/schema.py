@@ -166,9 +166,9 @@ def validate_scene(table: Mapping[str, Any]) -> Table:
     return validate(_SCENE, table)
 
 
-def validate_bearing(table: Mapping[str, Any]) -> Table:
-    """The same for a `[bearing]` table."""
-    return validate(_ONLY_BEARING, {"bearing": table})["bearing"]  # type: ignore[no-any-return]
+def validate_part(name: str, table: Mapping[str, Any]) -> Table:
+    """The same for the table `[bearing]`, `[top]` or `[solver]` alone."""
+    return validate(_ONLY[name], {name: table})[name]  # type: ignore[no-any-return]
 
 
 def validate_suite(table: Mapping[str, Any]) -> Table:
@@ -187,7 +187,14 @@ _SUITE: Model = create_model(
 )
 _TABLES |= {"records": _SUITE_MOTION, "records.scale_to": _SCALE_TO, "scale_to": _SUITE_TARGET}
 
-_ONLY_BEARING = create_model("OnlyBearing", __base__=_Strict, bearing=(_EITHER, ...))
+
+def _only(name: str, kind: Any) -> Model:
+    """A table that holds one table."""
+    fields: Table = {name: (kind, ...)}
+    return create_model("Only", __base__=_Strict, **fields)
+
+
+_ONLY = {"bearing": _only("bearing", _EITHER), "top": _only("top", _TOP), "solver": _only("solver", PARTS["solver"])}
 
 
 def validate(model: Model, table: Mapping[str, Any], tables: Mapping[str, Model] | None = None) -> Table:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.common.fields import errors_at
+from msfp_gen.common.inputs import is_input
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file import schema
 from msfp_gen.scene.file.loader import toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion, is_file, resolved
+from msfp_gen.scene.file.motion_tables import RecordMotion, resolved
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
@@ -49,7 +50,7 @@ def load_suite(path: str | Path, progress: Callable[[float, float], None] | None
     the path of the field, the value and the remedy.
     """
     path = Path(path)
-    if not is_file(path):
+    if not is_input(path):
         raise InputError(f"suite = {str(path)!r}: no such file; give the path of a TOML file with [[records]]")
     try:
         return suite_from_table(toml_file(path), path.parent, progress)

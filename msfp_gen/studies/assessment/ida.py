@@ -47,8 +47,9 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
 
     A curve is made of the runs that differ in their intensity only: one for each record, sample and bound. A run that
     ended early counts as a demand above all others, and so does a larger intensity of its curve. The fractile of share
-    p of n curves is the smallest demand that at least p n of them do not exceed. Where the curves have different
-    intensities, such as spectral accelerations, their demands are interpolated, from zero at zero.
+    p of n curves is the smallest demand that at least p n of them do not exceed; where p n is a whole number, the mean
+    of it and the next, so that the median of an even number is the mean of the middle two. Where the curves have
+    different intensities, such as spectral accelerations, their demands are interpolated, from zero at zero.
 
     Parameters
     ----------
@@ -82,9 +83,19 @@ def ida(rows: Any, measure: str, demand: str, fractiles: Sequence[float] = FRACT
     values = np.sort([_interpolated(levels, *curve) for curve in each], axis=0)
     table = {measure: levels, "curves": len(each), "ended_early": np.isinf(values).sum(axis=0)}
     for share in fractiles:
-        # The share of a number of curves may miss a whole number by roundoff.
-        table[f"p{100 * share:g}"] = values[max(ceil(share * len(each) - 1e-9), 1) - 1]
+        table[f"p{100 * share:g}"] = _fractile(values, share)
     return Ida(measure, demand, unit_of(rows, measure), unit_of(rows, demand), curves, pd.DataFrame(table))
+
+
+def _fractile(values: Array, share: float) -> Array:
+    """The fractile of each column of sorted rows (the second definition of Hyndman and Fan, 1996)."""
+    count = share * len(values)
+    whole = round(count)
+    if abs(count - whole) < 1e-9 * len(values):  # the share of a number may miss a whole number by roundoff
+        middle: Array = values[max(whole, 1) - 1 : whole + 1].mean(axis=0)
+        return middle
+    reached: Array = values[ceil(count) - 1]
+    return reached
 
 
 def _levels(curves: list[Curve]) -> Array:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from msfp_gen.common.fields import Quantity, Text
+from msfp_gen.common.inputs import read_input
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 
@@ -136,7 +137,7 @@ def load_factors(source: str | Path) -> FactorTable:
     if str(source) in _bundled() or not path.is_file():
         return _read(str(source), factor_text(str(source)))
     try:
-        return _read(path.stem, path.read_text(encoding="utf-8"))
+        return _read(path.stem, read_input(path).decode("utf-8"))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: no UTF-8 text at byte {error.start}; save the file as UTF-8") from None
     except InputError as error:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import clear_all_leftovers, write_bytes
 from msfp_gen.errors import InputError
 from msfp_gen.jit.cache import digest_sources
@@ -58,36 +59,34 @@ class Chunks:
             "version": __version__,
             "equations": digest_sources(),
             "scene": study.recipe.scene,
-            "factors": {name: asdict(table) for name, table in study.recipe.factors.items()},
+            "base": study.base,
+            "factors": study.recipe.factors,
             "axes": [(axis.name, axis.change, axis.paths, axis.surfaces, axis.random) for axis in study.axes],
             "keep": [study.keep.names, study.keep.formulas, study.keep.surfaces],
             "intensity": study.table.get("records", {}).get("intensity"),
             "run_seconds": study.limits.run_seconds,
-            "files": [study.contents[path] for path in sorted(study.contents) if path in _files_of(study)],
         }
-        return sha256(json.dumps(common, sort_keys=True, default=str).encode())
+        return sha256(fingerprint(common, study.files).encode())
 
     @cached_property
     def _digests(self) -> list[Any]:
         """Of each grid axis the digests of its values and labels, as an array of 16 bytes each."""
-        found = []
-        for axis in self.study.axes:
+        study, found = self.study, []
+        for index, axis in enumerate(study.axes):
             if axis.values is None:
                 continue
-            texts = [
-                json.dumps([self._content(axis.change, v), label], default=str)
-                for v, label in zip(axis.values, axis.labels, strict=True)
+            each = [
+                (study.recipe.records[value] if axis.change == "record" else value, label, study.opened.get((index, k)))
+                for k, (value, label) in enumerate(zip(axis.values, axis.labels, strict=True))
             ]
-            found.append(np.array([sha256(text.encode()).digest()[:16] for text in texts], dtype="V16"))
+            digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in each]
+            found.append(np.array(digests, dtype="V16"))
         return found
 
-    def _content(self, change: str, value: Any) -> Any:
-        """What determines a value: of a record its table and the digests of its files."""
-        if change != "record":
-            return value
-        table = self.study.recipe.records[value]
-        named = table.get("file") or ()
-        return [table, [self.study.contents[path] for path in ([named] if isinstance(named, str) else named)]]
+    @cached_property
+    def identity(self) -> str:
+        """Digest of everything that any row of the study depends on; that of what workers keep for it."""
+        return fingerprint((self.digest, [each.tobytes() for each in self._digests]))
 
     def open(self) -> None:
         """Write `study.toml`; parts of a last, shorter chunk that the study has outgrown are removed.
@@ -109,6 +108,10 @@ class Chunks:
         path = self.folder / STUDY_FILE
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             write_bytes(path, [text.encode()])
+
+    def started(self) -> None:
+        """Note that runs start now: the time of `study.toml`, from which their rate is counted."""
+        os.utime(self.folder / STUDY_FILE)
 
     def _check(self, present: dict[str, int]) -> None:
         chunks = self.study.chunks
@@ -137,7 +140,7 @@ class Chunks:
         new = {"about": {}, **self.study.table, "chunk": self.study.chunk}
         return next(
             (f"{key} differs" for key in (*new, *old) if key != "about" and _text(old.get(key)) != _text(new.get(key))),
-            "its records or the equations have changed",
+            "its files or the equations have changed",
         )
 
 
@@ -147,12 +150,6 @@ def chunks_in(study: Study, folder: Path) -> Chunks:
     if study.given_chunk is None and isinstance(size, int) and size > 0 and parts_in(folder):
         study = replace(study, given_chunk=size)
     return Chunks(study, folder)
-
-
-def _files_of(study: Study) -> list[str]:
-    """The files of the base scene; those of records belong to the values of their axis."""
-    named = study.recipe.scene.get("motion", {}).get("file") or ()
-    return [named] if isinstance(named, str) else list(named)
 
 
 def _text(value: Any) -> str:

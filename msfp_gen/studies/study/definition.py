@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import prod
 from typing import Annotated, Any
@@ -11,22 +11,25 @@ from typing import Annotated, Any
 import numpy as np
 
 from msfp_gen.buildings.columns import column_names
-from msfp_gen.buildings.opening import AnyScene, scene_of
+from msfp_gen.buildings.opening import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.inputs import Files, expecting, recording
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.simulation.batch import check_method
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker, bearings_at, rule_of, surface_values
+from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
 from msfp_gen.studies.study.sampling import Sampling
 
 MOST_RUNS = 100_000_000
 _Counts = tuple[int, int, int]  # floors, storeys and bearings of a building
 
-TRIED = 1000  # values of one axis that are tried before the first run, at least
+TRIED = 1000  # numbers of one axis that are tried before the first run, at least; of texts and tables all
 PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
 LEAST, MOST = 8, 256  # runs of a chunk where the study file does not say
 
@@ -95,7 +98,9 @@ class Study:
         limits: of a run, and of the study.
         given_chunk: runs of a chunk; None: from the number of runs.
         table: the study as a plain table, complete: scene and records are in it.
-        contents: sha256 of every file that the scenes read, by its path.
+        files: path -> sha256 of every file that was opened to make the scenes of every value.
+        base: fingerprint of the scene of the first run, with the files that were opened for it.
+        opened: (index of an axis, index of its value) -> fingerprint of the files that were opened beyond these.
     """
 
     name: str
@@ -105,7 +110,9 @@ class Study:
     limits: Limits
     given_chunk: int | None
     table: dict[str, Any]
-    contents: dict[str, str]
+    files: Files = field(default_factory=dict)
+    base: str = ""
+    opened: dict[tuple[int, int], str] = field(default_factory=dict)
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -155,41 +162,54 @@ class Study:
             raise InputError(f"run = {run}: give a number from 1 to {self.runs}")
         number, row = divmod(run - 1, self.chunk)
         values, _ = self.task(number).rows(self.axes)[row]
-        made = SceneMaker(self.recipe).scene(values)
+        with expecting(self.files):
+            made = SceneMaker(self.recipe).scene(values)
         return replace(made, name=f"{self.name or 'study'}, run {run}")
 
 
 def check_study(study: Study) -> Study:
-    """The study with its quantities fitted to its bearings. Raises InputError: a value that a scene does not accept,
-    names that occur twice, or too many runs.
+    """The study with its quantities fitted to its bearings, and with the files that its scenes open. Raises InputError:
+    a value that a scene does not accept, names that occur twice, or too many runs.
 
-    Every value of a grid, and the least and the largest of a random axis, is tried in the base scene.
+    Every text and table among the values of a grid, and the least and the largest number of an axis, is tried in the
+    base scene.
     """
     if study.runs > MOST_RUNS:
         raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
+    with recording() as files:
+        study = _tried_study(replace(study, files=files))
+    reserved = [INTENSITY] if study.recipe.intensities else []
+    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in study.keep.columns())]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
+    return study
+
+
+def _tried_study(study: Study) -> Study:
+    """The study after all that `check_study` tries."""
     try:
-        plain = scene_of(study.recipe.scene)
+        maker = SceneMaker(study.recipe)
     except InputError as error:
         raise InputError(f"scene: {error}") from None
     for axis in study.axes:
         try:
-            _check_axis(axis, plain, bool(study.recipe.records))
+            _check_axis(axis, maker, bool(study.recipe.records))
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
     surfaces, building = 0, None
     columns: tuple[str, ...] = ()
-    for scene in _tried(study, SceneMaker(study.recipe)):  # one after the other: their motions are long
+    first, base, opened = {}, "", {}
+    for place, scene, files in _tried(study, maker):  # one after the other: their motions are long
+        if place is None:
+            first, base = files, fingerprint((scene, sorted(files.values())))
+        elif own := sorted(digest for path, digest in files.items() if path not in first):
+            opened[place] = fingerprint(own)
         surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in _bearings(scene)))
         building = _larger(building, _counts(scene))
         if isinstance(scene, BuildingScene) and study.keep.formulas and not columns:
             columns = column_names(scene)
     keep = replace(study.keep, surfaces=surfaces, building=building, building_columns=columns)
-    found = replace(study, keep=keep)
-    reserved = [INTENSITY] if study.recipe.intensities else []
-    names = [*reserved, *(axis.name for axis in study.axes), *(column.name for column in found.keep.columns())]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise InputError(f"{twice[0]}: this name occurs twice among axes, keep and quantities; give another")
-    return found
+    return replace(study, keep=keep, base=base, opened=opened)
 
 
 def _bearings(scene: AnyScene) -> list[Bearing]:
@@ -210,44 +230,48 @@ def _counts(scene: AnyScene) -> _Counts | None:
     return len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
 
 
-def _check_axis(axis: Axis, scene: AnyScene, has_records: bool) -> None:
-    """Raise InputError where an axis cannot change this scene."""
+def _check_axis(axis: Axis, maker: SceneMaker, has_records: bool) -> None:
+    """Raise InputError where an axis cannot change the base scene."""
     for path in axis.paths if axis.change in ("sets", "multiplies") else ():
         if path.partition(".")[0] == "motion" and has_records:
             raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
-        if axis.change == "multiplies" and rule_of(scene, path) is None:
-            raise InputError(f"multiplies = {path!r}: give a number of bearing, top or solver, or set the field")
-        chosen = bearings_at(scene, path)
-        if axis.surfaces is not None:
-            own = path[path.rindex("bearing.") :] if chosen else path
-            for one in [scene.bearings[index] for index in chosen] if isinstance(scene, BuildingScene) else [scene]:
-                surface_values(one, own)
-    count = min(len(bearing.surfaces) for bearing in _bearings(scene))
+        try:
+            if axis.change == "multiplies" or axis.surfaces is not None:
+                multiplied_table(maker.recipe.scene, path, 1.0, axis.surfaces)
+        except InputError as error:
+            raise InputError(f"{axis.change} = {path!r}: {str(error).removeprefix(f'{path}: ')}") from None
+    count = min(len(bearing.surfaces) for bearing in _bearings(maker.base))
     for surface in axis.surfaces or ():
         if surface > count:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried(study: Study, maker: SceneMaker) -> Iterator[AnyScene]:
-    """The scenes of the first run, and of every value of each axis with the first values of the others."""
+def _tried(study: Study, maker: SceneMaker) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
+    """The scenes of the first run, and of every value of each axis with the first values of the others.
+
+    Yields the indices of the axis and of its value, None for the first run; the scene, and the files that it opened.
+    """
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
-    yield _made(maker, base, f"run 1 ({named})")
+    yield None, *_made(maker, base, f"run 1 ({named})")
     drawn = iter(study.samples.T)
     for index, axis in enumerate(study.axes):
         if axis.values is None:
             column = next(drawn)
-            tried: Sequence[Any] = sorted({float(column.min()), float(column.max())})
+            tried: list[tuple[int, Any]] = list(enumerate(sorted({float(column.min()), float(column.max())})))
         else:
-            tried = axis.values[:: max(1, len(axis.values) // TRIED)]
-        for value in tried:
-            yield _made(maker, (*base[:index], value, *base[index + 1 :]), f"axes.{axis.name}: value {value!r}")
+            numeric = all(isinstance(value, int | float) for value in axis.values)
+            tried = list(enumerate(axis.values))[:: max(1, len(axis.values) // TRIED) if numeric else 1]
+        for place, value in tried:
+            changed = (*base[:index], value, *base[index + 1 :])
+            yield (index, place), *_made(maker, changed, f"axes.{axis.name}: value {value!r}")
 
 
-def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> AnyScene:
+def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
     try:
-        scene = maker.scene(values)
+        with recording() as files:
+            scene = maker.scene(values)
         check_method(scene)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    return scene
+    return scene, files

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from hashlib import sha256
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.buildings.opening import files_of, with_absolute_paths
+from msfp_gen.buildings.opening import located_value, with_absolute_paths
 from msfp_gen.common.fields import Quantity
+from msfp_gen.common.inputs import is_input, recording
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion, is_file
+from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies.bounding import load_factors
 from msfp_gen.studies.study.axes import Axis, axis_from
 from msfp_gen.studies.study.definition import Limits, Study, check_study
@@ -60,7 +61,7 @@ def load_study(
     if isinstance(source, Mapping):
         return _study(_for_search(source) if design else dict(source), None, progress)
     path = Path(source)
-    if not is_file(path):
+    if not is_input(path):
         raise InputError(f"study = {str(source)!r}: no such file; `msfp-gen study --example` prints one to start from")
     try:
         table = toml_file(path)
@@ -81,9 +82,15 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
     known_keys(table, KEYS, "")
     if "scene" not in table:
         raise InputError(f"scene is missing: give {KEYS['scene']}")
+    with recording():  # a file that changes from here to the end of the check is an error
+        return _checked(table, folder, progress)
+
+
+def _checked(table: Table, folder: Path | None, progress: Progress | None) -> Study:
     scene = _scene(table["scene"], folder)
     records = records_from(table.get("records"), folder, progress)
-    axes = (*records.axes, *(axis_from(name, each) for name, each in _table(table, "axes").items()))
+    own = [_located(axis_from(name, each), folder) for name, each in _table(table, "axes").items()]
+    axes = (*records.axes, *own)
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")
     sampling = _sampling(table, axes)
@@ -103,9 +110,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
         **{key: value for key, value in table.items() if key != "about"},
         "scene": scene,
         **({"records": records.table} if tables else {}),
-    }
-    contents = {
-        path: sha256(Path(path).read_bytes()).hexdigest() for path in [*files_of(scene), *_files(list(tables.values()))]
+        **({"axes": {axis.name: _complete(axis, table["axes"][axis.name]) for axis in own}} if own else {}),
     }
     return check_study(
         Study(
@@ -116,9 +121,28 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
             limits=Limits(**fields_of(table, "limits", Limits)),
             given_chunk=_chunk(table.get("chunk")),
             table=complete,
-            contents=contents,
         )
     )
+
+
+def _located(axis: Axis, folder: Path | None) -> Axis:
+    """The axis with absolute paths of the files that its values name, relative to the folder of the study file."""
+    if axis.change != "sets" or axis.values is None:
+        return axis
+    values = axis.values
+    try:
+        for path in axis.paths:
+            values = tuple(located_value(path, value, folder) for value in values)
+    except InputError as error:
+        raise InputError(f"axes.{axis.name}: {error}") from None
+    return replace(axis, values=values)
+
+
+def _complete(axis: Axis, table: Table) -> Table:
+    """The table of an axis for the copy of the study: with the paths of its values and the labels that these had."""
+    if axis.values is None or list(axis.values) == table.get("values"):
+        return table
+    return {**table, "values": list(axis.values), "labels": list(axis.labels)} if "values" in table else table
 
 
 def _table(table: Mapping[str, Any], key: str) -> Table:
@@ -143,7 +167,7 @@ def _scene(value: Any, folder: Path | None) -> Table:
 def _beside(source: str, folder: Path | None) -> str:
     """A path in a study file as seen from here; names of presets as they are."""
     path = (folder or Path()) / source
-    return str(path) if is_file(path) else source
+    return str(path) if is_input(path) else source
 
 
 def _sampling(table: Table, axes: tuple[Axis, ...]) -> Sampling | None:
@@ -179,9 +203,3 @@ def _chunk(value: Any) -> int | None:
         return int(_CHUNK.parse(value))
     except ValueError as error:
         raise InputError(f"chunk = {value!r}: {error}") from None
-
-
-def _files(tables: list[Any]) -> list[str]:
-    """Files that `[motion]` tables name, each once."""
-    named = [table["file"] for table in tables if isinstance(table, Mapping) and table.get("file") is not None]
-    return list(dict.fromkeys(path for each in named for path in ([each] if isinstance(each, str) else each)))

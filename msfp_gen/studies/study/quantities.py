@@ -28,6 +28,19 @@ EXTREMES: dict[str, Callable[[Any], Any]] = {
     "most": np.max,
     "last": lambda values: values[-1],
 }
+# Word and field of the history -> the extreme over all steps of a run that is the same quantity.
+_OVER_STEPS = {
+    ("peak", "displacement"): "displacement",
+    ("peak", "top_force"): "top_force",
+    ("peak", "sliding"): "sliding",
+    ("most", "sliding"): "sliding",
+    ("least", "gap"): "gap",
+    ("least", "normal_force"): "least_normal",
+    ("most", "normal_force"): "most_normal",
+    ("least", "friction_coefficient"): "least_friction",
+    ("most", "friction_coefficient"): "most_friction",
+    ("most", "temperature"): "temperature",
+}
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
 # Quantities of the summary beside the columns of a sweep: name -> (unit, path).
 _MORE = {
@@ -67,7 +80,7 @@ class Keep:
     Attributes:
         names: quantities, as in the study file.
         formulas: pairs of a name and a formula of quantities, axes, and `peak(...)`, `least(...)`, `most(...)`,
-            `last(...)` of a column of the history.
+            `last(...)` of a column of the history: over all steps where the run records them, else of the rows.
         surfaces: the most surfaces of any bearing of the study.
         axes: names of the axes that hold numbers.
         building: floors, storeys and bearings where the base is a building.
@@ -245,8 +258,17 @@ class _Reader:
         return None if value is None else _finite(value)
 
     def extreme(self, word: str, column: str) -> float | None:
-        """An extreme of a column of the history; None where the run has no such column."""
-        values = self._building_columns.get(column) if self._keep.building else self._history_column(column)
+        """An extreme of a column of the history; None where the run has no such column.
+
+        Over all steps where the run records it, else of the rows.
+        """
+        if self._keep.building:
+            values = self._building_columns.get(column)
+        else:
+            values = self._history_column(column)
+            field, index = history_columns(self._keep.surfaces)[column]
+            if values is not None and (name := _OVER_STEPS.get((word, field))):
+                return _finite(getattr(self.result.extremes, name)[index[0]])
         return None if values is None else _finite(EXTREMES[word](values))
 
     @cached_property

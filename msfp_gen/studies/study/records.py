@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from msfp_gen.common.fields import Choice, Quantity, check_fields
+from msfp_gen.common.inputs import is_input
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.motion_tables import is_file
 from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
 from msfp_gen.studies.study.axes import Axis, grid
 from msfp_gen.studies.study.fields import fields_of, known_keys
@@ -93,7 +93,7 @@ def _suite(table: Mapping[str, Any], folder: Path | None, progress: Progress | N
         if not isinstance(table["suite"], str):
             raise InputError(f"records.suite = {table['suite']!r}: give a path in quotes")
         path = (folder or Path()) / table["suite"]
-        return load_suite(path if is_file(path) else table["suite"], progress)
+        return load_suite(path if is_input(path) else table["suite"], progress)
     try:
         return suite_from_table({"records": table["motions"]}, folder, progress)
     except InputError as error:

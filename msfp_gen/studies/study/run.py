@@ -13,7 +13,6 @@ from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
 from msfp_gen.studies.study.definition import Study, Task
 from msfp_gen.studies.study.engines import Engine, engine_from, require
 from msfp_gen.studies.study.loader import load_study
-from msfp_gen.studies.study.recipe import SceneMaker
 from msfp_gen.studies.study.status import failures
 from msfp_gen.studies.study.worker import Order, build_models, run_chunk
 
@@ -128,10 +127,11 @@ def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progr
     _check_failures(study, failed, before, chunks.folder)
     if missing:
         _build(study)
+        chunks.started()
     if progress is not None:
         progress(before, total)
     done = 0
-    order = Order(chunks.digest, study.recipe, study.keep, study.limits.run_seconds)
+    order = Order(chunks.identity, chunks.digest, study.recipe, study.files, study.keep, study.limits.run_seconds)
     for task, (part, bad) in engine.results(run_chunk, _calls(study, missing, order)):
         write_bytes(chunks.path(task), [part], tidy=False)
         done, failed = done + len(task), failed + bad
@@ -163,5 +163,4 @@ def _length(study: Study, number: int) -> int:
 
 def _build(study: Study) -> None:
     """Build the model of the first run, so that local workers find it in the cache; other hosts build their own."""
-    (values, _), *_ = study.task(0).rows(study.axes)
-    build_models([SceneMaker(study.recipe).scene(values)])
+    build_models([study.scene(1)])

@@ -8,13 +8,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from msfp_gen.common.tables import Table
-from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
+from msfp_gen.studies.study.chunks import STUDY_FILE, parts_in, readable_parts, study_table
 
-RECENT = 50  # newest parts from which the rate is measured
-IDLE = 10  # times the mean interval between parts, after which a study counts as not running
+IDLE = 3  # times the longest interval between parts, after which a study counts as not running
+LEAST_IDLE = 10.0  # that time at least [s]
 
 
 @dataclass(frozen=True)
@@ -25,9 +23,8 @@ class Status:
         name: of the study.
         runs, done, failed: numbers of runs: all, in parts, and of these not ended with `ok` or `stopped`.
         parts, chunks: numbers of parts that are written, and of all.
-        rate: runs per second over the newest parts [1/s]; None with fewer than two parts, or where they are of one
-            moment.
-        running: whether parts still appear at that rate.
+        rate: runs per second since the study was last started, on all its workers [1/s]; None before the first part.
+        running: whether parts still appear.
         seconds_left: time left at that rate [s]; None where it is not known.
     """
 
@@ -69,22 +66,20 @@ def study_status(folder: str | Path) -> Status:
 
 
 def _rate(folder: Path, written: dict[str, int]) -> tuple[float | None, bool]:
-    """Runs per second over the newest parts, and whether the newest one is recent."""
-    times = sorted(((folder / name).stat().st_mtime, count) for name, count in written.items())
-    times = _without_pauses(times[-RECENT - 1 :])
-    if len(times) < 2 or not (span := times[-1][0] - times[0][0]):
+    """Runs per second since the study was last started, and whether parts still appear.
+
+    Workers end their chunks in bunches, so that the time between two parts says nothing: the rate counts from the
+    start, which is the time of `study.toml`.
+    """
+    begin = (folder / STUDY_FILE).stat().st_mtime
+    stamps = ((folder / name).stat().st_mtime for name in written)
+    times = sorted((stamp, count) for stamp, count in zip(stamps, written.values(), strict=True) if stamp > begin)
+    if not times:
         return None, False
-    between = span / (len(times) - 1)
-    return sum(count for _, count in times[1:]) / span, time.time() - times[-1][0] < max(IDLE * between, IDLE)
-
-
-def _without_pauses(times: list[tuple[float, int]]) -> list[tuple[float, int]]:
-    """The parts since the last pause, such as that between two calls of a study."""
-    gaps = [after - before for (before, _), (after, _) in pairwise(times)]
-    if not gaps:
-        return times
-    longest = IDLE * max(float(np.median(gaps)), 1.0)
-    return times[max((index + 1 for index, gap in enumerate(gaps) if gap > longest), default=0) :]
+    ends = [begin, *(stamp for stamp, _ in times)]
+    longest = max(after - before for before, after in pairwise(ends))
+    rate = sum(count for _, count in times) / (ends[-1] - begin)
+    return rate, time.time() - ends[-1] < max(IDLE * longest, LEAST_IDLE)
 
 
 def failures(part: Path) -> int:
@@ -108,6 +103,8 @@ def status_table(found: Status) -> Table:
         rows.append(("state", "complete"))
     elif found.running and found.seconds_left is not None:
         rows.append(("state", f"running, {found.seconds_left:.0f} s left"))
+    elif found.rate is None and found.parts < found.chunks:
+        rows.append(("state", "no part since it was started; the same command continues it if it stopped"))
     else:
         rows.append(("state", "not running; the same command continues it"))
     return Table(found.name or "study", (), rows)

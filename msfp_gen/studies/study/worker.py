@@ -8,6 +8,7 @@ from functools import lru_cache, partial
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msfp_gen.common.inputs import Files, expecting
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
@@ -25,10 +26,16 @@ BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those o
 
 
 class Order(NamedTuple):
-    """What workers need for any chunk of a study."""
+    """What workers need for any chunk of a study.
 
+    identity: of the whole study. digest: of what its parts have in common. files: path -> sha256 of those that its
+    scenes open.
+    """
+
+    identity: str
     digest: str
     recipe: Recipe
+    files: Files
     keep: Keep
     run_seconds: float | None
 
@@ -41,11 +48,20 @@ _makers: dict[str, SceneMaker] = {}  # of the last study only
 
 
 def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
-    """The part of a chunk as the bytes of a Parquet file, and how many of its runs failed."""
-    maker = _makers.get(order.digest)
+    """The part of a chunk as the bytes of a Parquet file, and how many of its runs failed.
+
+    Raises ChangedFileError where a file is not as it was when the study was checked.
+    """
+    with expecting(order.files):
+        return _chunk(order, task)
+
+
+def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
+    maker = _makers.get(order.identity)
     if maker is None:
+        maker = SceneMaker(order.recipe)
         _makers.clear()
-        maker = _makers.setdefault(order.digest, SceneMaker(order.recipe))
+        _makers[order.identity] = maker
     axes = order.recipe.axes
     rows = []
     for offset, (values, labels) in enumerate(task.rows(axes), start=1):

@@ -28,7 +28,7 @@ from msfp_gen import (
     presets,
 )
 from msfp_gen.buildings.file import building_from_table
-from msfp_gen.buildings.opening import files_of, load_bearing_scene, with_absolute_paths
+from msfp_gen.buildings.opening import load_bearing_scene, with_absolute_paths
 
 TEXT = """
 name = "one storey"
@@ -284,7 +284,8 @@ def test_files_of_a_table_are_found_wherever_they_are_named(tmp_path: Path):
         (tmp_path / name).write_text("", encoding="utf-8")
     rows = [{"motion": {"kind": "file", "file": "corner.csv"}}, {}]
     given = {"motion": {"file": "ground.csv"}, "building": {"mass": "M.mtx", "stiffness": "K.mtx", "bearing": rows}}
-    assert files_of(given) == ["ground.csv", "M.mtx", "K.mtx", "corner.csv"]
     found = with_absolute_paths(given, tmp_path)
-    assert files_of(found) == [str(tmp_path / name) for name in ("ground.csv", "M.mtx", "K.mtx", "corner.csv")]
-    assert files_of(given)[-1] == "corner.csv"  # the table given is as before
+    assert found["motion"]["file"] == str(tmp_path / "ground.csv")
+    assert [found["building"][name] for name in ("mass", "stiffness")] == [str(tmp_path / f"{x}.mtx") for x in "MK"]
+    assert found["building"]["bearing"][0]["motion"]["file"] == str(tmp_path / "corner.csv")
+    assert rows[0]["motion"]["file"] == "corner.csv"  # the table itself stays

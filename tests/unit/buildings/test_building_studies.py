@@ -164,7 +164,7 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("bearing[*]", "bearing[5]", r"axes\.mu.*there are 3 bearings; give an index from 0 to 2"),
+        ("bearing[*]", "bearing[5]", r"axes\.mu.*there are 3 of them; give an index from 0 to 2"),
         ("surfaces = [1, 4]", "surfaces = [7]", "this bearing has surfaces 1 to 4"),
         ('"peak_base_shear",', '"peak_top_force",', "'peak_top_force' is no quantity"),
         ("peak_base_shear / 441000", "peak(displacement_E1)", "'displacement_E1' is no column of a history"),

@@ -28,6 +28,7 @@ from support.resuming import assert_same, interrupted, stopping_at
 
 from msfp_gen import InputError, Motion, RunError, Scene, build_model, simulate
 from msfp_gen.cli import main
+from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import replacing
 from msfp_gen.result import Result
 from msfp_gen.scene.parts import Stop
@@ -155,9 +156,9 @@ def test_a_record_whose_data_changed_is_another_scene(saved: Path) -> None:
     scene = scene_of("fenz-test2")
     coefficients = scene.motion.coefficients * (1 + 1e-15)
     changed = replace(scene, motion=replace(scene.motion, coefficients=coefficients))
-    assert checkpoint.fingerprint(changed) != checkpoint.fingerprint(scene)
+    assert fingerprint(changed) != fingerprint(scene)
     assert "made for another scene" in refusal(changed, saved)
-    assert checkpoint.fingerprint(scene_of("fenz-test2")) == checkpoint.fingerprint(scene)
+    assert fingerprint(scene_of("fenz-test2")) == fingerprint(scene)
 
 
 def test_another_build_is_refused(saved: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -175,7 +175,7 @@ def test_a_changed_record_is_another_study(tmp_path: Path) -> None:
     }
     msfp_gen.study(table, tmp_path / "out", threads=True)
     record.write_text(record.read_text(encoding="utf-8").replace("0.300000", "0.310000"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"parts of another study .its records or the equations have changed"):
+    with pytest.raises(InputError, match=r"parts of another study .its files or the equations have changed"):
         msfp_gen.study(table, tmp_path / "out", threads=True)
 
 
@@ -239,14 +239,29 @@ def test_few_calls_wait_at_a_time(tmp_path: Path) -> None:
 def test_status_says_how_far_and_how_fast(tmp_path: Path) -> None:
     msfp_gen.study(cheap_study(chunk=2), tmp_path, threads=True, shard=(1, 2))
     now = time.time()
-    for place, path in enumerate(sorted(tmp_path.glob("part-*.parquet"))):
-        stamp = now - 10 + 4 * place
+    for place, path in enumerate([tmp_path / "study.toml", *sorted(tmp_path.glob("part-*.parquet"))]):
+        stamp = now - 14 + 4 * place
         os.utime(path, (stamp, stamp))
     found = study_status(tmp_path)
     assert (found.runs, found.done, found.parts, found.chunks, found.failed) == (12, 6, 3, 6, 0)
     assert found.rate == pytest.approx(0.5) and found.seconds_left == pytest.approx(12) and found.running
     with pytest.raises(InputError, match=r"no study.toml here; give the folder of a study"):
         study_status(tmp_path / "nothing")
+
+
+def test_the_rate_is_that_of_the_study_where_chunks_end_in_bunches(tmp_path: Path) -> None:
+    """Two workers whose chunks of 20 s end within 0.1 s of each other: 0.1 runs per second, not 10."""
+    msfp_gen.study(cheap_study(chunk=1, sampling={"samples": 4, "seed": 3}), tmp_path, threads=True)
+    begin = time.time() - 100
+    parts = sorted(tmp_path.glob("part-*.parquet"))
+    stamps = [begin - 1000, *(begin + 20 * round_ + late for round_ in (1, 2, 3) for late in (0.0, 0.1))]
+    for path, stamp in zip(parts, stamps, strict=False):  # the first is of an earlier call, the last is missing
+        os.utime(path, (stamp, stamp))
+    parts[-1].unlink()
+    os.utime(tmp_path / "study.toml", (begin, begin))
+    found = study_status(tmp_path)
+    assert (found.done, found.parts) == (7, 7) and found.running
+    assert found.rate == pytest.approx(6 / 60.1) and found.seconds_left == pytest.approx(60.1 / 6)
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:

@@ -1,0 +1,103 @@
+"""Random studies one after the other on the same workers, against their runs one by one.
+
+Their files have the same names and other contents in every study, in one folder or in several.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.study_tables import rows_of, write_record
+
+import msfp_gen
+from msfp_gen import simulate
+from msfp_gen.scene.file.catalogue import scene_table
+from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.studies import load_study
+
+Table = dict[str, Any]
+AXES: tuple[Table, ...] = (
+    {"sets": "bearing.friction", "values": [[0.05, 0.02, 0.02, 0.09], 0.06]},
+    {"sets": "bearing.friction", "surfaces": [1, 4], "values": [0.04, 0.09]},
+    {"multiplies": "bearing.radius", "values": [1.0, 1.1]},
+    {"multiplies": "bearing.friction", "surfaces": [1], "distribution": "uniform", "low": 0.7, "high": 1.3},
+    {"sets": "top.axial_load", "values": ["100 kN", 120e3]},
+    {"sets": "motion.file", "values": ["b.csv", "c.csv"]},
+    {"sets": "motion.scale", "distribution": "uniform", "low": 0.5, "high": 2.0},
+    {"factors": "asce7"},
+    {"sets": "bearing", "values": ["fenz-tfp", "becker-tfp"], "labels": ["fenz", "becker"]},
+)
+
+
+def random_study(rng: np.random.Generator, folder: Path) -> Path:
+    """A study of up to 16 runs of a second with its files; the file of the study."""
+    for name in ("a", "b", "c"):
+        write_record(folder / f"{name}.csv", float(f"{rng.uniform(0.3, 3.0):.2f}"))
+    pivot = {"preset": "fenz-tfp", "friction": [0.05, 0.017, 0.017, 0.1], "friction_at": "pivot"}
+    scene = {**scene_table("fenz-test1"), "solver": {"rtol": 1e-2}}
+    scene |= {"bearing": pivot if rng.random() < 0.5 else "fenz-tfp"}
+    scene |= {"motion": {"kind": "record", "file": "a.csv", "correct": False}}
+    chosen = [AXES[index] for index in rng.choice(len(AXES), rng.integers(1, 3), replace=False)]
+    table: Table = {"scene": scene, "keep": ["peak_displacement", "peak_top_force"], "chunk": int(rng.integers(1, 4))}
+    if rng.random() < 0.5:
+        chosen = [axis for axis in chosen if not axis.get("sets", "").startswith("motion")]
+        motions = [{"file": f"{name}.csv", "correct": False} for name in ("a", "b")]
+        table["records"] = {"motions": motions, "scales": [1.0, float(f"{rng.uniform(0.5, 2.0):.2f}")]}
+    table["axes"] = {f"x{number}": axis for number, axis in enumerate(chosen)}
+    if any("distribution" in axis for axis in chosen):
+        table["sampling"] = {"samples": 2, "seed": int(rng.integers(100))}
+    (folder / "study.toml").write_text(dumps(table), encoding="utf-8")
+    return folder / "study.toml"
+
+
+@contextmanager
+def engine(name: str) -> Iterator[Executor]:
+    if name == "threads":
+        with ThreadPoolExecutor(2) as executor:
+            yield executor
+    elif name == "processes":
+        with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as executor:
+            yield executor
+    else:
+        distributed = pytest.importorskip("distributed")
+        with (
+            distributed.LocalCluster(
+                n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+            ) as made,
+            distributed.Client(made) as client,
+        ):
+            yield client.get_executor(pure=False)
+
+
+def check(name: str, seeds: range, folder: Path) -> None:
+    """Compare the rows of studies on one engine with runs one by one."""
+    with engine(name) as executor:
+        for seed in seeds:
+            rng = np.random.default_rng(seed)
+            file = random_study(rng, folder / str(rng.integers(2)))
+            out = folder / f"out-{seed}"
+            done = msfp_gen.study(file, out, executor=executor, workers=2)
+            rows, study = rows_of(out), load_study(file)
+            assert done == (study.runs, 0, study.runs, 0) and (rows.status == "ok").all()
+            for run in range(1, study.runs + 1):
+                summary = simulate(study.scene(run)).summary
+                row = rows.iloc[run - 1]
+                found = row.peak_displacement, row.peak_top_force
+                assert found == tuple(summary[key]["radial"] for key in ("peak_displacement", "peak_top_force")), seed
+
+
+def test_studies_on_the_same_threads_are_their_runs(tmp_path: Path) -> None:
+    check("threads", range(2), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["threads", "processes", "dask"])
+def test_many_studies_on_the_same_workers_are_their_runs(name: str, tmp_path: Path) -> None:
+    check(name, range(3, 11), tmp_path)
