@@ -62,7 +62,9 @@ def cell(peak: float, damping: float, rtol: float) -> tuple[float, str]:
 
 def spread(runs: int = 20) -> None:
     """Print how far runs of one scene lie apart whose motion differs in the last digit: what rounding decides."""
-    print("\n| rtol | at 0.7 s: least to largest [mm] | largest: least, mean, largest [mm] | spread |\n|---|---|---|---|")
+    print(
+        "\n| rtol | at 0.7 s: least to largest [mm] | largest: least, mean, largest [mm] | spread |\n|---|---|---|---|"
+    )
     for rtol in TOLERANCES:
         scene = bouncing(1.05, 10.0, rtol)
         before, peaks = [], []
