@@ -18,14 +18,15 @@ for archive in "$folder"/dist/*; do
     cd "$place"
     MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen run fenz-test1 --json >summary.json
     venv/bin/msfp-gen study --example >study.toml
-    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen study study.toml -o study >study.log
+    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen study study.toml -o study --shard 1/16 >study.log
     venv/bin/python - <<'PYTHON'
 import json, pathlib, msfp_gen
+from msfp_gen.studies import read_study
 assert "site-packages" in msfp_gen.__file__, f"not the installed package: {msfp_gen.__file__}"
 assert len(list(pathlib.Path("models").glob("msfp_5_2_2-*/manifest.json"))) == 1, "the model was not built here"
 summary = json.loads(pathlib.Path("summary.json").read_text())
 assert summary["status"] == "ok", summary
-rows = msfp_gen.read_study("study")
+rows = read_study("study")
 assert len(rows) and set(rows["status"]) == {"ok"}, rows
 PYTHON
     echo "${archive##*/}: installed, a preset and a study run"
