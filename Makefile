@@ -8,7 +8,7 @@ SITE   := $(VENV)/.site
 ZIG    := $(VENV)/.zig
 PEERS  := $(VENV)/.peers
 
-.PHONY: demo test slow lint types package wheels bounds clang zig fuzz mutants figures docs clean
+.PHONY: demo test slow lint types package wheels processors bounds clang zig fuzz mutants figures docs clean
 
 demo: $(RUNS)
 	$(BIN)/msfp-gen demo -o out
@@ -34,6 +34,10 @@ package: $(STAMP)
 # The wheel with compiled models for Linux on x86-64, in dist/prebuilt: two minutes; downloads ziglang (100 MB).
 wheels: $(STAMP)
 	tests/wheels.sh
+
+# The tests of the physics as on other processors, by what NumPy and BLAS can be told.
+processors: $(STAMP)
+	tests/processors.sh
 
 # The lowest versions of the dependencies that pyproject.toml allows.
 bounds: $(STAMP)

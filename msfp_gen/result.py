@@ -105,7 +105,7 @@ class Result(RunData):
     def to_parquet(self, path: str | Path) -> Path:
         """Write a Parquet file with units in its metadata.
 
-        Raises InputError as `to_csv` does, and where pyarrow is not installed.
+        Raises InputError as `to_csv` does.
         """
         from msfp_gen.results.export import write_parquet
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What is published: sdist and wheel are built and checked, with the wheels that `make wheels` left in dist/prebuilt, and
 # each of the two is installed in an empty environment. There, outside the checkout, a preset runs, which builds its model
-# from the installed sources.
+# from the installed sources, and a study, with nothing installed beside the package.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$PWD/.venv/bin
@@ -17,12 +17,17 @@ for archive in "$folder"/dist/*; do
     "$bin/uv" pip install -q --python "$place/venv" "$archive"
     cd "$place"
     MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen run fenz-test1 --json >summary.json
+    venv/bin/msfp-gen study --example >study.toml
+    MSFP_GEN_CACHE=$place/models venv/bin/msfp-gen study study.toml -o study --shard 1/16 >study.log
     venv/bin/python - <<'PYTHON'
 import json, pathlib, msfp_gen
+from msfp_gen.studies import read_study
 assert "site-packages" in msfp_gen.__file__, f"not the installed package: {msfp_gen.__file__}"
-assert len(list(pathlib.Path("models").glob("msfp_5_2_2-*/manifest.json"))) == 1, "the model was not built here"
+assert len(list(pathlib.Path("models").glob("msfp_5_2_2-*/manifest.json"))), "the model was not built here"
 summary = json.loads(pathlib.Path("summary.json").read_text())
 assert summary["status"] == "ok", summary
+rows = read_study("study")
+assert len(rows) and set(rows["status"]) == {"ok"}, rows
 PYTHON
-    echo "${archive##*/}: installed, a preset runs"
+    echo "${archive##*/}: installed, a preset and a study run"
 done

@@ -59,13 +59,12 @@ def batch(
     ] = False,
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
-    from msfp_gen.results.export import require_pyarrow
     from msfp_gen.scene.file.suite import load_suite
     from msfp_gen.studies.sweep import TABLE_SUFFIXES
     from msfp_gen.studies.sweep.variations import variations, varied_field
 
     if table is not None:
-        require_pyarrow(check_output(table, TABLE_SUFFIXES, "--table"), "--table", ".csv")
+        check_output(table, TABLE_SUFFIXES, "--table")
     fields = [varied_field(text) for text in vary or ()]
     with Progress("suite") as progress:
         records = () if suite is None else load_suite(suite, progress).records

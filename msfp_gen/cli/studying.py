@@ -109,10 +109,8 @@ def _report(done: Outcome, output: Path, as_json: bool) -> None:
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study status out\n  msfp-gen study status out --json")
 def status(folder: Folder, as_json: AsJson = False) -> None:
     """How far a study has come, how fast it is, and how long it will still take."""
-    from msfp_gen.studies.study.engines import require
     from msfp_gen.studies.study.status import status_table, study_status
 
-    require("pyarrow", "parquet", "study status")
     found = study_status(folder)
     if as_json:
         say(json.dumps(found.as_dict(), indent=2))

@@ -7,10 +7,11 @@ In all functions `knots` is an ndarray, shape (k+1,), [s], increasing. `coeffici
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import factorial
+from math import atan2, factorial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 
@@ -39,6 +40,14 @@ _DERIVATIVE_FACTORS = np.array(
 )
 
 
+def powers(values: ArrayLike, count: int = ORDER) -> Array:
+    """Powers 0 to count - 1 along a new last axis, by products: the `**` of NumPy depends on the processor."""
+    factors = np.repeat(np.asarray(values, dtype=float)[..., None], count, axis=-1)
+    factors[..., 0] = 1.0
+    found: Array = np.cumprod(factors, axis=-1)
+    return found
+
+
 def derivatives(local: float, orders: int = 3) -> Array:
     """Matrix that gives value and derivatives of one piece from its coefficients: ndarray, shape (orders, 6).
 
@@ -46,10 +55,10 @@ def derivatives(local: float, orders: int = 3) -> Array:
         local: time since the knot at which the piece begins [s].
         orders: number of rows: the value and orders - 1 derivatives.
     """
-    powers = local ** np.arange(ORDER)
+    rising = powers(local)
     rows = np.zeros((orders, ORDER))
     for order in range(orders):
-        rows[order, order:] = _DERIVATIVE_FACTORS[order, order:] * powers[: ORDER - order]
+        rows[order, order:] = _DERIVATIVE_FACTORS[order, order:] * rising[: ORDER - order]
     return rows
 
 
@@ -85,9 +94,10 @@ def hermite5(knots: Array, value: Array, slope: Array, curvature: Array) -> Arra
     d0 = value[1:] - value[:-1] - h * (slope[:-1] + h * curvature[:-1] / 2)
     d1 = (slope[1:] - slope[:-1] - h * curvature[:-1]) * h
     d2 = (curvature[1:] - curvature[:-1]) * h**2
-    c3 = (10 * d0 - 4 * d1 + d2 / 2) / h**3
-    c4 = (-15 * d0 + 7 * d1 - d2) / h**4
-    c5 = (6 * d0 - 3 * d1 + d2 / 2) / h**5
+    _, _, _, h3, h4, h5 = np.moveaxis(powers(h), -1, 0)
+    c3 = (10 * d0 - 4 * d1 + d2 / 2) / h3
+    c4 = (-15 * d0 + 7 * d1 - d2) / h4
+    c5 = (6 * d0 - 3 * d1 + d2 / 2) / h5
     return np.stack([value[:-1], slope[:-1], curvature[:-1] / 2, c3, c4, c5], axis=-1)
 
 
@@ -130,8 +140,8 @@ def knot_jumps(knots: Array, coefficients: Array, derivative: int) -> tuple[Arra
     left = polynomial(coefficients[:-1], h[:-1, None], derivative)
     right = polynomial(coefficients[1:], np.zeros((len(h) - 1, 1)), derivative)
     largest_value = _largest_in_vector(coefficients[:, :, 0])
-    powers = h[:, None, None] ** np.arange(ORDER - derivative)
-    terms = np.abs(coefficients[:, :, derivative:]) * _DERIVATIVE_FACTORS[derivative, derivative:] * powers
+    rising = powers(h[:, None], ORDER - derivative)
+    terms = np.abs(coefficients[:, :, derivative:]) * _DERIVATIVE_FACTORS[derivative, derivative:] * rising
     largest = _largest_in_vector(terms.sum(axis=2))
     short = np.minimum(h[:-1], h[1:])[:, None]
     bound = 1e-9 * largest + 64 * np.finfo(float).eps * largest_value / short**derivative
@@ -152,13 +162,16 @@ def azimuth(knots: Array, horizontal: Array) -> float | None:
 
     `horizontal` are coefficients of shape (k, 2, 6) of the displacement relative to the start of the motion.
     """
-    scaled = horizontal * np.diff(knots)[:, None, None] ** np.arange(ORDER)
-    _, sizes, directions = np.linalg.svd(scaled.transpose(0, 2, 1).reshape(-1, 2), full_matrices=False)
-    if sizes[1] > 1e-12 * sizes[0]:
-        return None
-    if sizes[0] == 0:
+    scaled = horizontal * powers(np.diff(knots)[:, None])
+    if not np.any(scaled):
         return 0.0
-    angle = float(np.arctan2(directions[0, 1], directions[0, 0]))
+    x, y = np.moveaxis(scaled / np.abs(scaled).max(), 1, 0)
+    squares = x**2 + y**2
+    at = np.unravel_index(np.argmax(squares), squares.shape)
+    across = x * y[at] - y * x[at]
+    if np.sum(across**2) > 1e-24 * squares[at] * np.sum(squares):
+        return None
+    angle = atan2(y[at], x[at])
     angle -= np.pi * round(angle / np.pi)
     return angle if angle > -np.pi / 2 + 1e-12 else angle + np.pi
 

@@ -13,7 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.motions import piecewise
 from msfp_gen.motions.checks import finite, increasing, number, numbers, order, positive, storable, vector
-from msfp_gen.motions.piecewise import ORDER
+from msfp_gen.motions.piecewise import ORDER, powers
 from msfp_gen.motions.samples import sampled_linear
 from msfp_gen.motions.time_grid import Resolution
 from msfp_gen.motions.waveforms import product, sine, smoothstep, wave_knots
@@ -79,7 +79,7 @@ class Prescribed:
     def jumps(self) -> Array:
         """Knots at which a channel jumps, ndarray, shape (j,), [s]."""
         width = np.diff(self.knots)[:-1, None]
-        left = np.sum(self.coefficients[:-1] * width[..., None] ** np.arange(ORDER), axis=2)
+        left = np.sum(self.coefficients[:-1] * powers(width), axis=2)
         # Relative to all forces, all moments or all angles: a component may be the rounding of a cosine.
         values = np.abs(self.coefficients[:, :, 0]).max(axis=0)
         size = np.concatenate([np.full(len(part), part.max()) for part in np.split(values, max(1, len(values) // 3))])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.motions.piecewise import ORDER, polynomial
+from msfp_gen.motions.piecewise import ORDER, polynomial, powers
 
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
@@ -201,7 +201,7 @@ def _longest_steps(knots: Array, pieces: Array, kinked: Flags, sizes: Mapping[in
 
 def _degrees(pieces: Array, width: Array, size: Array) -> Indices:
     """Degree of every piece, shape (k,): the highest power with a term above the rounding error."""
-    terms = np.abs(pieces) * width[:, None, None, None] ** np.arange(ORDER)
+    terms = np.abs(pieces) * powers(width[:, None, None])
     used = np.any(terms > SMOOTH_DEVIATION[0] * size[:, None, None], axis=(1, 2))
     degree: Indices = (used * np.arange(ORDER)).max(axis=1)
     return degree

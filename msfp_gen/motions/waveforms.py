@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.elementary import cos, sin
 from msfp_gen.errors import InputError
 from msfp_gen.motions.checks import positive
 from msfp_gen.motions.piecewise import Pieces, hermite5
@@ -26,7 +27,7 @@ def smoothstep(time: Array, rise: float) -> Wave:
     """
     x = np.clip(time / rise, 0.0, 1.0)
     return (
-        x**3 * (10 - 15 * x + 6 * x**2),
+        x**2 * x * (10 - 15 * x + 6 * x**2),
         30 * x**2 * (1 - x) ** 2 / rise,
         60 * x * (1 - x) * (1 - 2 * x) / rise**2,
     )
@@ -35,7 +36,7 @@ def smoothstep(time: Array, rise: float) -> Wave:
 def sine(time: Array, angular_frequency: float, phase: float = 0.0) -> Wave:
     """sin(angular_frequency * time + phase) at `time`, shape (k,), [s]; angular frequency [rad/s], phase [rad]."""
     w, angle = angular_frequency, angular_frequency * time + phase
-    return np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)
+    return sin(angle), w * cos(angle), -(w**2) * sin(angle)
 
 
 def product(first: Wave, second: Wave) -> Wave:

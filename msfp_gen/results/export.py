@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -55,20 +54,11 @@ def export_columns(result: RunData, path: str | Path, names: Sequence[str] | Non
 
 
 def check_result_path(path: str | Path, name: str = "output") -> Path:
-    """`path` if a result can be written there; raises InputError otherwise, also for .parquet without pyarrow.
+    """`path` if a result can be written there; raises InputError otherwise.
 
     name: that of the option, for the message.
     """
-    return require_pyarrow(check_output(path, WRITERS, name), name, ".nc, .csv or .mat")
-
-
-def require_pyarrow(path: Path, name: str, others: str) -> Path:
-    """`path`; raises InputError for .parquet without pyarrow, whose message names the `others` to give instead."""
-    if path.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
-        raise InputError(
-            f"{name} = {str(path)!r}: Parquet needs pyarrow; pip install 'msfp-gen[parquet]', or give {others}"
-        )
-    return path
+    return check_output(path, WRITERS, name)
 
 
 def columns(dataset: xr.Dataset) -> list[Column]:
@@ -154,7 +144,7 @@ def _events(result: RunData) -> list[dict[str, Any]]:
 
 
 def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
-    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file. Needs pyarrow.
+    """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
 
     names, sign: as of `export_columns`.
     """
@@ -168,7 +158,7 @@ def write_parquet(result: RunData, path: str | Path, names: Sequence[str] | None
 
 
 def write_parquet_table(path: Path, table: list[Column], about: dict[str, str]) -> None:
-    """Write columns as Parquet, with metadata of the file. Needs pyarrow."""
+    """Write columns as Parquet, with metadata of the file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

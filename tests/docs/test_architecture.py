@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import packages_distributions
 
 import pytest
 from support import ROOT
@@ -21,6 +22,10 @@ ORDER = (
     "scene", "model", "coupling", "results", "analysis", "buildings", "fmu", "figures", "result", "simulation",
     "studies", "report", "explorer", "", "cli", "__main__",
 )  # fmt: skip  # "" is msfp_gen/__init__.py
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+BROUGHT = {"markupsafe": "jinja2", "PIL": "matplotlib"}  # what a dependency requires itself
+DEPENDENCIES, EXTRAS = PROJECT["dependencies"], PROJECT["optional-dependencies"]
 
 # What `import msfp_gen` must never load.
 HEAVY = {"sympy", "xarray", "matplotlib", "pint", "scipy", "pydantic", "h5netcdf", "h5py", "jinja2", "Cython"}
@@ -165,10 +170,31 @@ def test_import_of_the_package_is_light():
     assert not HEAVY & set(run.stdout.split())
 
 
+def distributions(requirements):
+    """Names of what requirements install."""
+    return {re.split(r"[^A-Za-z0-9-]", text)[0].lower() for text in requirements}
+
+
+def test_every_library_is_installed_with_the_package_or_its_extra_is_named():
+    """A module of an extra has a `require` that states the command; all others are plain dependencies."""
+    of_modules = packages_distributions()
+    named = {
+        module: extra
+        for path in PACKAGE
+        for module, extra in re.findall(r'require\("(\w+)", "(\w+)"', path.read_text(encoding="utf-8"))
+    }
+    assert len(named) >= 4
+    for path in PACKAGE:
+        for top in {module.partition(".")[0] for module in imports_of(path, late=True)}:
+            if top in sys.stdlib_module_names or top == "msfp_gen":
+                continue
+            extra = EXTRAS.get(named.get(top, ""), DEPENDENCIES)
+            needed = {name.lower().replace("_", "-") for name in of_modules.get(BROUGHT.get(top, top), [top])}
+            assert needed & distributions(extra), f"{path.name} imports {top}, which nothing installs"
+
+
 def test_every_dependency_has_its_sentence():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    wanted = [*project["dependencies"], *(d for extra in project["optional-dependencies"].values() for d in extra)]
-    names = {re.split(r"[^A-Za-z0-9-]", text)[0].lower() for text in wanted}
+    names = distributions([*DEPENDENCIES, *(name for extra in EXTRAS.values() for name in extra)])
     names -= {"sympy", "numpy", "scipy", "cython", "pytest"}
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([\w, -]+?)(?: \(tests\))? \| .+ \|$", page, flags=re.MULTILINE)

@@ -83,12 +83,13 @@ def test_a_surface_that_rattles_is_noted():
 
 
 def test_a_small_bounce_has_one_answer():
-    """Landings dissipate enough that the path of the top hardly depends on the tolerance; 20 % with 1 s/m."""
+    """To 2e-4 until the sliders rattle at the end of the flight; then rounding decides 1.2 % (docs/uplift.md)."""
     histories = [simulate(shaken(1.05, sideways=0.03, rtol=rtol)).history for rtol in (1e-3, 1e-4, 3e-5, 1e-5)]
     assert all(2e-4 < history.lift.max() < 5e-4 for history in histories)
     peaks = [np.abs(history.displacement[:, 0]).max() for history in histories]
     assert max(peaks) < 1.02 * min(peaks)
-    assert max(peaks[1:]) < 1.005 * min(peaks[1:])
+    before = [np.interp(0.7, history.time, history.displacement[:, 0]) for history in histories]
+    assert np.ptp(before) < 2e-4 * max(peaks)
 
 
 def differences(scene):

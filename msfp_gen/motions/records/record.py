@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.elementary import cos, sin
 from msfp_gen.errors import InputError
 from msfp_gen.motions.checks import finite, positive
 
@@ -106,12 +107,16 @@ class Record:
 
     def rotated(self, angle: float) -> Record:
         """The record with its horizontal components rotated by `angle` [rad] about E3, from E1 towards E2."""
-        c, s = np.cos(angle), np.sin(angle)
-        matrix = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        c, s = cos(angle), sin(angle)
+
+        def turn(values: Array) -> Array:
+            one, two, three = values.T
+            return np.stack([c * one - s * two, s * one + c * two, three], axis=1)
+
         first, second, up = self.channels
         turned = f"{' and '.join(filter(None, (first, second)))} rotated"
         note = f"horizontal components rotated by {np.degrees(angle):.6g} degrees from E1 towards E2"
-        return self._changed(lambda values: values @ matrix, (turned, turned, up), note)
+        return self._changed(turn, (turned, turned, up), note)
 
     def _changed(self, change: Callable[[Array], Array], channels: tuple[str, str, str], note: str) -> Record:
         """The record with a linear `change` of the rows of all its quantities."""

@@ -31,7 +31,7 @@ def run_opensees(scene: Scene, steps: int) -> Trial:
     """
     require_base_motion_only(scene)
     if find_spec("openseespy") is None:
-        raise InputError("openseespy is not installed: pip install openseespy to compare with TripleFrictionPendulum")
+        raise InputError("TripleFrictionPendulum needs openseespy; pip install 'msfp-gen[opensees]'")
     lower, upper, inner = _links(scene)
     try:
         ops = import_module("openseespy.opensees")

@@ -108,7 +108,6 @@ def pareto(
 
     """
     require("pymoo", "pymoo", "a Pareto search")
-    require("pyarrow", "parquet", "a Pareto search")
     study = _search_study(source)
     _check(study, goals, population, generations)
     folder = Path(output)

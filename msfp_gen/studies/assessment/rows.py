@@ -13,7 +13,6 @@ from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
-from msfp_gen.studies.study.engines import require
 
 COMPLETE = "ok"  # the status of a run that reached its end
 
@@ -24,7 +23,6 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
     columns: only these, and `run` and `status`; None: all. Units are in `DataFrame.attrs["units"]`. Raises InputError:
     no study there, no rows yet, or an unknown column.
     """
-    require("pyarrow", "parquet", "reading a study")
     import pyarrow.dataset as ds
 
     folder = Path(folder)

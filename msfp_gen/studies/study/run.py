@@ -11,7 +11,7 @@ from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
 from msfp_gen.studies.study.definition import Study, Task
-from msfp_gen.studies.study.engines import Engine, engine_from, require
+from msfp_gen.studies.study.engines import Engine, engine_from
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.status import failures
 from msfp_gen.studies.study.worker import Order, build_models, run_chunk
@@ -81,7 +81,6 @@ def study(
 
     """
     _check_shard(shard)
-    require("pyarrow", "parquet", "study")
     found = source if isinstance(source, Study) else load_study(source)
     with engine_from(workers, threads, executor, dask, mpi) as engine:
         return run_on(engine, found, Path(output), shard, progress)

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.elementary import exp
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
 
@@ -97,7 +98,7 @@ _QUANTILES: dict[str, Callable[..., Array]] = {
     "uniform": lambda u, low, high: low + u * (high - low),
     "triangular": _triangular,
     "normal": _normal,
-    "lognormal": lambda u, median, dispersion: median * np.exp(_normal(u, 0.0, dispersion)),
+    "lognormal": lambda u, median, dispersion: median * exp(_normal(u, 0.0, dispersion)),
 }
 _SHARES: dict[str, Callable[..., float]] = {
     "uniform": lambda x, low, high: min(max((x - low) / (high - low), 0.0), 1.0),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.tables import Table
-from msfp_gen.results.export import require_pyarrow
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -89,9 +88,9 @@ def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> 
     """Write the rows, sorted by their number, as CSV or Parquet by the suffix; completely or not at all.
 
     Names carry units in CSV (`peak_displacement [m]`); in Parquet units are metadata of the columns. Raises InputError
-    for an invalid path, and for .parquet without pyarrow.
+    for an invalid path.
     """
-    target = require_pyarrow(check_output(path, TABLE_SUFFIXES, name), name, ".csv")
+    target = check_output(path, TABLE_SUFFIXES, name)
     table = _columns(sorted(rows))
     content = _csv(table) if target.suffix.lower() == ".csv" else _parquet(table)
     write_bytes(target, [content])

@@ -12,6 +12,7 @@ from msfp_gen import Motion, Solver, simulate
 from msfp_gen.buildings.data import peaks_of_rows
 from msfp_gen.buildings.peaks import Peaks
 
+ROUNDING = 1e-12  # of sums of some ten terms that differ in the order of addition
 EVENTFUL = scene(frame(), duration=0.8)
 
 
@@ -24,10 +25,12 @@ def test_peaks_do_not_depend_on_the_rows():
         expected = getattr(fine.peaks, one.name)
         assert getattr(coarse.peaks, one.name) == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max()), one.name
     short = peaks_of_rows(coarse)
-    assert np.all(short.node_acceleration <= coarse.peaks.node_acceleration)
+    # A row is within the peaks but for its last digits: its sum is NumPy's, that of the peaks is the run's.
+    assert np.all(short.node_acceleration <= (1 + ROUNDING) * coarse.peaks.node_acceleration)
     assert np.any(short.node_acceleration < 0.8 * coarse.peaks.node_acceleration)
     assert coarse.summary["floors"][-1]["peak_acceleration"]["E1"] == coarse.peaks.node_acceleration[-1, 0]
-    assert coarse.summary["peak_base_shear"]["radial"] == coarse.peaks.base_reaction[3] >= short.base_reaction[3]
+    assert coarse.summary["peak_base_shear"]["radial"] == coarse.peaks.base_reaction[3]
+    assert short.base_reaction[3] <= (1 + ROUNDING) * coarse.peaks.base_reaction[3]
     found = coarse.characterise()
     assert found.peak_force == coarse.peaks.base_reaction[3] and found.peak_drift_ratio > 0
     assert found.bearings[1].minimum_load_ratio == coarse.peaks.axial_force[1, 0] / coarse.scene.axial_loads[1]

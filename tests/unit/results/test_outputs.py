@@ -6,7 +6,6 @@ import dataclasses
 import errno
 import json
 import os
-import sys
 import tomllib
 
 import numpy as np
@@ -136,14 +135,6 @@ def test_a_failed_write_leaves_the_old_file(result, suffix, tmp_path, monkeypatc
     with pytest.raises(ZeroDivisionError):
         result.save(path)
     assert [file.read_text() for file in tmp_path.iterdir()] == ["old"]
-
-
-def test_without_pyarrow_the_remedy_is_named_before_the_run(monkeypatch, tmp_path, capsys, result):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(InputError, match=r"pyarrow; pip install 'msfp-gen\[parquet\]', or give \.nc, \.csv or \.mat"):
-        result.to_parquet(tmp_path / "run.parquet")
-    assert main(["run", "fenz-test2", "-o", str(tmp_path / "run.parquet")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("suffix", WRITERS)

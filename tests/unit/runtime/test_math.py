@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from support import ROOT, Array
 
+from msfp_gen.common import elementary
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 
 HEADER = ROOT / "msfp_gen" / "runtime" / "msfp_math.h"
@@ -109,6 +110,18 @@ def test_polynomials_are_those_of_the_script(script: ModuleType, name: str) -> N
     text = HEADER.read_text(encoding="utf-8").partition(f"msfp_{name}_rest(double z)")[2]
     written = re.sub(r"\s+", "", text.partition("return ")[2].partition(";")[0])
     assert written == re.sub(r"\s+", "", script.as_c(script.polynomial(name)))
+
+
+def test_functions_of_inputs_are_those_of_the_runtime(library: ctypes.CDLL, script: ModuleType) -> None:
+    """Bit by bit: a motion or a sample made in Python is that of a program in C."""
+    for name in ("sin", "cos", "exp"):
+        assert list(getattr(elementary, f"{name.upper()}_REST")) == script.polynomial(name)
+        x = np.random.default_rng(9).uniform(-1, 1, 4000) * 10.0 ** np.random.default_rng(10).uniform(-9, 2.8, 4000)
+        ends = [709.0, -708.0, -709.0] if name == "exp" else [np.pi / 4, -np.pi / 4, 99999.0, 1e7]
+        x = np.concatenate([x, [0.0, -0.0, *ends]])
+        found = getattr(elementary, name)(x)
+        assert found.tobytes() == evaluated(library, name, x).tobytes()
+        assert found[3] == getattr(elementary, name)(x[3])
 
 
 def test_no_kernel_calls_the_functions_of_the_system(library: ctypes.CDLL) -> None:

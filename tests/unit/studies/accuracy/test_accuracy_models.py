@@ -136,7 +136,7 @@ def test_what_does_not_apply_is_left_out_and_said(monkeypatch):
     for name, changes, why in (
         ("massless", {"sliders": "massless"}, "the scene itself has sliders = 'massless'"),
         ("no rims", {"rims": False}, "the scene itself has rims = False"),
-        ("OpenSees", {}, "pip install openseespy"),
+        ("OpenSees", {}, "pip install 'msfp-gen[opensees]'"),
     ):
         scene = scene_of("fenz-test2", changes, duration=1.0)
         trials, notes = models._variant_trials(NAMED[name], scene, [1e-2], 5.0, quiet)

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# The tests of the physics once more as on other processors: NumPy without its versions for vectors of 512 bits, and BLAS
+# with its kernels for a processor of 2013. Models are those in the cache.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bin=$PWD/.venv/bin
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# Its own log: the summary of pytest that CI ends with is the one of `make test`.
+repeat() {
+    env "$1=$2" "$bin/python" -m pytest -q -n auto --dist loadfile -m "not slow" \
+        tests/physics tests/unit/buildings/test_building_peaks.py >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+    echo "$1=$2: the tests of the physics pass"
+}
+
+repeat NPY_DISABLE_CPU_FEATURES "$(PYTHONPATH=tests "$bin/python" -c 'import support.digests as d; print(*d.wide_features())')"
+if grep -qw avx2 /proc/cpuinfo 2>/dev/null; then repeat OPENBLAS_CORETYPE Haswell; fi
