@@ -118,7 +118,7 @@ static finding hot(const msfp_run *run, double h, double energy[NB], double peak
 {
     finding worst = { 0.0, 0.0, 0 };
     for (int j = 0; j < NB; ++j) {
-        const double lost = msfp_friction_power(run->parameters.surface[j], run->work.contact[j]).lost;
+        const double lost = msfp_heating(&run->parameters, &run->work, j);
         const double flux = run->options.monitor_heating[j] * lost;
         energy[j] = run->monitor.energy[j] + h * flux;
         peak[j] = fmax(run->monitor.peak[j], flux);
