@@ -52,6 +52,9 @@ stack.
   $-F_{top}, -M_{top}$. $F_E, M_E$ is the prescribed part of $F_{top}, M_{top}$.
 - $r_{s\gamma}, p_{s\gamma}$ are rim radius and rim offset of the slider of surface $\gamma$.
 - $S_{\psi_k}, C_{\psi_k}, S_{\theta_k}, C_{\theta_k}$ are sines and cosines of the angles of body $k$.
+- $E$ are energies [J], $D$ powers that are dissipated and $\dot{W}$ powers of the input [W]; those of friction are
+  $\dot{E}_f$, stored, $D_c$, dissipated by contact damping, $D_d$ by the drilling moment, and $D_f$ by the rest.
+- $c_n(s)$ are the Stumpff functions, $c_1(x^2) = \sin x/x$ and $c_2(x^2) = (1 - \cos x)/x^2$.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
 
 TITLES = {
@@ -68,6 +71,13 @@ TITLES = {
     "moment_to_world": "Moment about the sphere centre",
     "linear_balance": "Balance of linear momentum (3.26), (3.28): left side less right side",
     "angular_balance": "Balance of angular momentum (3.27), (3.29): left side less right side",
+    "friction_power": "Powers of friction: stored, dissipated by contact damping, dissipated by plastic slip",
+    "rim_energy": "Energy of a closed rim, and power that its damper dissipates",
+    "restraint": "Energy of the springs of the top, and the compression of the vertical one",
+    "top_power": "Powers at the top: of the load, of moving supports, of dampers",
+    "base_power": "Power of a rotating base",
+    "lock_power": "Power of the moment that locks the spin",
+    "rotation_angles": "Angles (2.1) of the rotation vector of an end of a two-port, with two derivatives",
 }
 
 

@@ -48,6 +48,16 @@ class Blocks:
     base_motion: Block
     energy: Block
     unilateral: Block
+    friction_power: Block
+    closed_rim: Block
+    rim_energy: Block
+    restraint: Block
+    top_power: Block
+    lock: Block
+    power: Block
+    turn: Block
+    rotation_angles: Block
+    axis_turn: Block
     coefficient: Block | None = None
     """The friction coefficient as an unknown, where it follows a law."""
 
@@ -245,9 +255,49 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)
         .scalar("grip", "-", "1 + damping share of the force; where it is not positive the contact is open")
         .scalar("stored", "J", "elastic energy")
-        .scalar("power", "W", "rate of the elastic energy")
+        .scalar("lost", "W", "power dissipated; where the contact lets go, what its spring releases")
         .build(),
     }
+
+
+def _powers(new: Maker, uplift: bool) -> dict[str, Block]:
+    """Energies of springs and powers of the energy balance."""
+    return {
+        "friction_power": new("friction_power")
+        .scalar("stored", "W", "stored and recoverable")
+        .scalar("damped", "W", "dissipated by contact damping")
+        .scalar("lost", "W", "dissipated by plastic slip and by the drilling moment")
+        .build(),
+        "closed_rim": new("closed_rim").scalar("g", "m", "gap (3.21)").scalar("dg", "m/s", "d gap/dt (2.102)").build(),
+        "rim_energy": new("rim_energy")
+        .scalar("stored", "J", "energy of the spring")
+        .scalar("lost", "W", "power dissipated by the damper")
+        .build(),
+        "restraint": new("restraint")
+        .scalar("stored", "J", "energy of the springs of the top")
+        .scalar("settlement", "m", "compression of its vertical spring")
+        .build(),
+        "top_power": new("top_power")
+        .scalar("load", "W", "power of the load, relative to the base")
+        .scalar("prescribed", "W", "power of the moving ends of the springs and dampers of a rig")
+        .scalar("support", "W", "power of a rotating support, and of the spring against spin")
+        .scalar("damped", "W", "power dissipated by the dampers")
+        .build(),
+        "lock": new("lock").scalar("moment", "N m", "axial moment that locks the spin").build(),
+        "power": new("power").scalar("power", "W", "power").build(),
+    }
+
+
+def _ends(new: Maker, uplift: bool) -> dict[str, Block]:
+    """Rotation of the end of a two-port, in space also where the model is planar."""
+    turn, angles = new("turn"), new("rotation_angles")
+    for order, per in enumerate(("", "/s", "/s^2")):
+        suffix = str(order or "")
+        turn.vector(f"r{suffix}", f"rad{per}", f"rotation vector, derivative {order} in time", (None, None, None))
+        for name in ("psi", "theta", "phi"):
+            angles.scalar(f"{name}{suffix}", f"rad{per}", f"{name}, derivative {order} in time")
+    axis = new("axis_turn").vector("w", "rad/s", "angular velocity of the axis of the support", (None, None, None))
+    return {"turn": turn.build(), "rotation_angles": angles.build(), "axis_turn": axis.build()}
 
 
 def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
@@ -268,7 +318,7 @@ def make_blocks(planar: bool, uplift: bool = False) -> Blocks:
     def new(name: str) -> BlockBuilder:
         return BlockBuilder(name, planar)
 
-    groups = (_parameters, _motion, _interfaces, _rims, _balances)
+    groups = (_parameters, _motion, _interfaces, _rims, _powers, _ends, _balances)
     blocks = {name: block for group in groups for name, block in group(new, uplift).items()}
     return Blocks(**blocks, **top_blocks(new))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, laws, seat, top
+from . import body, columns, contact, energy, laws, rotation, seat, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -71,9 +71,11 @@ def derive(spec: ModelSpec) -> Equations:
         top.foot(blocks),
         top.top_energy(blocks),
         contact.gap(blocks),
+        *energy.programs(blocks, effects.rims, effects.top_rotation),
+        rotation.rotation_angles(blocks),
     ]
     if effects.top_rotation:
-        programs.append(top.upright(blocks))
+        programs += [top.upright(blocks), rotation.axis_turn(blocks)]
     if effects.rims:
         programs.append(contact.rim(blocks))
     if effects.uplift:

@@ -26,6 +26,17 @@ class ArcTan2(sp.Function):  # type: ignore[misc]
         return (x if argindex == 1 else -y) / (x**2 + y**2)
 
 
+class Stumpff(sp.Function):  # type: ignore[misc]
+    """Stumpff function c_n(s), the sum over k of (-s)^k/(2k + n)!; c_1(x^2) = sin(x)/x."""
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 2) -> sp.Expr:
+        """(n c_(n+2) - c_(n+1))/2."""
+        n, s = self.args
+        return (n * Stumpff(n + 2, s) - Stumpff(n + 1, s)) / 2
+
+
 class Modulus(sp.Function):  # type: ignore[misc]
     """|x|, with the derivative +1 for positive x and -1 otherwise."""
 

@@ -33,6 +33,12 @@ DIFFERENTIATED = {
     "top_energy": False,
     "gap": True,
     "rim": False,
+    "friction_power": False,
+    "rim_energy": False,
+    "restraint": False,
+    "top_power": False,
+    "base_power": False,
+    "lock_power": False,
 }
 """Programs that are differentiated, and whether the block of their results is at hand where this is done."""
 

@@ -104,6 +104,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
         "ct": r"\cos\tilde{\theta}_{@}",
         "u": r"\tilde{u}_{@}",
         "v": r"\tilde{v}_{@}",
+        "drill": r"D_{d@}",
     },
     "report_contact": {"p": r"p_{@,#}", "M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}"},
     "top_parameters": {
@@ -128,6 +129,20 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "top_wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
     "rim": {"f": r"F_{c@,#}", "M": r"M_{c@,#}", "g": r"g_{@}", "dg": r"\dot{g}_{@}", "fc": r"F_{c@}"},
     "gap": {"s": r"s_{@}", "g": r"g_{@}"},
+    "base_motion": {"O": "u_{g#}", "U": r"\dot{u}_{g#}", "B": r"\ddot{u}_{g#}"},
+    "friction_power": {"stored": r"\dot{E}_{f@}", "damped": r"D_{c@}", "lost": r"D_{f@}"},
+    "closed_rim": {"g": r"g_{@}", "dg": r"\dot{g}_{@}"},
+    "rim_energy": {"stored": r"E_{c@}", "lost": r"D_{r@}"},
+    "restraint": {"stored": r"E_{@}", "settlement": r"s_{@}"},
+    "top_power": {"load": r"\dot{W}_{E}", "prescribed": r"\dot{W}_{g}", "support": r"\dot{W}_{R}", "damped": r"D_{@}"},
+    "turn": {"r": "r_{#}", "r1": r"\dot{r}_{#}", "r2": r"\ddot{r}_{#}"},
+    "rotation_angles": {
+        f"{name}{order or ''}": rf"\{dot}{{\{name}}}" if dot else rf"\{name}"
+        for order, dot in enumerate(("", "dot", "ddot"))
+        for name in ("psi", "theta", "phi")
+    },
+    "lock": {"moment": r"M^{\phi}_{@}"},
+    "power": {"power": r"\dot{W}_{@}"},
     "linear": {"r": r"\epsilon_{@,#}"},
     "angular": {"r": r"\eta_{@,#}"},
 }
@@ -155,6 +170,13 @@ PLACES: dict[str, dict[str, str]] = {
     "report_contact": {"par": r"\gamma", "x": r"\gamma", "f": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "foot": {"par": "T", "b": "n", "y": "T", "out": "T"},
     "top_wrench": {"par": "T", "y": "T", "b": "n", "x": "n", "fe": "E", "me": "E", "out": "n"},
+    "friction_power": {"par": r"\gamma", "c": r"\gamma", "out": r"\gamma"},
+    "rim_energy": {"par": r"\gamma", "rim": r"\gamma", "out": r"\gamma"},
+    "restraint": {"par": "T", "b": "n", "f": "T", "out": "T"},
+    "top_power": {"par": "T", "b": "n", "f": "T", "x": "n", "base": "g", "fe": "E", "me": "E", "out": "T"},
+    "base_power": {"b": "1", "base": "g", "f": "1", "m": "1", "out": "1"},
+    "lock_power": {"b": "k", "l": "k", "out": "k"},
+    "rotation_angles": {"t": "", "out": ""},
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
     "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
 }
@@ -162,8 +184,8 @@ PLACES: dict[str, dict[str, str]] = {
 KINDS = {
     ("surface_local", "rim"): "rim_force",
     ("moment_to_world", "loc"): "local_moment",
-    ("top_wrench", "fe"): "top_force",
-    ("top_wrench", "me"): "top_moment",
+    **{(name, "fe"): "top_force" for name in ("top_wrench", "top_power")},
+    **{(name, "me"): "top_moment" for name in ("top_wrench", "top_power")},
 }
 
 
@@ -179,6 +201,10 @@ class Latex(LatexPrinter):  # type: ignore[misc]
 
     def _print_ArcTan2(self, expr: sp.Function, exp: Any = None) -> str:
         return self._function("atan2", expr, exp)
+
+    def _print_Stumpff(self, expr: sp.Function, exp: Any = None) -> str:
+        text = rf"c_{{{expr.args[0]}}}\left({self._print(expr.args[1])}\right)"
+        return text if exp is None else rf"{text}^{{{exp}}}"
 
     def _print_Modulus(self, expr: sp.Function, exp: Any = None) -> str:
         return self._function("abs", expr, exp)

@@ -37,6 +37,9 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
     def _print_ArcTan2(self, expr: sp.Function) -> str:
         return f"msfp_angle({self._print(expr.args[0])}, {self._print(expr.args[1])})"
 
+    def _print_Stumpff(self, expr: sp.Function) -> str:
+        return f"msfp_stumpff({expr.args[0]}, {self._print(expr.args[1])})"
+
     def _print_Modulus(self, expr: sp.Function) -> str:
         return f"fabs({self._print(expr.args[0])})"
 

@@ -15,6 +15,7 @@ from typing import Any
 import sympy as sp
 
 from .blocks import Blocks
+from .functions import Step
 from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale
 
@@ -34,17 +35,17 @@ def _read_inputs(p: Program, b: Blocks) -> tuple[Symbols, Symbols, Vector]:
 def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Vector, s: Vector) -> Program:
     """Force ks depth (1 + cs d depth/dt) along `normal` (Hunt and Crossley 1975) with its moment and energies."""
     rate = p.rate(depth)
-    damping = p.let(par["cs"] * rate)
+    grip = p.let(1 + par["cs"] * rate)
     elastic = p.let(par["ks"] * depth)
-    force = p.let_vector(scale(p.let(elastic * (1 + damping)), normal), "F")
+    force = p.let_vector(scale(p.let(elastic * grip), normal), "F")
     p.write(
         b.unilateral,
         {
             "F": force,
             "T": cross(s, force),
-            "grip": 1 + damping,
+            "grip": grip,
             "stored": elastic * depth / 2,
-            "power": elastic * rate,
+            "lost": p.let(elastic * rate) * (Step(grip) * grip - 1),
         },
         tangents=("F", "T"),
     )

@@ -131,6 +131,18 @@ static inline double msfp_atan2(double y, double x)
     return copysign(x > 0.0 ? angle : 2.0 * MSFP_HALF_PI - angle, y);
 }
 
+/* Stumpff function c_n(s), the sum over k of (-s)^k/(2k + n)!, s < 10, n > 0: in nested form, from the last term that
+ * counts. */
+static inline double msfp_stumpff(int n, double s)
+{
+    double sum = 1.0, factorial = 1.0;
+    for (int k = s < 0.1 ? 8 : 20; k > 0; --k)
+        sum = 1.0 - s * sum / ((2 * k + n) * (2 * k + n - 1));
+    for (int k = 2; k <= n; ++k)
+        factorial *= k;
+    return sum / factorial;
+}
+
 /* ---- exponential, logarithm and what follows from them ---- */
 
 /* 0 below exp(-708), the least number that is not subnormal. */

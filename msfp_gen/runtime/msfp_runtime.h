@@ -129,8 +129,7 @@ typedef struct {
     double contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */
-    double rim_sum[MSFP_NB]; /* k_c gap + c_c dgap/dt of a closed gap [N]; positive where the damper would pull */
-    double rim_gap[MSFP_NB]; /* gap [m] of a closed rim, with uplift of every rim */
+    double rim_gap[MSFP_NB], rim_rate[MSFP_NB]; /* gap of a closed rim, with uplift of every rim, and its rate [m], [m/s] */
 #if MSFP_LAW
     double coefficient[MSFP_NB]
                       [MSFP_COEFFICIENT_SIZE]; /* mu on entry is the first guess of Newton's method; 0 will do */
@@ -225,9 +224,14 @@ typedef struct {
 
 /* Energies of the masses at the evaluation in `w`. */
 msfp_mechanical msfp_mechanical_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
+/* Parts of the power of the input [W]: of the load on the top plate, relative to the moving base; of everything that moves
+ * as prescribed, the base of the rig and a rotating base. */
+typedef struct {
+    double load, prescribed;
+} msfp_input_parts;
 /* Integrands [W] of the integrals `enum msfp_integral`. */
-void msfp_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w, const msfp_mechanical *mechanical,
-                 double power[MSFP_WORKS]);
+msfp_input_parts msfp_powers(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
+                             const msfp_mechanical *mechanical, double power[MSFP_WORKS]);
 /* Evaluate the equations at a state with given accelerations, and fill a row but for its time and integrals. */
 void msfp_observe(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_row *row);
 

@@ -44,7 +44,7 @@ void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
 {
     double along, across, *contact = w->unilateral[j];
     compression(w, j, &along, &across);
-    contact[MSFP_UNILATERAL_GRIP] = contact[MSFP_UNILATERAL_STORED] = contact[MSFP_UNILATERAL_POWER] = 0.0;
+    contact[MSFP_UNILATERAL_GRIP] = contact[MSFP_UNILATERAL_STORED] = contact[MSFP_UNILATERAL_LOST] = 0.0;
     if (msfp_compression(p, w, j) > 0.0) {
         if (inside(p->surface[j], along, across))
             msfp_unilateral_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);

@@ -134,8 +134,6 @@ int msfp_top_is_sprung(const msfp_parameters *p);
 double msfp_sprung_mass(const msfp_parameters *p);
 /* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
 void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage);
-/* Compression of that spring and its rate [m], [m/s]; 0 without one. */
-void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2]);
 #if MSFP_TOP_ROTATION
 /* Axis of the support of the top plate and its angular velocity, into the block `upright`. */
 void msfp_support_axis(const msfp_point *at, double *upright);
@@ -206,19 +204,12 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 
 /* ---- observe.c ---- */
 
-/* Powers of friction at one surface [W]: stored and recoverable, dissipated by contact damping, dissipated otherwise. */
-typedef struct {
-    double stored, damped, lost;
-} msfp_friction_powers;
-/* par, contact: blocks of the surface. */
-msfp_friction_powers msfp_friction_power(const double *par, const double *contact);
-/* Integrands of all integrals but friction stored and dissipated [W]. */
-void msfp_powers_without_friction(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
-                                  const msfp_mechanical *mechanical, double power[MSFP_WORKS]);
-/* Power of the load on the top plate, relative to the moving base [W]. */
-double msfp_load_power(const msfp_point *at, const msfp_work *w);
-/* Power of everything that moves as prescribed, a part of the input: the base of the rig and a rotating base [W]. */
-double msfp_prescribed_power(const msfp_parameters *p, const msfp_point *at, const msfp_work *w);
+/* Motion of the base as the block `base_motion`. */
+void msfp_base_motion(const msfp_point *at, double *base);
+/* Rim of surface j, whose gap is closed, as the block `closed_rim`. */
+void msfp_closed_rim(const msfp_work *w, int j, double *rim);
+/* Power that plastic slip and the drilling moment dissipate at surface j [W]. */
+double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j);
 /* Kinetic and potential energy and that of all springs but friction [J]. */
 double msfp_stored_energy(const msfp_parameters *p, const msfp_point *at, const msfp_work *w,
                           const msfp_mechanical *mechanical);

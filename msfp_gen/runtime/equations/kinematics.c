@@ -209,14 +209,6 @@ static void move_foot(const msfp_parameters *p, const double *stage, msfp_work *
     w->foot[MSFP_FOOT_Y2] = plate[MSFP_BODY_AZ];
 }
 
-void msfp_settlement(const msfp_parameters *p, const msfp_work *w, double settlement[2])
-{
-    const double *plate = w->body[NB];
-    const int sprung = msfp_top_is_sprung(p);
-    settlement[0] = sprung ? plate[MSFP_BODY_CZ] - w->foot[MSFP_FOOT_Y] : 0.0;
-    settlement[1] = sprung ? plate[MSFP_BODY_VZ] - w->foot[MSFP_FOOT_Y1] : 0.0;
-}
-
 void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
 {
     msfp_work w;

@@ -37,7 +37,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
 {
     memset(w->rim[j], 0, sizeof w->rim[j]);
     w->rim_active[j] = 0;
-    w->rim_sum[j] = 0.0;
+    w->rim_rate[j] = 0.0;
     w->rim_gap[j] = p->surface[j][MSFP_SURFACE_PARAMETERS_SC];
 #if MSFP_RIMS
     if (rim_is_clear(p, w, j))
@@ -52,9 +52,9 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
     } else
         msfp_rim(p->surface[j], x, out);
     w->rim_gap[j] = out[MSFP_RIM_G];
+    w->rim_rate[j] = out[MSFP_RIM_DG];
     if (MSFP_UPLIFT && out[MSFP_RIM_G] >= 0.0)
         return;
-    w->rim_sum[j] = out[MSFP_RIM_FC];
     if (out[MSFP_RIM_FC] < 0.0 || HELD(p, j)) { /* a rim only pushes: docs/model.md, choice 4 */
         memcpy(w->rim[j], out, sizeof out);
         w->rim_active[j] = 1;

@@ -233,12 +233,25 @@ MSFP_INLINE void msfp_get_polar(const double *block, msfp_columns *vector)
     for (int i = 0; i < MSFP_FORCE_SIZE; ++i)
         memcpy(vector[MSFP_PLANAR ? 2 * i : i], block + i * MSFP_COLUMNS, sizeof *vector);
 }
+/* The inverse. */
+MSFP_INLINE void msfp_put_polar(double *block, const msfp_columns *vector)
+{
+    for (int i = 0; i < MSFP_FORCE_SIZE; ++i)
+        memcpy(block + i * MSFP_COLUMNS, vector[MSFP_PLANAR ? 2 * i : i], sizeof *vector);
+}
 /* The same of an axial vector, which in the plane has E2 only. */
 MSFP_INLINE void msfp_get_axial(const double *block, msfp_columns *vector)
 {
     memset(vector, 0, 3 * sizeof *vector);
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
         memcpy(vector[MSFP_PLANAR ? 1 : i], block + i * MSFP_COLUMNS, sizeof *vector);
+}
+
+/* The inverse. */
+MSFP_INLINE void msfp_put_axial(double *block, const msfp_columns *vector)
+{
+    for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
+        memcpy(block + i * MSFP_COLUMNS, vector[MSFP_PLANAR ? 1 : i], sizeof *vector);
 }
 
 MSFP_INLINE int msfp_last_stage(const msfp_run *run)
@@ -261,6 +274,11 @@ void msfp_complete_columns(msfp_run *run, msfp_group *group);
 
 /* ---- power_columns.c, work_columns.c: works of the energy balance, where they are asked for ---- */
 
+/* Columns of the block `base_motion`. */
+void msfp_base_motion_columns(const msfp_point_columns *dat, double *dbase);
+/* Columns of energy and power of the rim of surface j [MSFP_RIM_ENERGY_SIZE][MSFP_COLUMNS]. */
+void msfp_rim_energy_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                             const msfp_work_columns *d, int j, double *energy);
 /* Columns of the powers at the evaluation in `w`, with all results of its contacts. */
 void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,

@@ -9,7 +9,7 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-enum { NB = MSFP_NB, C = MSFP_COLUMNS, FORCE = MSFP_FORCE_SIZE };
+enum { NB = MSFP_NB, C = MSFP_COLUMNS };
 
 /* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
  * centre, where its columns are zero. */
@@ -57,13 +57,8 @@ MSFP_COLUMNWISE void msfp_mechanical_columns(const msfp_parameters *p, const msf
 {
     double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C];
     msfp_columns one[MSFP_ENERGY_SIZE];
-    static const int first[3] = { MSFP_BASE_MOTION_OX, MSFP_BASE_MOTION_UX, MSFP_BASE_MOTION_BX };
-    msfp_base_motion_O_put(base, at->base[0]);
-    msfp_base_motion_U_put(base, at->base[1]);
-    msfp_base_motion_B_put(base, at->base[2]);
-    for (int order = 0; order < 3; ++order)
-        for (int i = 0; i < FORCE; ++i)
-            memcpy(dbase + (first[order] + i) * C, dat->base[order][MSFP_PLANAR ? 2 * i : i], C * sizeof *dbase);
+    msfp_base_motion(at, base);
+    msfp_base_motion_columns(dat, dbase);
     memset(energy, 0, MSFP_ENERGY_SIZE * sizeof *energy);
     for (int k = 1; k <= NB + 1; ++k) {
         if (k <= NB)
@@ -74,69 +69,13 @@ MSFP_COLUMNWISE void msfp_mechanical_columns(const msfp_parameters *p, const msf
     }
 }
 
-/* Settlement of the top and energy of its springs (restraint_energy of observe.c). */
-MSFP_INLINE void restraint(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                           const msfp_work *w, const msfp_work_columns *d, msfp_columns *row)
-{
-    const double *t = p->top, *dt = dp->top;
-    double C0[3], axis[3], anchor[3], held[3] = { 0.0, 0.0, 1.0 }, settlement[2];
-    msfp_columns dC[3], daxis[3], danchor[3];
-    msfp_body_C_get(w->body[NB], C0);
-    msfp_body_t3_get(w->body[NB], axis);
-    msfp_top_parameters_x0_get(t, anchor);
-    msfp_get_polar(d->body[NB] + MSFP_BODY_CX * C, dC);
-    msfp_get_polar(d->body[NB] + MSFP_BODY_T3X * C, daxis);
-    msfp_get_polar(dt + MSFP_TOP_PARAMETERS_X0X * C, danchor);
-#if MSFP_TOP_ROTATION
-    double upright[MSFP_UPRIGHT_SIZE];
-    msfp_support_axis(at, upright);
-    msfp_upright_e_get(upright, held);
-#else
-    (void)at;
-#endif
-    msfp_settlement(p, w, settlement);
-    for (int c = 0; c < C; ++c) {
-        double square = 0.0, dsquare = 0.0, lean = 0.0, dlean = 0.0;
-        for (int i = 0; i < 3; ++i) {
-            const double x = i < 2 ? C0[i] - anchor[i] : 0.0, dx = i < 2 ? dC[i][c] - danchor[i][c] : 0.0;
-            square += x * x;
-            dsquare += 2.0 * x * dx;
-            lean += 0.5 * (axis[i] - held[i]) * (axis[i] - held[i]);
-            dlean += (axis[i] - held[i]) * daxis[i][c];
-        }
-        const double sunk = msfp_top_is_sprung(p)
-                                ? d->body[NB][MSFP_BODY_CZ * C + c] - d->foot[MSFP_FOOT_Y * C + c]
-                                : 0.0;
-        row[MSFP_ROW_TOP_SETTLEMENT][c] = sunk;
-        row[MSFP_ROW_RESTRAINT][c] =
-            0.5 * (dt[MSFP_TOP_PARAMETERS_K * C + c] * square + t[MSFP_TOP_PARAMETERS_K] * dsquare) +
-            dt[MSFP_TOP_PARAMETERS_KR * C + c] * lean + t[MSFP_TOP_PARAMETERS_KR] * dlean +
-            0.5 * dt[MSFP_TOP_PARAMETERS_KV * C + c] * settlement[0] * settlement[0] +
-            t[MSFP_TOP_PARAMETERS_KV] * settlement[0] * sunk;
-    }
-}
-
-/* Energy of the spring of a closed rim, k_c gap^2/2 times the ratio of lever arms (rim_energy of observe.c). */
-MSFP_INLINE void rim_energy(const double *par, const double *dpar, double gap, const msfp_columns dgap, double *sum)
-{
-    const double k = par[MSFP_SURFACE_PARAMETERS_KC], R = par[MSFP_SURFACE_PARAMETERS_R];
-    const double offset = par[MSFP_SURFACE_PARAMETERS_PR], lever = 1.0 - offset / R;
-    for (int c = 0; c < C; ++c) {
-        const double dlever = (offset / R * dpar[MSFP_SURFACE_PARAMETERS_R * C + c] -
-                               dpar[MSFP_SURFACE_PARAMETERS_PR * C + c]) /
-                              R;
-        sum[c] += 0.5 * gap * gap * (dpar[MSFP_SURFACE_PARAMETERS_KC * C + c] * lever + k * dlever) +
-                  k * gap * dgap[c] * lever;
-    }
-}
-
 /* Quantities of surface j. */
 MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
                          const msfp_work_columns *d, int j, msfp_columns *row)
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
-    double sliding[MSFP_GAP_SIZE];
+    double sliding[MSFP_GAP_SIZE], rim[MSFP_RIM_ENERGY_SIZE * C];
     memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
     memset(angles[0], 0, sizeof *angles);
     memset(slip[1], 0, sizeof *slip);
@@ -159,15 +98,15 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
     msfp_get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
-    if (MSFP_RIMS && sliding[MSFP_GAP_G] < 0.0)
-        rim_energy(p->surface[j], dp->surface[j], sliding[MSFP_GAP_G], gap[MSFP_GAP_G], row[MSFP_ROW_RIM_STORED]);
+    msfp_rim_energy_columns(p, dp, w, d, j, rim);
+    msfp_add_columns(&row[MSFP_ROW_RIM_STORED], (const msfp_columns *)rim + MSFP_RIM_ENERGY_STORED, 1.0, 1);
 }
 
 MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                          const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
                                          const msfp_work_columns *d, msfp_columns *row)
 {
-    msfp_columns energy[MSFP_ENERGY_SIZE];
+    msfp_columns energy[MSFP_ENERGY_SIZE], stored[MSFP_RESTRAINT_SIZE];
     memset(row[MSFP_ROW_RIM_STORED], 0, sizeof *row); /* a sum; fields that the model lacks are zero from the start */
     memcpy(row + MSFP_ROW_Q, dat->q, sizeof dat->q);
     memcpy(row + MSFP_ROW_V, dat->v, sizeof dat->v);
@@ -186,7 +125,9 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
     msfp_get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
         memcpy(row[MSFP_ROW_TOP_MOMENT + (MSFP_PLANAR ? 1 : i)], d->moment[NB] + i * C, sizeof *row);
-    restraint(p, dp, at, w, d, row);
+    msfp_restraint_direction(p->top, w->body[NB], w->foot, dp->top, d->body[NB], d->foot, stored[0]);
+    memcpy(row[MSFP_ROW_RESTRAINT], stored[MSFP_RESTRAINT_STORED], sizeof *row);
+    memcpy(row[MSFP_ROW_TOP_SETTLEMENT], stored[MSFP_RESTRAINT_SETTLEMENT], sizeof *row);
     msfp_mechanical_columns(p, dp, at, dat, w, d, energy);
     memcpy(row[MSFP_ROW_KINETIC], energy[MSFP_ENERGY_KINETIC], sizeof *row);
     memcpy(row[MSFP_ROW_POTENTIAL], energy[MSFP_ENERGY_POTENTIAL], sizeof *row);

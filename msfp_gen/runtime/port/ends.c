@@ -5,132 +5,37 @@
  */
 #include <math.h>
 #include <string.h>
+#include "msfp_kernels.h"
 #include "port.h"
 
-/* ---- rotation vectors ---- */
+MSFP_STATIC_ASSERT(MSFP_TURN_SIZE == MSFP_ORDERS * 3 && MSFP_ROTATION_ANGLES_SIZE == MSFP_ORDERS * 3, orders_of_ends);
 
-/* A value with two derivatives with respect to time. */
-typedef struct {
-    double of[MSFP_ORDERS];
-} jet;
-
-static jet constant(double value) { return (jet){ { value, 0.0, 0.0 } }; }
-
-static jet sum(jet a, double factor, jet b)
-{
-    for (int i = 0; i < MSFP_ORDERS; ++i)
-        a.of[i] += factor * b.of[i];
-    return a;
-}
-
-static jet product(jet a, jet b)
-{
-    return (jet){ { a.of[0] * b.of[0], a.of[1] * b.of[0] + a.of[0] * b.of[1],
-                    a.of[2] * b.of[0] + 2.0 * a.of[1] * b.of[1] + a.of[0] * b.of[2] } };
-}
-
-/* Sum over k of (-s)^k/(2k + first)!: sin(x)/x with first = 1, (1 - cos x)/x^2 with first = 2, where s = x^2 < 10. */
-static jet series(jet s, int first)
-{
-    enum { TERMS = 20, SMALL = 8 };
-    static const double smallest = 0.1; /* below it the terms from SMALL on vanish */
-    double value = 0.0, rate = 0.0, second = 0.0;
-    for (int k = s.of[0] < smallest ? SMALL : TERMS; k > 0; --k) { /* a_(k-1) = 1 + factor s a_k, in nested form */
-        const double factor = -1.0 / ((2 * k + first) * (2 * k + first - 1));
-        second = factor * (second * s.of[0] + 2.0 * rate);
-        rate = factor * (rate * s.of[0] + (value + 1.0));
-        value = factor * s.of[0] * (value + 1.0);
-    }
-    const double scale = 1.0 / first;
-    value = (value + 1.0) * scale;
-    rate *= scale;
-    second *= scale;
-    return (jet){ { value, rate * s.of[1], second * s.of[1] * s.of[1] + rate * s.of[2] } };
-}
-
-/* Angle of the point (x, y). */
-static jet angle_of(jet y, jet x)
-{
-    const double turn = x.of[0] * y.of[1] - y.of[0] * x.of[1], square = x.of[0] * x.of[0] + y.of[0] * y.of[0];
-    const double dturn = x.of[0] * y.of[2] - y.of[0] * x.of[2], dsquare = 2.0 * (x.of[0] * x.of[1] + y.of[0] * y.of[1]);
-    return (jet){ { msfp_atan2(y.of[0], x.of[0]), turn / square, (dturn - turn * dsquare / square) / square } };
-}
-
-/* Angle between -pi/2 and pi/2 with that sine. */
-static jet angle_of_sine(jet sine)
-{
-    const double angle = msfp_asin(sine.of[0]), cosine = msfp_cos(angle), rate = sine.of[1] / cosine;
-    return (jet){ { angle, rate, (sine.of[2] + sine.of[0] * rate * rate) / cosine } };
-}
-
-/* The rotation matrix is cos(x) I + A [r]x + B r r^T with x = |r|. */
 void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_ORDERS][3])
 {
-    static const int next[3] = { 1, 2, 0 };
-    jet r[3], matrix[3][3], square = constant(0.0);
     int turned = 0;
     for (int i = 0; i < MSFP_ORDERS * 3; ++i)
         turned |= (&rotation[0][0])[i] != 0.0;
-    if (!turned) {
+    if (turned)
+        msfp_rotation_angles(&rotation[0][0], &angles[0][0]);
+    else
         memset(&angles[0][0], 0, MSFP_ORDERS * sizeof *angles);
-        return;
-    }
-    for (int i = 0; i < 3; ++i)
-        r[i] = (jet){ { rotation[0][i], rotation[1][i], rotation[2][i] } };
-    for (int i = 0; i < 3; ++i)
-        square = sum(square, 1.0, product(r[i], r[i]));
-    const jet A = series(square, 1), B = series(square, 2), cosine = sum(constant(1.0), -1.0, product(B, square));
-    for (int i = 0; i < 3; ++i) {
-        const int j = next[i], k = next[j];
-        const jet along = product(B, product(r[i], r[j])), across = product(A, r[k]);
-        matrix[i][i] = sum(cosine, 1.0, product(B, product(r[i], r[i])));
-        matrix[i][j] = sum(along, -1.0, across);
-        matrix[j][i] = sum(along, 1.0, across);
-    }
-    const jet found[3] = { angle_of(sum(constant(0.0), -1.0, matrix[1][2]), matrix[2][2]),
-                           angle_of_sine(matrix[0][2]),
-                           angle_of(sum(constant(0.0), -1.0, matrix[0][1]), matrix[0][0]) };
-    for (int order = 0; order < MSFP_ORDERS; ++order)
-        for (int i = 0; i < 3; ++i)
-            angles[order][i] = found[i].of[order];
 }
 
 #if MSFP_TOP_ROTATION
-/* Angular velocity of the axis at angles psi, theta, phi, from their rates, (3.12) without spin. */
-static void axis_turns(const double *angles, const double *rates, double turn[3])
-{
-    turn[0] = rates[0];
-    turn[1] = rates[1] * msfp_cos(angles[0]);
-    turn[2] = rates[1] * msfp_sin(angles[0]);
-}
-
-/* Rates of angles at the rates of the rotation vector, are linear in these; their derivatives with respect to the
- * rotation vector are the second derivatives of the angles on a straight path, in two directions at once. */
 void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3])
 {
-    double path[MSFP_ORDERS][3] = { { 0.0 } }, along[MSFP_ORDERS][3], sum[MSFP_ORDERS][3], difference[MSFP_ORDERS][3];
-    memcpy(path[0], rotation[0], sizeof path[0]);
-    memcpy(path[1], rotation[1], sizeof path[1]);
-    double angles[MSFP_ORDERS][3];
-    msfp_end_angles((const double(*)[3])path, angles);
-    const double sine = msfp_sin(angles[0][0]), cosine = msfp_cos(angles[0][0]);
-    for (int i = 0; i < 3; ++i) {
-        memset(path[1], 0, sizeof path[1]);
-        path[1][i] = 1.0;
-        msfp_end_angles((const double(*)[3])path, along);
-        axis_turns(along[0], along[1], turns[i]);
-        for (int k = 0; k < 3; ++k)
-            path[1][k] = rotation[1][k] + (k == i);
-        msfp_end_angles((const double(*)[3])path, sum);
-        for (int k = 0; k < 3; ++k)
-            path[1][k] = rotation[1][k] - (k == i);
-        msfp_end_angles((const double(*)[3])path, difference);
-        const double psi1 = 0.25 * (sum[2][0] - difference[2][0]), theta1 = 0.25 * (sum[2][1] - difference[2][1]);
-        const double turned = angles[1][1] * along[1][0];
-        derivatives[i][0] = psi1;
-        derivatives[i][1] = theta1 * cosine - turned * sine;
-        derivatives[i][2] = theta1 * sine + turned * cosine;
-    }
+    enum { VARIABLES = 6 }; /* the rotation vector and its rate */
+    double turn[MSFP_TURN_SIZE] = { 0.0 }, dturn[MSFP_TURN_SIZE * VARIABLES] = { 0.0 };
+    double w[MSFP_AXIS_TURN_SIZE], dw[MSFP_AXIS_TURN_SIZE * VARIABLES];
+    memcpy(turn, rotation, VARIABLES * sizeof *turn);
+    for (int i = 0; i < VARIABLES; ++i)
+        dturn[i * VARIABLES + i] = 1.0;
+    msfp_axis_turn_tangent(turn, w, dturn, dw);
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+            derivatives[i][k] = dw[k * VARIABLES + i];
+            turns[i][k] = dw[k * VARIABLES + 3 + i];
+        }
 }
 #endif
 

@@ -122,7 +122,7 @@ static void heat_flux(const msfp_run *run, const msfp_state *s, double flux[NB])
         const double *par = run->parameters.surface[j], reach = run->options.monitor_reach[j],
                      slid = par[MSFP_SURFACE_PARAMETERS_R] * msfp_hypot(s->q[j][0], s->q[j][1]);
         const double heating = reach > 0.0 && slid > reach ? 0.0 : run->options.monitor_heating[j];
-        flux[j] = heating > 0.0 ? heating * msfp_friction_power(par, run->work.contact[j]).lost : 0.0;
+        flux[j] = heating > 0.0 ? heating * msfp_heating(&run->parameters, &run->work, j) : 0.0;
     }
 }
 

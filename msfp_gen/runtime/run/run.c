@@ -39,13 +39,14 @@ static int solve_initial_state(msfp_run *run)
     msfp_friction_rates(&run->work, run->now.df);
     msfp_heat_initial_state(run);
     run->now.mechanical = msfp_mechanical_energy(&run->parameters, &at, &run->work);
-    msfp_powers(&run->parameters, &at, &run->work, &run->now.mechanical, run->now.power);
-    run->now.prescribed_power = msfp_prescribed_power(&run->parameters, &at, &run->work);
+    const msfp_input_parts parts =
+        msfp_powers(&run->parameters, &at, &run->work, &run->now.mechanical, run->now.power);
+    run->now.prescribed_power = parts.prescribed;
     msfp_energy_balance_begin(run, &at);
     memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
     run->have_unknowns = 0;
     run->restart = 1;
-    msfp_quasistatic_begin(run, &at);
+    msfp_quasistatic_begin(run, &at, parts.load);
     return msfp_check_state(run, &run->work, &run->now);
 }
 

@@ -150,8 +150,8 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
     memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);
     msfp_friction_rates(&run->work, s->df[i]);
     run->next.mechanical = msfp_mechanical_energy(&run->parameters, &s->now.at, &run->work);
-    msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]);
-    s->prescribed[i] = msfp_prescribed_power(&run->parameters, &s->now.at, &run->work);
+    s->prescribed[i] =
+        msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]).prescribed;
     msfp_heat_stage(run, i, s->now.beta);
     if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
         msfp_node *node = &run->node[run->node_count++];

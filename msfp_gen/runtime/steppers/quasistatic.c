@@ -32,13 +32,13 @@ static void store_state(msfp_step_history *to, const msfp_point *at, const msfp_
     }
 }
 
-void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_power)
 {
     run->step_history.h = run->step_history.span = 0.0;
     memset(run->step_history.jerk, 0, sizeof run->step_history.jerk);
     store_state(&run->step_history, at, &run->work);
     if (msfp_is_quasistatic(run)) /* the work of the load is summed separately */
-        run->now.power[MSFP_WORK_INPUT] -= msfp_load_power(at, &run->work);
+        run->now.power[MSFP_WORK_INPUT] -= load_power;
 }
 
 /* Q and beta with which q = Q + beta v is the end of the parabola through the last two states whose end slope is v. */
@@ -177,8 +177,9 @@ static void count_work(msfp_run *run, const msfp_stage *s, double h)
 {
     msfp_state *next = &run->next;
     next->mechanical = msfp_mechanical_energy(&run->parameters, &s->at, &run->work);
-    msfp_powers_without_friction(&run->parameters, &s->at, &run->work, &next->mechanical, next->power);
-    next->power[MSFP_WORK_INPUT] -= msfp_load_power(&s->at, &run->work);
+    const msfp_input_parts parts =
+        msfp_powers(&run->parameters, &s->at, &run->work, &next->mechanical, next->power);
+    next->power[MSFP_WORK_INPUT] -= parts.load;
     for (int e = 0; e < MSFP_WORKS; ++e)
         if (e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED)
             next->work[e] += 0.5 * h * (run->now.power[e] + next->power[e]) -
@@ -233,10 +234,11 @@ int msfp_step_quasistatic(msfp_run *run, double h, double *error)
     return MSFP_OK;
 }
 #else
-void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at)
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_power)
 {
     (void)run;
     (void)at;
+    (void)load_power;
 }
 
 double msfp_limit_step(const msfp_run *run, double h)

@@ -111,8 +111,9 @@ double msfp_limit_step(const msfp_run *run, double h);
 /* After a quasi-static step to a rim contact or release, where rates and powers have a kink: the next step is short and
  * takes nothing from the steps before. */
 void msfp_quasistatic_restart(msfp_run *run);
-/* Prepare quasi-static steps from a state without a step before it. */
-void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at);
+/* Prepare quasi-static steps from a state without a step before it. load_power: that of the load [W], whose work these steps
+ * sum from its displacement. */
+void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_power);
 
 /* ---- gradients ---- */
 

@@ -1148,6 +1148,216 @@ static inline void msfp_gap(const double *restrict par /* surface_parameters */,
     out[1] = out_3; /* g */
 }
 
+/* powers of friction at one surface.
+ * 13 operations; out: friction_power. */
+MSFP_INLINED
+static inline void msfp_friction_power(const double *restrict par /* surface_parameters */, const double *restrict c /* contact */, double *restrict out)
+{
+    const double par_mu = par[3];
+    const double par_dy = par[4];
+    const double par_td = par[5];
+    const double c_dY = c[1];
+    const double c_N = c[2];
+    const double c_Y = c[3];
+    const double c_u = c[6];
+    const double limit_1 = c_N*par_mu;
+    const double depth_2 = limit_1*par_dy;
+    const double s_3 = c_Y*c_dY*depth_2;
+    const double s_4 = (c_dY*c_dY)*depth_2*par_td;
+    const double s_5 = c_u*limit_1*(c_Y + c_dY*par_td);
+    const double out_6 = -s_3 - s_4 + s_5;
+    out[0] = s_3; /* stored */
+    out[1] = s_4; /* damped */
+    out[2] = out_6; /* lost */
+}
+
+/* energy stored in a closed rim, and power dissipated there.
+ * 16 operations; out: rim_energy. */
+MSFP_INLINED
+static inline void msfp_rim_energy(const double *restrict par /* surface_parameters */, const double *restrict rim /* closed_rim */, double *restrict out)
+{
+    const double par_R = par[1];
+    const double par_kc = par[6];
+    const double par_cc = par[7];
+    const double par_pr = par[9];
+    const double rim_g = rim[0];
+    const double rim_dg = rim[1];
+    const double lever_1 = 1 - par_pr/par_R;
+    const double spring_2 = par_kc*rim_g;
+    const double damper_3 = par_cc*rim_dg;
+    const double pushes_4 = msfp_heaviside(-damper_3 - spring_2);
+    const double out_5 = (1.0/2.0)*lever_1*rim_g*spring_2;
+    const double out_6 = lever_1*rim_dg*(damper_3*pushes_4 - spring_2*(1 - pushes_4));
+    out[0] = out_5; /* stored */
+    out[1] = out_6; /* lost */
+}
+
+/* energy of the springs of the top; compression of the vertical spring.
+ * 17 operations; out: restraint. */
+MSFP_INLINED
+static inline void msfp_restraint(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict f /* foot */, double *restrict out)
+{
+    const double par_k = par[0];
+    const double par_kr = par[2];
+    const double par_kv = par[10];
+    const double par_x0x = par[12];
+    const double b_t3x = b[2];
+    const double b_t3z = b[3];
+    const double b_Cx = b[8];
+    const double b_Cz = b[9];
+    const double f_y = f[0];
+    const double s_1 = b_Cz - f_y;
+    const double s_2 = (1.0/2.0)*(b_t3x*b_t3x) + (1.0/2.0)*((b_t3z - 1)*(b_t3z - 1));
+    const double out_3 = (1.0/2.0)*par_k*((b_Cx - par_x0x)*(b_Cx - par_x0x)) + par_kr*s_2 + (1.0/2.0)*par_kv*(s_1*s_1);
+    out[0] = out_3; /* stored */
+    out[1] = s_1; /* settlement */
+}
+
+/* powers of load, moving supports, spin and dampers at the top plate.
+ * 31 operations; out: top_power. */
+MSFP_INLINED
+static inline void msfp_top_power(const double *restrict par /* top_parameters */, const double *restrict b /* body */, const double *restrict f /* foot */, const double *restrict x /* coordinates */, const double *restrict base /* base_motion */, const double *restrict fe /* force */, const double *restrict me /* moment */, double *restrict out)
+{
+    const double par_k = par[0];
+    const double par_c = par[1];
+    const double par_cr = par[3];
+    const double par_m = par[4];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double par_x0x = par[12];
+    const double b_wpy = b[5];
+    const double b_Cx = b[8];
+    const double b_Cz = b[9];
+    const double b_Vx = b[10];
+    const double b_Vz = b[11];
+    const double f_y = f[0];
+    const double f_y1 = f[1];
+    (void)x;
+    const double base_Ux = base[0];
+    const double base_Uz = base[1];
+    const double fe_Fx = fe[0];
+    const double fe_Fz = fe[1];
+    const double me_My = me[0];
+    const double s_1 = b_wpy*me_My + fe_Fx*(b_Vx - base_Ux) + fe_Fz*(b_Vz - base_Uz);
+    const double s_2 = b_Vz - f_y1;
+    const double s_3 = par_cv*s_2 + par_kv*(b_Cz - f_y);
+    const double s_4 = 1 - msfp_heaviside(par_m - par_mz);
+    const double s_5 = base_Ux*(b_Vx*par_c + par_k*(b_Cx - par_x0x));
+    const double out_6 = base_Uz*s_3*s_4 + s_5;
+    const double out_7 = (b_Vx*b_Vx)*par_c + (b_wpy*b_wpy)*par_cr + par_cv*(s_2*s_2);
+    out[0] = s_1; /* load */
+    out[1] = out_6; /* prescribed */
+    out[2] = 0; /* support */
+    out[3] = out_7; /* damped */
+}
+
+/* power of a rotating base.
+ * 7 operations; out: power. */
+MSFP_INLINED
+static inline void msfp_base_power(const double *restrict b /* body */, const double *restrict base /* base_motion */, const double *restrict f /* force */, const double *restrict m /* moment */, double *restrict out)
+{
+    const double b_wpy = b[5];
+    const double b_Vx = b[10];
+    const double b_Vz = b[11];
+    const double base_Ux = base[0];
+    const double base_Uz = base[1];
+    const double f_Fx = f[0];
+    const double f_Fz = f[1];
+    const double m_My = m[0];
+    const double out_1 = b_wpy*m_My + f_Fx*(b_Vx - base_Ux) + f_Fz*(b_Vz - base_Uz);
+    out[0] = out_1; /* power */
+}
+
+/* power of the moment that locks the spin of a body.
+ * 0 operations; out: power. */
+MSFP_INLINED
+static inline void msfp_lock_power(const double *restrict b /* body */, const double *restrict l /* lock */, double *restrict out)
+{
+    (void)b;
+    (void)l;
+    out[0] = 0; /* power */
+}
+
+/* angles psi, theta, phi (2.1) of a rotation vector, with two derivatives in time.
+ * 439 operations; out: rotation_angles. */
+MSFP_INLINED
+static inline void msfp_rotation_angles(const double *restrict t /* turn */, double *restrict out)
+{
+    const double t_rx = t[0];
+    const double t_ry = t[1];
+    const double t_rz = t[2];
+    const double t_r1x = t[3];
+    const double t_r1y = t[4];
+    const double t_r1z = t[5];
+    const double t_r2x = t[6];
+    const double t_r2y = t[7];
+    const double t_r2z = t[8];
+    const double s_1 = (t_rx*t_rx) + (t_ry*t_ry) + (t_rz*t_rz);
+    const double s_2 = msfp_stumpff(1, s_1);
+    const double s_3 = msfp_stumpff(2, s_1);
+    const double s_4 = -s_1*s_3 + 1;
+    const double s_5 = s_3*(t_rx*t_rx) + s_4;
+    const double s_6 = s_2*t_rz - s_3*t_rx*t_ry;
+    const double s_7 = s_3*(t_rz*t_rz) + s_4;
+    const double s_8 = s_2*t_rx - s_3*t_ry*t_rz;
+    const double s_9 = (s_5*s_5) + (s_6*s_6);
+    const double s_10 = sqrt(s_9);
+    const double rate_11 = 2*t_r1x*t_rx + 2*t_r1y*t_ry + 2*t_r1z*t_rz;
+    const double rate_12 = rate_11*(-1.0/2.0*msfp_stumpff(3, s_1) + msfp_stumpff(4, s_1));
+    const double rate_13 = -rate_11*s_3 - rate_12*s_1;
+    const double rate_14 = rate_12*(t_rx*t_rx) + rate_13 + 2*s_3*t_r1x*t_rx;
+    const double rate_15 = rate_11*(-1.0/2.0*msfp_stumpff(2, s_1) + (1.0/2.0)*msfp_stumpff(3, s_1));
+    const double rate_16 = -rate_12*t_rx*t_ry + rate_15*t_rz + s_2*t_r1z - s_3*t_r1x*t_ry - s_3*t_r1y*t_rx;
+    const double rate_17 = 2*rate_14*s_5 + 2*rate_16*s_6;
+    const double s_18 = (1.0/2.0)*rate_17/s_10;
+    const double s_19 = s_8/s_10;
+    const double s_20 = s_7/s_10;
+    const double s_21 = msfp_angle(s_19, s_20);
+    const double rate_22 = -rate_12*t_ry*t_rz + rate_15*t_rx + s_2*t_r1x - s_3*t_r1y*t_rz - s_3*t_r1z*t_ry;
+    const double rate_23 = rate_22/s_10 - s_18*s_8/(s_10*s_10);
+    const double rate_24 = rate_12*(t_rz*t_rz) + rate_13 + 2*s_3*t_r1z*t_rz;
+    const double rate_25 = rate_24/s_10 - s_18*s_7/(s_10*s_10);
+    const double s_26 = rate_23*s_20 - rate_25*s_19;
+    const double s_27 = s_2*t_ry + s_3*t_rx*t_rz;
+    const double s_28 = msfp_angle(s_27, s_10);
+    const double rate_29 = rate_12*t_rx*t_rz + rate_15*t_ry + s_2*t_r1y + s_3*t_r1x*t_rz + s_3*t_r1z*t_rx;
+    const double s_30 = rate_29*s_10 - s_18*s_27;
+    const double s_31 = s_6/s_10;
+    const double s_32 = s_5/s_10;
+    const double s_33 = msfp_angle(s_31, s_32);
+    const double rate_34 = rate_16/s_10 - s_18*s_6/(s_10*s_10);
+    const double rate_35 = rate_14/s_10 - s_18*s_5/(s_10*s_10);
+    const double s_36 = rate_34*s_32 - rate_35*s_31;
+    const double rate_37 = 2*(t_r1x*t_r1x) + 2*(t_r1y*t_r1y) + 2*(t_r1z*t_r1z) + 2*t_r2x*t_rx + 2*t_r2y*t_ry + 2*t_r2z*t_rz;
+    const double rate_38 = (rate_11*rate_11)*((1.0/4.0)*msfp_stumpff(4, s_1) - 5.0/4.0*msfp_stumpff(5, s_1) + 2*msfp_stumpff(6, s_1)) + rate_37*(-1.0/2.0*msfp_stumpff(3, s_1) + msfp_stumpff(4, s_1));
+    const double rate_39 = (rate_11*rate_11)*((1.0/4.0)*msfp_stumpff(3, s_1) - 3.0/4.0*msfp_stumpff(4, s_1) + (3.0/4.0)*msfp_stumpff(5, s_1)) + rate_37*(-1.0/2.0*msfp_stumpff(2, s_1) + (1.0/2.0)*msfp_stumpff(3, s_1));
+    const double rate_40 = rate_12*(-t_r1y*t_rz - t_r1z*t_ry) + 2*rate_15*t_r1x - rate_38*t_ry*t_rz + rate_39*t_rx + s_2*t_r2x - s_3*t_r2y*t_rz - s_3*t_r2z*t_ry + t_r1y*(-rate_12*t_rz - s_3*t_r1z) + t_r1z*(-rate_12*t_ry - s_3*t_r1y);
+    const double rate_41 = -2*rate_11*rate_12 - rate_37*s_3 - rate_38*s_1;
+    const double rate_42 = 2*rate_12*t_r1x*t_rx + rate_38*(t_rx*t_rx) + rate_41 + 2*s_3*t_r2x*t_rx + t_r1x*(2*rate_12*t_rx + 2*s_3*t_r1x);
+    const double rate_43 = rate_12*(-t_r1x*t_ry - t_r1y*t_rx) + 2*rate_15*t_r1z - rate_38*t_rx*t_ry + rate_39*t_rz + s_2*t_r2z - s_3*t_r2x*t_ry - s_3*t_r2y*t_rx + t_r1x*(-rate_12*t_ry - s_3*t_r1y) + t_r1y*(-rate_12*t_rx - s_3*t_r1x);
+    const double rate_44 = 2*(rate_14*rate_14) + 2*(rate_16*rate_16) + 2*rate_42*s_5 + 2*rate_43*s_6;
+    const double rate_45 = -1.0/2.0*rate_17*s_18/(s_10*s_10) + (1.0/2.0)*rate_44/s_10;
+    const double rate_46 = -rate_22*s_18/(s_10*s_10) + rate_40/s_10 - rate_45*s_8/(s_10*s_10) + s_18*(-rate_22/(s_10*s_10) + 2*s_18*s_8/(s_10*s_10*s_10));
+    const double rate_47 = 2*rate_12*t_r1z*t_rz + rate_38*(t_rz*t_rz) + rate_41 + 2*s_3*t_r2z*t_rz + t_r1z*(2*rate_12*t_rz + 2*s_3*t_r1z);
+    const double rate_48 = -rate_24*s_18/(s_10*s_10) - rate_45*s_7/(s_10*s_10) + rate_47/s_10 + s_18*(-rate_24/(s_10*s_10) + 2*s_18*s_7/(s_10*s_10*s_10));
+    const double rate_49 = rate_46*s_20 - rate_48*s_19;
+    const double rate_50 = rate_12*(t_r1x*t_rz + t_r1z*t_rx) + 2*rate_15*t_r1y + rate_38*t_rx*t_rz + rate_39*t_ry + s_2*t_r2y + s_3*t_r2x*t_rz + s_3*t_r2z*t_rx + t_r1x*(rate_12*t_rz + s_3*t_r1z) + t_r1z*(rate_12*t_rx + s_3*t_r1x);
+    const double rate_51 = -rate_45*s_27 + rate_50*s_10;
+    const double rate_52 = -rate_16*s_18/(s_10*s_10) + rate_43/s_10 - rate_45*s_6/(s_10*s_10) + s_18*(-rate_16/(s_10*s_10) + 2*s_18*s_6/(s_10*s_10*s_10));
+    const double rate_53 = -rate_14*s_18/(s_10*s_10) + rate_42/s_10 - rate_45*s_5/(s_10*s_10) + s_18*(-rate_14/(s_10*s_10) + 2*s_18*s_5/(s_10*s_10*s_10));
+    const double rate_54 = rate_52*s_32 - rate_53*s_31;
+    out[0] = s_21; /* psi */
+    out[1] = s_28; /* theta */
+    out[2] = s_33; /* phi */
+    out[3] = s_26; /* psi1 */
+    out[4] = s_30; /* theta1 */
+    out[5] = s_36; /* phi1 */
+    out[6] = rate_49; /* psi2 */
+    out[7] = rate_51; /* theta2 */
+    out[8] = rate_54; /* phi2 */
+}
+
 /* rim contact (3.20)-(3.25); applied only while the force is compressive.
  * 57 operations; out: rim. */
 MSFP_INLINED

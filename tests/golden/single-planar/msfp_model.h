@@ -1336,7 +1336,7 @@ enum {
     MSFP_UNILATERAL_TY = 2, /* [N m] moment on the slider about its sphere centre, while it stands on its edge */
     MSFP_UNILATERAL_GRIP = 3, /* [-] 1 + damping share of the force; where it is not positive the contact is open */
     MSFP_UNILATERAL_STORED = 4, /* [J] elastic energy */
-    MSFP_UNILATERAL_POWER = 5, /* [W] rate of the elastic energy */
+    MSFP_UNILATERAL_LOST = 5, /* [W] power dissipated; where the contact lets go, what its spring releases */
     MSFP_UNILATERAL_SIZE = 6
 };
 static inline void msfp_unilateral_F_get(const double *block, double vector[3])
@@ -1368,9 +1368,239 @@ static inline double msfp_unilateral_stored(const double *block)
 {
     return block[4];
 }
-static inline double msfp_unilateral_power(const double *block)
+static inline double msfp_unilateral_lost(const double *block)
 {
     return block[5];
+}
+
+/* friction_power */
+enum {
+    MSFP_FRICTION_POWER_STORED = 0, /* [W] stored and recoverable */
+    MSFP_FRICTION_POWER_DAMPED = 1, /* [W] dissipated by contact damping */
+    MSFP_FRICTION_POWER_LOST = 2, /* [W] dissipated by plastic slip and by the drilling moment */
+    MSFP_FRICTION_POWER_SIZE = 3
+};
+static inline double msfp_friction_power_stored(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_friction_power_damped(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_friction_power_lost(const double *block)
+{
+    return block[2];
+}
+
+/* closed_rim */
+enum {
+    MSFP_CLOSED_RIM_G = 0, /* [m] gap (3.21) */
+    MSFP_CLOSED_RIM_DG = 1, /* [m/s] d gap/dt (2.102) */
+    MSFP_CLOSED_RIM_SIZE = 2
+};
+static inline double msfp_closed_rim_g(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_closed_rim_dg(const double *block)
+{
+    return block[1];
+}
+
+/* rim_energy */
+enum {
+    MSFP_RIM_ENERGY_STORED = 0, /* [J] energy of the spring */
+    MSFP_RIM_ENERGY_LOST = 1, /* [W] power dissipated by the damper */
+    MSFP_RIM_ENERGY_SIZE = 2
+};
+static inline double msfp_rim_energy_stored(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_rim_energy_lost(const double *block)
+{
+    return block[1];
+}
+
+/* restraint */
+enum {
+    MSFP_RESTRAINT_STORED = 0, /* [J] energy of the springs of the top */
+    MSFP_RESTRAINT_SETTLEMENT = 1, /* [m] compression of its vertical spring */
+    MSFP_RESTRAINT_SIZE = 2
+};
+static inline double msfp_restraint_stored(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_restraint_settlement(const double *block)
+{
+    return block[1];
+}
+
+/* top_power */
+enum {
+    MSFP_TOP_POWER_LOAD = 0, /* [W] power of the load, relative to the base */
+    MSFP_TOP_POWER_PRESCRIBED = 1, /* [W] power of the moving ends of the springs and dampers of a rig */
+    MSFP_TOP_POWER_SUPPORT = 2, /* [W] power of a rotating support, and of the spring against spin */
+    MSFP_TOP_POWER_DAMPED = 3, /* [W] power dissipated by the dampers */
+    MSFP_TOP_POWER_SIZE = 4
+};
+static inline double msfp_top_power_load(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_top_power_prescribed(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_top_power_support(const double *block)
+{
+    return block[2];
+}
+static inline double msfp_top_power_damped(const double *block)
+{
+    return block[3];
+}
+
+/* lock */
+enum {
+    MSFP_LOCK_MOMENT = 0, /* [N m] axial moment that locks the spin */
+    MSFP_LOCK_SIZE = 1
+};
+static inline double msfp_lock_moment(const double *block)
+{
+    return block[0];
+}
+
+/* power */
+enum {
+    MSFP_POWER_POWER = 0, /* [W] power */
+    MSFP_POWER_SIZE = 1
+};
+static inline double msfp_power_power(const double *block)
+{
+    return block[0];
+}
+
+/* turn */
+enum {
+    MSFP_TURN_RX = 0, /* [rad] rotation vector, derivative 0 in time */
+    MSFP_TURN_RY = 1, /* [rad] rotation vector, derivative 0 in time */
+    MSFP_TURN_RZ = 2, /* [rad] rotation vector, derivative 0 in time */
+    MSFP_TURN_R1X = 3, /* [rad/s] rotation vector, derivative 1 in time */
+    MSFP_TURN_R1Y = 4, /* [rad/s] rotation vector, derivative 1 in time */
+    MSFP_TURN_R1Z = 5, /* [rad/s] rotation vector, derivative 1 in time */
+    MSFP_TURN_R2X = 6, /* [rad/s^2] rotation vector, derivative 2 in time */
+    MSFP_TURN_R2Y = 7, /* [rad/s^2] rotation vector, derivative 2 in time */
+    MSFP_TURN_R2Z = 8, /* [rad/s^2] rotation vector, derivative 2 in time */
+    MSFP_TURN_SIZE = 9
+};
+static inline void msfp_turn_r_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_turn_r_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_turn_r1_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_turn_r1_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+static inline void msfp_turn_r2_get(const double *block, double vector[3])
+{
+    vector[0] = block[6];
+    vector[1] = block[7];
+    vector[2] = block[8];
+}
+static inline void msfp_turn_r2_put(double *block, const double vector[3])
+{
+    block[6] = vector[0];
+    block[7] = vector[1];
+    block[8] = vector[2];
+}
+
+/* rotation_angles */
+enum {
+    MSFP_ROTATION_ANGLES_PSI = 0, /* [rad] psi, derivative 0 in time */
+    MSFP_ROTATION_ANGLES_THETA = 1, /* [rad] theta, derivative 0 in time */
+    MSFP_ROTATION_ANGLES_PHI = 2, /* [rad] phi, derivative 0 in time */
+    MSFP_ROTATION_ANGLES_PSI1 = 3, /* [rad/s] psi, derivative 1 in time */
+    MSFP_ROTATION_ANGLES_THETA1 = 4, /* [rad/s] theta, derivative 1 in time */
+    MSFP_ROTATION_ANGLES_PHI1 = 5, /* [rad/s] phi, derivative 1 in time */
+    MSFP_ROTATION_ANGLES_PSI2 = 6, /* [rad/s^2] psi, derivative 2 in time */
+    MSFP_ROTATION_ANGLES_THETA2 = 7, /* [rad/s^2] theta, derivative 2 in time */
+    MSFP_ROTATION_ANGLES_PHI2 = 8, /* [rad/s^2] phi, derivative 2 in time */
+    MSFP_ROTATION_ANGLES_SIZE = 9
+};
+static inline double msfp_rotation_angles_psi(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_rotation_angles_theta(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_rotation_angles_phi(const double *block)
+{
+    return block[2];
+}
+static inline double msfp_rotation_angles_psi1(const double *block)
+{
+    return block[3];
+}
+static inline double msfp_rotation_angles_theta1(const double *block)
+{
+    return block[4];
+}
+static inline double msfp_rotation_angles_phi1(const double *block)
+{
+    return block[5];
+}
+static inline double msfp_rotation_angles_psi2(const double *block)
+{
+    return block[6];
+}
+static inline double msfp_rotation_angles_theta2(const double *block)
+{
+    return block[7];
+}
+static inline double msfp_rotation_angles_phi2(const double *block)
+{
+    return block[8];
+}
+
+/* axis_turn */
+enum {
+    MSFP_AXIS_TURN_WX = 0, /* [rad/s] angular velocity of the axis of the support */
+    MSFP_AXIS_TURN_WY = 1, /* [rad/s] angular velocity of the axis of the support */
+    MSFP_AXIS_TURN_WZ = 2, /* [rad/s] angular velocity of the axis of the support */
+    MSFP_AXIS_TURN_SIZE = 3
+};
+static inline void msfp_axis_turn_w_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_axis_turn_w_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
 }
 
 /* seed */

@@ -1,0 +1,152 @@
+"""Programs of the energy balance: energies of springs, and the powers whose integrals are the works of a run.
+
+Energies are relative to the frame that translates with the base (docs/model.md, choice 9).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from .blocks import Blocks
+from .functions import Step
+from .program import Program
+from .vectors import cross, dot, subtract
+
+Symbols = dict[str, Any]
+
+
+def friction_power(b: Blocks) -> Program:
+    """Powers of friction at one surface.
+
+    Friction stores mu N d_y |f|^2/2; a sheared contact with the damping time T dissipates mu N d_y T |df/dt|^2; plastic
+    slip and the drilling moment dissipate the rest. f: (Y, Z).
+    """
+    p = Program("friction_power", "powers of friction at one surface")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    c: Symbols = p.read(b.contact, "c", active=False)
+    limit = p.let((c if "mu" in c else par)["mu"] * c["N"], "limit")  # a friction law gives mu with the contact
+    depth, T = p.let(limit * par["dy"], "depth"), par["td"]
+    stored, damped, all_work = sp.Integer(0), sp.Integer(0), sp.Integer(0)
+    for f, rate, slip in ((c["Y"], c["dY"], c["u"]), (c["Z"], c["dZ"], c["v"])):
+        stored += p.let(depth * f * rate)
+        damped += p.let(depth * T * rate**2)
+        all_work += p.let(limit * (f + T * rate) * slip)
+    stored, damped = p.let(stored), p.let(damped)
+    p.write(
+        b.friction_power,
+        {"stored": stored, "damped": damped, "lost": all_work - stored - damped - c["drill"]},
+        tangents=False,
+    )
+    return p
+
+
+def rim_energy(b: Blocks) -> Program:
+    """Energy of the spring of a closed rim, and power that its damper dissipates.
+
+    The gap is measured at R (3.20), the force acts at R - p from the sphere centre (3.25), hence the ratio of lever
+    arms. Where the damper would pull, the rim exerts no force and the damper dissipates what the spring releases.
+    """
+    p = Program("rim_energy", "energy stored in a closed rim, and power dissipated there")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    rim: Symbols = p.read(b.closed_rim, "rim", active=False)
+    lever = p.let(1 - par["pr"] / par["R"], "lever")
+    spring, damper = p.let(par["kc"] * rim["g"], "spring"), p.let(par["cc"] * rim["dg"], "damper")
+    pushes = p.let(Step(-spring - damper), "pushes")  # (3.23) clamped: docs/model.md, choice 4
+    lost = (pushes * damper - (1 - pushes) * spring) * rim["dg"] * lever
+    p.write(b.rim_energy, {"stored": spring * rim["g"] * lever / 2, "lost": lost}, tangents=False)
+    return p
+
+
+def _top(p: Program, b: Blocks, rotating_support: bool) -> tuple[Symbols, Symbols, Symbols, Symbols]:
+    """Inputs of the programs of the top: parameters, plate, foot, and axis and angular velocity of the support."""
+    par: Symbols = p.read(b.top_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    foot: Symbols = p.read(b.foot, "f", active=False)
+    zero = sp.Integer(0)
+    fixed: Symbols = {"e": (zero, zero, sp.Integer(1)), "w": (zero, zero, zero)}
+    support: Symbols = p.read(b.upright, "u", active=False) if rotating_support else fixed
+    return par, body, foot, support
+
+
+def restraint(b: Blocks, rotating_support: bool) -> Program:
+    """Energy of the springs of the top, and the compression of the vertical one."""
+    p = Program("restraint", "energy of the springs of the top; compression of the vertical spring")
+    par, body, foot, support = _top(p, b, rotating_support)
+    x, y, _ = subtract(body["C"], par["x0"])
+    settlement = p.let(body["C"][2] - foot["y"])
+    tilted = subtract(body["t3"], support["e"])
+    lean = p.let(dot(tilted, tilted) / 2)  # 1 - t_3 . e, without cancellation at small tilt
+    stored = par["k"] * (x**2 + y**2) / 2 + par["kr"] * lean + par["kv"] * settlement**2 / 2
+    p.write(b.restraint, {"stored": stored, "settlement": settlement}, tangents=False)
+    return p
+
+
+def top_power(b: Blocks, rotating_support: bool) -> Program:
+    """Powers of the load on the top plate, of its supports, and of its dampers."""
+    p = Program("top_power", "powers of load, moving supports, spin and dampers at the top plate")
+    par, body, foot, support = _top(p, b, rotating_support)
+    coordinates: Symbols = p.read(b.coordinates, "x", active=False)
+    base: Symbols = p.read(b.base_motion, "base", active=False)
+    force: Symbols = p.read(b.vector, "fe", active=False)
+    moment: Symbols = p.read(b.moment, "me", active=False)
+    C, V, U, wp = body["C"], body["V"], base["U"], body["wp"]
+    load = p.let(dot(force["F"], subtract(V, U)) + dot(moment["M"], wp))
+    rig = sum(((par["k"] * (C[i] - par["x0"][i]) + par["c"] * V[i]) * U[i] for i in (0, 1)), sp.Integer(0))
+    sinking = p.let(V[2] - foot["y1"])
+    vertical = p.let(par["kv"] * (C[2] - foot["y"]) + par["cv"] * sinking)
+    fixed = p.let(1 - Step(par["m"] - par["mz"]))  # the vertical spring of a rig has a fixed end, that below a mass not
+    turning = p.let_vector(subtract(wp, support["w"]), "turning")
+    spin = p.let(-par["kr"] * coordinates["phi"] * dot(body["t3"], wp))
+    tilting = cross(support["e"], body["t3"])
+    held = [par["kr"] * tilting[i] + par["cr"] * turning[i] for i in range(3)]
+    damped = par["c"] * (V[0] ** 2 + V[1] ** 2) + par["cr"] * dot(turning, turning) + par["cv"] * sinking**2
+    p.write(
+        b.top_power,
+        {
+            "load": load,
+            "prescribed": p.let(rig) + fixed * vertical * U[2],
+            "support": spin - p.let(dot((held[0], held[1], held[2]), support["w"])),
+            "damped": damped,
+        },
+        tangents=False,
+    )
+    return p
+
+
+def base_power(b: Blocks) -> Program:
+    """Power of a rotating base, relative to the frame that translates with it."""
+    p = Program("base_power", "power of a rotating base")
+    body: Symbols = p.read(b.body, "b", active=False)
+    base: Symbols = p.read(b.base_motion, "base", active=False)
+    force: Symbols = p.read(b.vector, "f", active=False)
+    moment: Symbols = p.read(b.moment, "m", active=False)
+    power = dot(force["F"], subtract(body["V"], base["U"])) + dot(moment["M"], body["wp"])
+    p.write(b.power, {"power": power}, tangents=False)
+    return p
+
+
+def lock_power(b: Blocks) -> Program:
+    """Power of the moment that locks the spin of a body.
+
+    With locked spin a body still rotates about its axis, by psi' sin(theta): the moment does work of the order of the
+    tilt squared.
+    """
+    p = Program("lock_power", "power of the moment that locks the spin of a body")
+    body: Symbols = p.read(b.body, "b", active=False)
+    lock: Symbols = p.read(b.lock, "l", active=False)
+    p.write(b.power, {"power": lock["moment"] * dot(body["t3"], body["wp"])}, tangents=False)
+    return p
+
+
+def programs(b: Blocks, rims: bool, rotating_support: bool) -> list[Program]:
+    """All programs of the energy balance but the energies of masses."""
+    return [
+        friction_power(b),
+        *([rim_energy(b)] if rims else []),
+        restraint(b, rotating_support),
+        top_power(b, rotating_support),
+        base_power(b),
+        lock_power(b),
+    ]
