@@ -41,7 +41,11 @@ SURFACE = (  # of each surface, the lowest first
     Value("contact_damping", "s", "damping time T of the sheared contact"),
 )
 SURFACE_UPLIFT = (  # after those, in models with uplift
-    Value("seat_stiffness", "N/m", "stiffness of the unilateral contact; the top's contain those of all surfaces in series"),
+    Value(
+        "seat_stiffness",
+        "N/m",
+        "stiffness of the unilateral contact; the top's contain those of all surfaces in series",
+    ),
     Value("seat_damping", "s/m", "damping of the unilateral contact, over its stiffness and compression"),
 )
 TOP = (
