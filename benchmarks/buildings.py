@@ -2,7 +2,8 @@
 
 `python benchmarks/buildings.py` measures cost over the number of bearings, and a hundred bearings under a record of 60 s;
 `python benchmarks/buildings.py opensees` time and error beside OpenSees with its own triple pendulum (needs
-openseespy). The record is that of the preset ridgecrest-clc. Seconds are those of the processors; with two threads also
+openseespy); `python benchmarks/buildings.py ringing` what damping of the interfaces does to the dependence of rotations
+on the tolerance. The record is that of the preset ridgecrest-clc. Seconds are those of the processors; with two threads also
 those of the clock.
 """
 
@@ -223,11 +224,39 @@ def theirs(
     return found
 
 
+def ringing() -> None:
+    """Print how far rotations and accelerations of a slab differ between tolerances, by the damping of its springs."""
+    bearing = presets.bearing("prototype-tfp").replace(contact_damping=1e-4)
+    mass, vertical = 4 * 112e3 / bearing.gravity, 5e7
+    slab = Building.shear(BaseSlab(mass, (3 * mass, 3 * mass, 6 * mass), (0.4, 0.2)), [])
+    acceleration, _ = record(15.0)
+    motion = Motion.from_acceleration(np.arange(len(acceleration)) * 0.01, 0.3 * acceleration)
+    tolerances, reference = (1e-3, 1e-4), 1e-5
+    print("| damping ratio | rtol | rotation | rotational acceleration | acceleration | N |\n|---|---|---|---|---|---|")
+    for ratio in (0.0, 0.005, 0.01, 0.02, 0.05):
+        damping = 2 * ratio * np.sqrt(vertical * 0.25 * mass)
+        interface = Top.node(1e8, vertical, 1e7, 1e5, damping, 1e4)
+        places = ((3.0, 2.0), (-3.0, 2.0), (-3.0, -2.0), (3.0, -2.0))
+        bearings = [BuildingBearing(bearing, interface, place, effects=Effects()) for place in places]
+        scene = BuildingScene(slab, bearings, motion)
+        found = []
+        for rtol in (*tolerances, reference):
+            result, *_ = timed(replace(scene, solver=Solver(rtol=rtol)))
+            turning = [np.abs(result.node("base")[:, order, 3:5]).max(axis=0) for order in (0, 2)]
+            found.append((*turning, result.peaks.node_acceleration, result.peaks.axial_force))
+        for rtol, peaks in zip(tolerances, found[:-1], strict=True):
+            cells = [f"{np.abs(a - b).max() / np.abs(b).max():.1%}" for a, b in zip(peaks, found[-1], strict=True)]
+            print(f"| {ratio:.1%} | {rtol:g} | " + " | ".join(cells) + " |", flush=True)
+
+
 if __name__ == "__main__":
     options = parser(__doc__)
-    options.add_argument("table", nargs="?", choices=("scaling", "opensees"), help="only this one; default: scaling")
+    tables = ("scaling", "opensees", "ringing")
+    options.add_argument("table", nargs="?", choices=tables, help="only this one; default: scaling")
     chosen = options.parse_args().table
-    if chosen != "opensees":
+    if chosen == "ringing":
+        ringing()
+    elif chosen != "opensees":
         scaling()
     compared = chosen == "opensees" or (QUICK and chosen is None)
     if compared and installed("openseespy.opensees", "four bearings beside OpenSees"):

@@ -6,14 +6,15 @@ is drawn: stiff rims, no or high friction, loads near zero, sliders of a gram, m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top
 from msfp_gen.scene.parts import InitialState
-from msfp_gen.scene.top import MassTop, RigTop
+from msfp_gen.scene.standing import needed_rotational_stiffness
+from msfp_gen.scene.top import MassTop, RigTop, load_values
 
 Layers = tuple[int, int, int]
 # The models: layouts of 2 to 9 bodies, with every effect in some of them.
@@ -155,6 +156,17 @@ def a_top(draw: Draw, layout: Layers) -> Top:
     return Top.prescribed((0.0, 0.0, -load))
 
 
+def held_up(bearing: Bearing, top: Top) -> Top:
+    """The top; a spring against tilt that is too weak to hold the plate up is made twice as stiff as it must be."""
+    given = getattr(top, "rotational_stiffness", 0.0)
+    if not given:
+        return top
+    mass, height = (top.mass, top.height) if isinstance(top, MassTop) else (0.0, 0.0)
+    load = -float(load_values(top)[2])
+    needed = needed_rotational_stiffness(bearing, load, getattr(top, "stiffness", 0.0), mass, height)
+    return top if given > needed or needed == np.inf else replace(top, rotational_stiffness=2.0 * needed)
+
+
 def reach(bearing: Bearing) -> float:
     """Displacement that the outer surfaces allow without rim contact [m]."""
     ends = (bearing.surfaces[0], bearing.surfaces[-1])
@@ -219,7 +231,8 @@ def case(seed: int, number: int, short: bool = False) -> Case:
     draw = Draw(seed, number)
     layout, words = draw.one(SHORT if short else SPECS)
     effects = Effects(**words)
-    bearing, top = a_bearing(draw, layout, effects.friction), a_top(draw, layout)
+    bearing = a_bearing(draw, layout, effects.friction)
+    top = held_up(bearing, a_top(draw, layout))
     motion = a_motion(draw, bearing, effects)
     start = a_start(draw, bearing, top, effects)
     explicit = effects.sliders == "inertial" and not effects.uplift and draw.chance(0.2)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from msfp_gen.buildings.vibration import VerticalModes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
@@ -54,6 +55,8 @@ class _OnBearings(Protocol):
     def attachments(self) -> Array: ...
     @property
     def axial_loads(self) -> Array: ...
+    @property
+    def vertical_modes(self) -> VerticalModes: ...
 
 
 def select_effects(scene: _OnBearings) -> tuple[EffectSelection, ...]:
@@ -125,17 +128,13 @@ def _vertical_response(scene: _OnBearings, times: Array) -> Array:
 
     By superposition of modes, each with its share of the damping, exact for an acceleration that is linear in a step.
     """
-    from scipy.linalg import eigh
     from scipy.signal import cont2discrete, lfilter
 
     building, rows = scene.building, scene.attachments[:, 2]
     springs = np.array([each.interface.vertical_stiffness for each in scene.bearings])
     dampers = np.array([each.interface.vertical_damping for each in scene.bearings])
-    stiffness = building.stiffness + rows.T * springs @ rows
-    damping = building.damping + rows.T * dampers @ rows
-    squares, modes = eigh(stiffness, building.mass)
+    squares, modes, rates, _ = scene.vertical_modes
     part = -modes.T @ building.mass @ building.rigid_motions[:, 2]
-    rates = np.einsum("im,ij,jm->m", modes, damping, modes)
     ground = _ground(scene, scene.bearings[0]).acceleration(times)[:, 2]
     loads = np.zeros((len(times), len(rows)))
     for mode, square, rate, force in zip(modes.T, squares, rates, part, strict=True):
@@ -143,7 +142,7 @@ def _vertical_response(scene: _OnBearings, times: Array) -> Array:
         if abs(force) * np.abs(along).max() < SMALL * np.abs(building.mass @ mode).max():
             continue
         for weight, numerator in ((springs, [force]), (dampers, [force, 0.0])):
-            above, below, _ = cont2discrete((numerator, [1.0, rate, max(square, 0.0)]), STEP, "foh")
+            above, below, _ = cont2discrete((numerator, [1.0, rate, square]), STEP, "foh")
             loads -= np.outer(lfilter(above[0], below, ground), weight * along)
     return loads
 

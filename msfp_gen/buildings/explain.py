@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.buildings.effects import remaining_loads
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
+from msfp_gen.buildings.vibration import undamped
 from msfp_gen.common.fields import ruled_fields
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.scene import explain as one
+from msfp_gen.scene.plausibility import doubtful_values
+from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.opening import AnyScene
@@ -31,6 +34,7 @@ def explain_building(scene: BuildingScene) -> list[Table]:
         bearing_table(scene),
         *_kinds(scene),
         *_interfaces(scene),
+        *one.doubt_tables(_doubts(scene)),
         *map(one.motion_table, scene.grounds[0]),
         *effect_tables(scene),
         _solver(scene),
@@ -99,7 +103,11 @@ def grouped(bearings: Sequence[BuildingBearing]) -> list[tuple[BuildingBearing, 
 
 def _kinds(scene: BuildingScene) -> Iterator[Table]:
     for number, (kind, members) in enumerate(grouped(scene.bearings), start=1):
-        for table in (one.surface_table(kind.bearing), *one.doubt_tables(kind.bearing), one.body_table(kind.bearing)):
+        for table in (
+            one.surface_table(kind.bearing),
+            *one.doubt_tables(doubtful_values(kind.bearing)),
+            one.body_table(kind.bearing),
+        ):
             where = _numbers(members, len(scene.bearings))
             yield Table(f"kind {number}, {where}: {table.title}", table.columns, table.rows)
 
@@ -114,6 +122,14 @@ def _interfaces(scene: BuildingScene) -> Iterator[Table]:
             for name, rule, _ in ruled_fields(type(interface))
         ]
         yield Table(f"interface to the building, {_numbers(members, len(scene.bearings))}", (), rows)
+
+
+def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+    """Doubts about the interfaces; those of bearings stand with their kinds."""
+    for index, (each, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True)):
+        given, needed, _ = standing_below(each, load)
+        yield from unsteady(f"{scene.label(index)}: interface.rotational_stiffness", given, needed)
+    yield from undamped(scene, scene.vertical_modes)
 
 
 def _solver(scene: BuildingScene) -> Table:

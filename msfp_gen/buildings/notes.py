@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.buildings.scene import BuildingBearing, standing_below
+from msfp_gen.buildings.vibration import undamped
 from msfp_gen.results.monitor_notes import RISING
 from msfp_gen.results.note import Note
 from msfp_gen.scene.plausibility import doubtful_values
+from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.data import BuildingData
-    from msfp_gen.scene.bearing import Bearing
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
 GATHERED = ("heat", "law_speed", "law_load", "law_temperature")  # kinds
@@ -27,9 +29,10 @@ ENERGY = (
 def notes_of(result: BuildingData) -> tuple[Note, ...]:
     """The notes of a run in order of time. The text of each begins with the bearing that it is about."""
     scene = result.scene
-    found = [(i, note) for i, each in enumerate(scene.bearings) for note in value_notes(each.bearing)]
+    found = [(i, note) for i, each in enumerate(scene.bearings) for note in value_notes(each, scene.axial_loads[i])]
     named = [replace(note, text=f"{scene.label(i)}: {note.text}") for i, note in [*found, *_gathered(result.monitored)]]
-    return tuple(sorted([*named, *_energy(result)], key=lambda note: note.time))
+    whole = [Note(0.0, "value", *doubt) for doubt in undamped(scene, scene.vertical_modes)]
+    return tuple(sorted([*named, *whole, *_energy(result)], key=lambda note: note.time))
 
 
 def _gathered(notes: Sequence[tuple[int, Note]]) -> list[tuple[int, Note]]:
@@ -58,9 +61,11 @@ def _falling_value(pair: tuple[int, Note]) -> float:
     return -pair[1].value
 
 
-def value_notes(bearing: Bearing) -> tuple[Note, ...]:
-    """Notes about values that are hardly meant."""
-    return tuple(Note(0.0, "value", *doubt) for doubt in doubtful_values(bearing))
+def value_notes(each: BuildingBearing, load: float) -> tuple[Note, ...]:
+    """Notes about values that are hardly meant, of a bearing and its interface. load: at rest [N]."""
+    given, needed, _ = standing_below(each, load)
+    doubts = (*doubtful_values(each.bearing), *unsteady("interface.rotational_stiffness", given, needed))
+    return tuple(Note(0.0, "value", *doubt) for doubt in doubts)
 
 
 def _energy(result: BuildingData) -> Iterator[Note]:

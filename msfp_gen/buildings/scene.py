@@ -11,6 +11,7 @@ import numpy as np
 
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.effects import select_effects
+from msfp_gen.buildings.vibration import VerticalModes, vertical_modes
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.errors import InputError
@@ -19,6 +20,7 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.standing import check_standing, needed_rotational_stiffness
 from msfp_gen.scene.top import NodeTop
 from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
@@ -59,6 +61,14 @@ class BuildingBearing:
                 )
 
 
+def standing_below(each: BuildingBearing, load: float) -> tuple[float, float, float]:
+    """Rotational stiffness of an interface, that which its plate needs, and the load: see `scene/standing.py`.
+
+    The building, which holds no plate at its place, follows it sideways.
+    """
+    return each.interface.rotational_stiffness, needed_rotational_stiffness(each.bearing, float(load), 0.0), float(load)
+
+
 @dataclass(frozen=True, eq=False)
 class BuildingScene:
     """The complete input of the run of a building.
@@ -94,7 +104,8 @@ class BuildingScene:
         self._check_motion()
         if self.solver.method == "dopri5":
             raise InputError("solver.method = 'dopri5': the run of a building is implicit; give 'implicit'")
-        _ = self.axial_loads
+        for index, (each, load) in enumerate(zip(self.bearings, self.axial_loads, strict=True)):
+            check_standing(f"scene.bearings[{index}].interface.rotational_stiffness", *standing_below(each, load))
 
     @property
     def end(self) -> float:
@@ -188,6 +199,11 @@ class BuildingScene:
             if load <= 0:
                 raise InputError(f"scene.bearings[{index}].position: it carries {load:.4g} N at rest; move it [m]")
         return loads
+
+    @cached_property
+    def vertical_modes(self) -> VerticalModes:
+        """Modes of the building on the vertical springs and dampers of its interfaces."""
+        return vertical_modes(self)
 
     @cached_property
     def effect_selections(self) -> tuple[EffectSelection, ...]:

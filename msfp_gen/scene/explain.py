@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from msfp_gen.common.tables import Table, vector, yes
 from msfp_gen.scene.bearing import Surface
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, damping_share, quasistatic
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.plausibility import doubtful_values
+from msfp_gen.scene.plausibility import scene_doubts
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def explain(scene: Scene) -> list[Table]:
     """Tables that describe `scene`: bearing, motion, top, histories, effects with their meaning, friction, solver."""
     return [
         surface_table(scene.bearing),
-        *doubt_tables(scene.bearing),
+        *doubt_tables(scene_doubts(scene)),
         body_table(scene.bearing),
         motion_table(scene.motion),
         _top(scene.top),
@@ -88,9 +88,9 @@ def surface_table(bearing: Bearing) -> Table:
     return Table(title, ("surface", "concave", *SURFACE_COLUMNS), rows)
 
 
-def doubt_tables(bearing: Bearing) -> Iterator[Table]:
-    """Values of a bearing that are hardly meant; no table without them."""
-    rows = [(text,) for _, _, text in doubtful_values(bearing)]
+def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
+    """Values that are hardly meant, as of `plausibility.doubtful_values`; no table without them."""
+    rows = [(text,) for _, _, text in doubts]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)
 

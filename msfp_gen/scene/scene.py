@@ -17,6 +17,7 @@ from msfp_gen.scene.parts import InitialState, SceneParts, Stop
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
+from msfp_gen.scene.standing import check_standing, standing_of
 from msfp_gen.scene.top import NodeTop, Top
 from msfp_gen.specification import contract
 from msfp_gen.specification.friction_laws import HEAT_TIMES
@@ -46,6 +47,8 @@ class Scene(SceneParts):
         word, law = self.law
         check_bearing(law, word, self.bearing)
         check_seats(self.bearing, self.top, self.effects)
+        if standing := standing_of(self):
+            check_standing(*standing)
         if self.effects.rims is not False:
             self._check_rims()
         elif self.stop is not None and self.stop.all_rims:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.scene.effect_switching import JAM_STATUSES
+from msfp_gen.scene.standing import MARGIN, standing_of
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.specification.contract import STATUSES
 
@@ -63,6 +64,8 @@ def _state(scene: Scene, model: Model, run: Run) -> str:
     text = (
         f" (last state: tilts up to {tilt:.3g} rad, N {low:.3g} to {high:.3g} N, rims up to {row['rim'].max():.3g} N)"
     )
-    if top > OVERTURNED and not getattr(scene.top, "rotational_stiffness", 0.0):
-        text += f"; the top plate has tilted by {top:.2g} rad: give it a rotational_stiffness [N m/rad]"
+    standing = standing_of(scene)
+    if top > OVERTURNED and standing and standing[1] < MARGIN * standing[2]:
+        text += f"; the top plate has tilted by {top:.2g} rad: give it a rotational_stiffness of several times "
+        text += f"{standing[2]:.4g} N m/rad, with which it stands at rest"
     return text

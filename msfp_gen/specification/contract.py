@@ -47,7 +47,11 @@ SURFACE = (  # of each surface, the lowest first
     Value("contact_damping", Quantity("s", least=0.0), "damping time T of the sheared contact"),
 )
 SURFACE_UPLIFT = (  # after those, in models with uplift
-    Value("seat_stiffness", Quantity("N/m", above=0.0), "stiffness of the unilateral contact"),
+    Value(
+        "seat_stiffness",
+        Quantity("N/m", above=0.0),
+        "stiffness of the unilateral contact; the top's contain those of all surfaces in series",
+    ),
     Value(
         "seat_damping",
         Quantity("s/m", least=0.0),

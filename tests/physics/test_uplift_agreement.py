@@ -127,6 +127,21 @@ def test_a_rig_that_holds_its_height_has_one_force(stiffness, sway):
     assert normal < 2e-3 and force < 2e-3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_any_rig_that_holds_its_height_has_one_force(seed):
+    draw = np.random.default_rng(seed)
+    stiffness = 10 ** draw.uniform(7.5, 9.7)
+    scene = heaving(stiffness, np.sqrt(0.2 * draw.uniform(0.3, 1.0) * 112e3 / stiffness), Effects())
+    ratio, side, size = draw.uniform(0.0, 0.3), 10 ** draw.uniform(7.0, 9.0), draw.uniform(1.0, 2.0)
+    bearing = presets.bearing(draw.choice(["fenz-tfp", "double-fp"])).replace(contact_damping=1e-4)
+    bearing = bearing.replace(radius=[size * surface.radius for surface in bearing.surfaces])
+    damping = 2 * ratio * np.sqrt(stiffness * 11.4e3)
+    top = replace(scene.top, stiffness=side, rotational_stiffness=1e8, vertical_damping=damping)
+    normal, force = differences(replace(scene, bearing=bearing, top=top))
+    assert normal < 5e-3 and force < 5e-3
+
+
 def test_contacts_softer_than_the_top_are_refused():
     scene = heaving(1e9, 0.01, replace(PLANAR, uplift=True))
     soft = scene.bearing.replace(seat_stiffness=4e9)

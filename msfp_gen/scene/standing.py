@@ -1,0 +1,87 @@
+"""Whether the top plate of a bearing stands by itself: its rotational stiffness against load times lever.
+
+While all surfaces slide, friction is a force and no stiffness. To small tilts the stack is then a chain of links
+between the sphere centres of its surfaces: body k turns about that of its lower face and carries the load at that of
+its upper face, or at r_nn. Its potential energy is that of the load on links that lean, and of the springs of the top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.scene.top import MassTop, RigTop, load_values
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.scene.parts import SceneParts
+
+MARGIN = 2.0  # of the stiffness over what the load at rest needs, below which there is a note
+
+
+def links(bearing: Bearing) -> Array:
+    """Height of the upper sphere centre of bodies 2..n above the lower one; of the top plate: of r_nn, (n-1,) [m]."""
+    centres = np.array([sign * s.radius for sign, s in zip(bearing.layout.signs, bearing.surfaces, strict=True)])
+    heights = np.array([body.height for body in bearing.bodies])
+    lengths: Array = heights + np.append(centres[1:], 0.0) - centres
+    return lengths
+
+
+def needed_rotational_stiffness(
+    bearing: Bearing, load: float, stiffness: float, mass: float = 0.0, height: float = 0.0
+) -> float:
+    """Least rotational stiffness of the top with which the stack stands while its surfaces slide [N m/rad].
+
+    load: on the top plate at r_nn, without the weight of the mass [N]. stiffness: of the horizontal spring of the top
+    [N/m]. mass [kg], height [m]: supported, above r_nn. Not above 0: it stands by itself; infinite: a slider falls
+    over, whatever holds the plate.
+    """
+    lengths = links(bearing)
+    weights = bearing.gravity * np.array([body.mass for body in bearing.bodies])
+    carried = load + mass * bearing.gravity + np.append(np.cumsum(weights[:0:-1])[::-1], 0.0)
+    energy = np.diag(-carried * lengths) + stiffness * np.outer(lengths, lengths)
+    energy[-1, -1] -= mass * bearing.gravity * height
+    sliders, across = energy[:-1, :-1], energy[:-1, -1]
+    if len(sliders) and np.linalg.eigvalsh(sliders)[0] <= 0:
+        return np.inf
+    return float(across @ np.linalg.solve(sliders, across) - energy[-1, -1])
+
+
+def check_standing(path: str, given: float, needed: float, load: float) -> None:
+    """Raise InputError where a rotational stiffness that is given does not hold the plate up.
+
+    path: of the field in messages. given: its value, 0: none is given. needed: as of `needed_rotational_stiffness`.
+    load: on the plate [N].
+    """
+    if 0 < given <= needed < np.inf:
+        raise InputError(
+            f"{path} = {given:g}: while the surfaces slide, the top plate turns over under {load:.4g} N on a lever of "
+            f"{needed / load:.3g} m; give more than {needed:.4g} [N m/rad]"
+        )
+
+
+def unsteady(path: str, given: float, needed: float) -> Iterator[tuple[int, float, str]]:
+    """The doubt where a plate stands while friction holds it alone, or would turn over under `MARGIN` times its load.
+
+    Yields 0 (no surface), the value and the text, as `plausibility.doubtful_values`. Arguments as of `check_standing`.
+    """
+    if 0 < needed < np.inf and given < MARGIN * needed:
+        reason = f"the top plate turns over where N is {given / needed:.2g} times that at rest"
+        if given == 0:
+            reason = "nothing holds the top plate up, which turns over while the surfaces slide"
+        yield 0, given, f"{path} = {given:g}: {reason}; give more than {needed:.4g} [N m/rad], several times as much"
+
+
+def standing_of(scene: SceneParts) -> tuple[str, float, float, float] | None:
+    """Path, value given, value needed and load of the plate of a scene at its start; None: no spring could hold it."""
+    top, load = scene.top, -float(load_values(scene.top)[2])
+    if not isinstance(top, RigTop | MassTop):
+        return None
+    load -= 0.0 if scene.load is None else float(scene.load.evaluate(0.0)[2])
+    mass, height = (top.mass, top.height) if isinstance(top, MassTop) else (0.0, 0.0)
+    needed = needed_rotational_stiffness(scene.bearing, load, getattr(top, "stiffness", 0.0), mass, height)
+    return "top.rotational_stiffness", top.rotational_stiffness, needed, load + mass * scene.bearing.gravity
