@@ -287,7 +287,7 @@ def takes(rule: Rule | None) -> str:
     """What a key takes: a number with its unit and bounds, one of some words, a text, a list, or a table."""
     if isinstance(rule, Quantity):
         bounds = {">": rule.above, "≥": rule.least, "<": rule.below}
-        limits = "".join(f" {sign} {bound:g}" for sign, bound in bounds.items() if bound is not None)
+        limits = ",".join(f" {sign} {bound:g}" for sign, bound in bounds.items() if bound is not None)
         noun = "whole number" if rule.whole else "number"
         if rule.shape:
             noun = "list of " + " x ".join("any" if count is None else str(count) for count in rule.shape) + " numbers"

@@ -35,8 +35,8 @@ def generator(function=generate) -> ModuleType:
 
 
 def write_house(house: Path) -> Path:
-    """What the cache key reads: a specification, a generator, a template and a runtime."""
-    python = {f"{folder}/one.py": "1\n" for folder in ("specification", "generator")}
+    """What the cache key reads: rules of fields, a specification, a generator, a template and a runtime."""
+    python = dict.fromkeys(("common/fields.py", "specification/one.py", "generator/one.py"), "1\n")
     for name, text in {**python, "templates/one.jinja": "1\n", "runtime/unit.c": RUNTIME}.items():
         (house / name).parent.mkdir(parents=True, exist_ok=True)
         (house / name).write_text(text)

@@ -123,7 +123,7 @@ def test_a_state_that_no_bearing_has_is_not_entered():
     rest = start_run(rocking(None)).members[0]
     q, ends = np.zeros((4, 3)), np.zeros((2, 3, 6))
     assert rest.port.enter(1.0, q, q, np.zeros((4, 2)), ends) == "ok" and rest.port.time == 1.0
-    assert rest.port.enter(1.0, q * np.nan, q, np.zeros((4, 2)), ends) == "finite"
+    assert rest.port.enter(1.0, q * np.nan, q, np.zeros((4, 2)), ends) == "argument"
     assert rest.port.enter(np.inf, q, q, np.zeros((4, 2)), ends) == "argument"
     with pytest.raises(ValueError, match="q: needs 12 values"):
         rest.port.enter(1.0, np.zeros((4, 6)), q, np.zeros((4, 2)), ends)

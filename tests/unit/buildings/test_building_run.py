@@ -74,6 +74,27 @@ def test_a_checkpoint_of_another_building_is_refused(tmp_path):
         start_run(short).run.restore(b"x" * 100)
 
 
+def test_the_compiled_run_refuses_a_snapshot_of_another_building():
+    """Structure, motion, tolerance, end and bearings are in its identity; the number of threads is not."""
+    short = replace(EVENTFUL, duration=0.05)
+    begun = start_run(short)
+    begun.run.advance(5)
+    snapshot = begun.run.snapshot()
+    rougher = BEARING.replace(friction=0.08)
+    others = {
+        "structure": replace(short, building=frame(frequency=4.0)),
+        "motion": replace(short, motion=Motion.ramp(0.05, 1.0)),
+        "tolerance": replace(short, solver=replace(short.solver, rtol=2e-4)),
+        "end": replace(short, duration=0.06),
+        "bearing": replace(short, bearings=[replace(short.bearings[0], bearing=rougher), *short.bearings[1:]]),
+    }
+    for name, other in others.items():
+        with pytest.raises(ValueError, match="no snapshot of a run of this building"):
+            start_run(other).run.restore(snapshot)
+            pytest.fail(name)
+    start_run(short, threads=2).run.restore(snapshot)
+
+
 @pytest.mark.parametrize("threads", [0, 1.5, True, "two"])
 def test_a_wrong_number_of_threads_is_refused(threads):
     with pytest.raises(InputError, match=rf"threads = {threads!r}: give a whole number of at least 1"):

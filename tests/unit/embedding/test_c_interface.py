@@ -26,7 +26,7 @@ from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 
-LAW = "mu * (1 - c1 * exp(-c2 * v)) * (1 + c3 * exp(-N / 1e6))"
+LAW = "mu * (1 - c1 * exp(-c2 * v)) + c3 * tanh(c4 * N)"
 SLOW: dict[str, tuple[tuple[int, int, int], dict[str, Any], bool]] = {
     "planar and massless": ((3, 1, 1), {"dimension": "planar", "sliders": "massless"}, False),
     "uplift": ((3, 1, 1), {"uplift": True}, False),

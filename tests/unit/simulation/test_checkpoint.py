@@ -198,21 +198,24 @@ def test_no_damage_is_believed(saved: Path, tmp_path: Path) -> None:
     assert "damaged" in refusal(scene, path)
 
 
-HEADER = struct.Struct("<8s7Q")  # magic, version, sizes of a row and an event and the state, counts, checksum
+# Magic, version, sizes of a row and an event, identity, size of the state, counts, checksum.
+HEADER = struct.Struct("<8s8Q")
 
 
 def forged(snapshot: bytes, start: int, content: bytes, **changes: int) -> bytes:
-    """A snapshot with other content at a place of its body, and a checksum that fits; counts may be changed too."""
-    magic, version, row, event, state, rows, events, _ = HEADER.unpack_from(snapshot)
+    """A snapshot with other content at a place of its body, and a checksum that fits; of the header too."""
+    magic, version, row, event, identity, state, rows, events, _ = HEADER.unpack_from(snapshot)
     body = bytearray(snapshot[HEADER.size :])
     body[start : start + len(content)] = content
     total = 14695981039346656037
     for offset in range(0, len(body) - len(body) % 8, 8):
         total = ((total ^ int.from_bytes(body[offset : offset + 8], "little")) * 1099511628211) % 2**64
+        total ^= total >> 32
     for byte in body[len(body) - len(body) % 8 :]:
         total = ((total ^ byte) * 1099511628211) % 2**64
     rows, events, version = changes.get("rows", rows), changes.get("events", events), changes.get("version", version)
-    return HEADER.pack(magic, version, row, event, state, rows, events, total) + bytes(body)
+    identity = changes.get("identity", identity)
+    return HEADER.pack(magic, version, row, event, identity, state, rows, events, total) + bytes(body)
 
 
 def test_the_checksum_of_a_snapshot_is_the_one_computed_here(saved: Path) -> None:
@@ -223,7 +226,7 @@ def test_the_checksum_of_a_snapshot_is_the_one_computed_here(saved: Path) -> Non
 def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: Path) -> None:
     """Digest and checksum are right, the content is not: no number in it that counts or selects is out of range."""
     about, snapshot = checkpoint.read(saved)
-    _, _, row, _, size, rows, _, _ = HEADER.unpack_from(snapshot)
+    _, _, row, _, identity, size, rows, _, _ = HEADER.unpack_from(snapshot)
     dice, path = random.Random(7), tmp_path / "forged.ck"
     last_time = size + (rows - 1) * row
     contents = {
@@ -233,7 +236,8 @@ def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: P
         "rows that are not there": forged(snapshot, 0, b"", rows=rows + 1),
         "rows beyond any size": forged(snapshot, 0, b"", rows=2**61),
         "events that are not there": forged(snapshot, 0, b"", events=5),
-        "version": forged(snapshot, 0, b"", version=2),
+        "version": forged(snapshot, 0, b"", version=1),
+        "identity": forged(snapshot, 0, b"", identity=identity ^ 1),
         "a row out of time": forged(snapshot, size, struct.pack("<d", 1e9)),
         "a last row after the end": forged(snapshot, last_time, struct.pack("<d", 1e9)),
         "a row that is not finite": forged(snapshot, last_time, struct.pack("<d", float("nan"))),
@@ -249,14 +253,15 @@ def test_a_forged_snapshot_is_refused_before_it_is_used(saved: Path, tmp_path: P
 def test_a_byte_changed_anywhere_in_the_state_ends_no_process(saved: Path) -> None:
     """Refused, or a run goes on from it to a status: with the right checksum, whatever the byte is."""
     snapshot = checkpoint.read(saved)[1]
-    size, dice, ends = HEADER.unpack_from(snapshot)[4], random.Random(11), set()
+    size, dice, ends = HEADER.unpack_from(snapshot)[5], random.Random(11), set()
     scene = scene_of("fenz-test2", solver={"max_steps": 200})
     model = build_model(scene.bearing.layout, scene.modelled)
     for _ in range(60):
         place = dice.randrange(size)
         run = start_run(scene, model, scene.effect_selection, scene.end, None, ())[0]
         try:
-            run.restore(forged(snapshot, place, dice.randbytes(4)))
+            identity = HEADER.unpack_from(run.snapshot())[4]  # of fewer steps
+            run.restore(forged(snapshot, place, dice.randbytes(4), identity=identity))
         except ValueError:
             ends.add("refused")
             continue
