@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass, replace
 from math import pi
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
@@ -37,7 +37,7 @@ SAFETY = 1.5  # factor on the difference from the reference run, which has an er
 DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
-METHOD = "implicit"
+METHOD: Final = "implicit"
 
 
 @dataclass(frozen=True, eq=False)
