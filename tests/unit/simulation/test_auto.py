@@ -28,7 +28,7 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.result import Result
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
-from msfp_gen.scene.effect_switching import Ending, next_effects
+from msfp_gen.scene.effect_switching import REQUIRED_EFFECTS, Ending, _extended, all_effects, next_effects
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.scene.parts import InitialState, Stop
@@ -335,6 +335,28 @@ def test_the_note_of_heat_gives_the_peak(tmp_path: Any, monkeypatch: Any) -> Non
     with pytest.raises(RunError, match="interrupted"):
         simulate(scene, progress=stopping_at(6.0), checkpoint=tmp_path / "run.ck", every=0.0)
     assert note in simulate(scene, checkpoint=tmp_path / "run.ck", every=0.0, resume=True).notes
+
+
+def test_all_effects_are_all_that_monitors_may_add() -> None:
+    """Whatever was selected; what the scene fixes stays."""
+    for scene, friction in ((kumar(), "pvt"), (replace(TEST2, effects=Auto()), "constant")):
+        every = all_effects(scene)
+        assert every == Effects(friction=friction, uplift=True)
+        assert all_effects(with_selection(scene, dimension="planar", sliders="massless", rims=False)) == every
+        assert not any(_extended(scene, every, name) for name in REQUIRED_EFFECTS)
+    for given in ({"dimension": "planar"}, {"rims": False}, {"uplift": False}, {"friction": "pv"}, {"spin": "patch"}):
+        fixed = all_effects(replace(kumar(), effects=Auto(**given)))
+        assert fixed == Effects(**{"friction": "pvt", "uplift": True} | given)
+    assert all_effects(replace(kumar(), effects=Auto(sliders="massless"))) == Effects(
+        sliders="massless", friction="pvt"
+    )
+    law = "mu * (1 - c1 * exp(-c2 * v))"
+    bearing = TEST2.bearing.replace(c1=0.3, c2=50.0)
+    custom = all_effects(replace(TEST2, bearing=bearing, effects=Auto(friction_law=law)))
+    assert custom == Effects(friction="custom", friction_law=law, uplift=True)
+    assert all_effects(replace(TEST2, effects=FULL)) is FULL
+    turned = replace(TEST2, effects=Auto(), top_rotation=Rotation.ramp(theta=0.001, duration=60.0))
+    assert all_effects(turned).top_rotation
 
 
 # ---- going on -----------------------------------------------------------------------------------------

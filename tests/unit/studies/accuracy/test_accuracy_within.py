@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from dataclasses import replace
 
+import auto_scenes
 import numpy as np
 import pytest
+from support import ROOT
 
 from msfp_gen import (
     Auto,
@@ -23,6 +26,8 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.cli import main
+from msfp_gen.scene.effect_switching import all_effects
+from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.studies.accuracy import error_target, simulate_within, trial
 from msfp_gen.studies.accuracy.effects import with_all_effects
 from msfp_gen.studies.accuracy.error_target import CANDIDATE_TOLERANCES, largest_error
@@ -239,6 +244,57 @@ def test_selected_effects_are_compared_with_all_of_them():
     tight = run_native("implicit", replace(chosen(), effects=Effects()), 1e-8, 60.0, repeats=0)
     mine = run_native("implicit", found.result.scene, found.chosen.rtol, 60.0, repeats=0)
     assert largest_error(errors(mine, tight)) < 0.01
+
+
+def heating(cycles=3):
+    """The example that heats, its friction law left to selection."""
+    table = tomllib.loads((ROOT / "examples" / "heating.toml").read_text(encoding="utf-8"))
+    table["motion"]["cycles"] = cycles
+    return scene_from_table(table | {"effects": {"dimension": "planar"}, "output_step": 0.05})
+
+
+def test_the_reference_has_heat_where_the_surfaces_have_its_parameters():
+    """Without heat the example dissipates 1.6 times as much."""
+    scene = heating()
+    found = simulate_within(scene, 0.01)
+    tight = run_native("esdirk4", replace(scene, effects=all_effects(scene)), 1e-6, 60.0, repeats=0)
+    mine = run_native("implicit", found.result.scene, found.chosen.rtol, 60.0, repeats=0)
+    assert found.result.history.temperature.max() > 100.0
+    assert largest_error(errors(mine, tight)) <= found.estimate <= 0.01
+
+
+def test_uplift_that_opens_in_the_course_of_a_run_is_modelled_from_the_start(monkeypatch):
+    """A jolt of the base in resonance with a sprung mass; the selection foresees neither uplift nor heat."""
+    monkeypatch.setattr(error_target, "MOST_STEPS", 1000)  # the ringing is damped, and is not resolved
+    scene = replace(auto_scenes.demanding(21, 39), effects=Auto(dimension="planar"))
+    assert not scene.modelled.uplift and simulate(scene).provenance["model"].endswith("-uplift")
+    found = simulate_within(scene, 0.02)
+    assert found.result.scene.effects == all_effects(scene) and found.result.history.lift is not None
+    assert found.estimate <= 0.02 and "they leave an error" in found.reasons[0]
+
+
+def test_selected_effects_that_end_a_run_early_are_given_up(monkeypatch):
+    real = error_target.run_native
+
+    def failing(name, scene, rtol, limit, repeats):
+        found = real(name, scene, rtol, limit, repeats)
+        return replace(found, status="newton", message="no solution") if isinstance(scene.effects, Auto) else found
+
+    monkeypatch.setattr(error_target, "run_native", failing)
+    found = simulate_within(chosen(), 0.05)
+    assert found.result.scene.effects == all_effects(chosen()) and "ends early: no solution" in found.reasons[0]
+
+
+def test_reference_runs_that_fail_end_the_search(monkeypatch):
+    real = error_target.run_native
+
+    def failing(name, scene, rtol, limit, repeats):
+        found = real(name, scene, rtol, limit, repeats)
+        return replace(found, status="parted", message="a body is beside") if name == "esdirk4" else found
+
+    monkeypatch.setattr(error_target, "run_native", failing)
+    with pytest.raises(RunError, match="was not reached: a run with every effect fails: a body is beside"):
+        simulate_within(chosen(), 0.05)
 
 
 def test_effects_that_cannot_meet_the_target_are_given_up(monkeypatch):
