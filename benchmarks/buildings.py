@@ -111,11 +111,12 @@ def scaling() -> None:
         result, seconds, _ = timed(tower(count, pick(15.0, 1.0)))
         steps = result.counts["steps"]
         print(f"| {count} | {steps} | {seconds:.2f} | {1e6 * seconds / steps / count:.1f} |")
+    largest_count, duration = pick(100, 4), pick(60.0, 1.0)
     for threads in (1, 2):
-        result, seconds, clock = timed(tower(pick(100, 4), pick(60.0, 1.0)), threads)
+        result, seconds, clock = timed(tower(largest_count, duration), threads)
         largest = np.abs(result.bearing_displacement[:, :, :2]).max()
         print(
-            f"100 bearings, 60 s, threads {threads}: {result.counts['steps']} steps, {seconds:.1f} s of the processors, "
+            f"{largest_count} bearings, {duration:g} s, threads {threads}: {result.counts['steps']} steps, {seconds:.1f} s of the processors, "
             f"{clock:.1f} s of the clock; bearings {1e3 * largest:.0f} mm"
         )
 

@@ -26,7 +26,8 @@ REPEATS = pick(7, 1)
 
 def fixed(name: str, effects: Effects = FULL) -> Scene:
     """A preset scene with given effects."""
-    return replace(load_scene(name), effects=effects)
+    scene = replace(load_scene(name), effects=effects)
+    return pick(scene, replace(scene, duration=0.05 * scene.end))
 
 
 def solved(scene: Scene, method: str, rtol: float, step: float | None = None) -> Result:

@@ -9,6 +9,7 @@ their sliders: `python benchmarks/uplift.py`; with `agreement` the runs with and
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from quick import parser, pick
@@ -155,7 +156,7 @@ def row(name: str, closed: tuple[np.ndarray, np.ndarray], lifting: tuple[np.ndar
 def contacts() -> None:
     """Print the largest distance of a contact point from the axis of its slider, over the radius of the face."""
     print("\n| scene | largest offset over radius, surface by surface |\n|---|---|")
-    for name in presets.names("scene")[: pick(None, 2)]:
+    for name in islice(presets.names("scene"), pick(None, 2)):
         scene = load_scene(name)
         faces = scene.bearing.arrays()["rim_radius"][
             [scene.bearing.slider(j) for j in range(scene.bearing.layout.surfaces)]

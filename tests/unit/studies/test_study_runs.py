@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import random
 import threading
 import time
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
@@ -13,11 +14,12 @@ from typing import Any
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from support.damaged_files import flip, noise, zeros
 from support.study_tables import cheap_study, rows_of
 
 import msfp_gen
 from msfp_gen import InputError, RunError, simulate
-from msfp_gen.studies import load_study, study_status
+from msfp_gen.studies import load_study, read_study, study_status
 from msfp_gen.studies.study import run as running
 from msfp_gen.studies.study import worker
 
@@ -268,3 +270,22 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(InputError, match=r"output = .*file"):
         msfp_gen.study(cheap_study(), tmp_path / "file", threads=True)
+
+
+def test_a_damaged_part_is_an_error_that_says_so(tmp_path: Path) -> None:
+    """Bytes of its pages that were zeroed or changed, and a missing end: never other rows."""
+    msfp_gen.study(cheap_study(), tmp_path, threads=True, workers=1)
+    expected = read_study(tmp_path)
+    part = sorted(tmp_path.glob("part-*.parquet"))[1]
+    whole, refused = part.read_bytes(), 0
+    footer = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")
+    for seed in range(60):
+        content, dice = bytearray(whole[:footer]), random.Random(seed)
+        dice.choice([zeros, noise, flip])(content, dice)
+        part.write_bytes(content + whole[footer:] if seed % 10 else whole[: dice.randrange(len(whole))])
+        try:
+            assert read_study(tmp_path).equals(expected)
+        except InputError as error:
+            assert "a part of the study is damaged" in str(error)
+            refused += 1
+    assert refused >= 50
