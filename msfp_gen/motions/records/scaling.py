@@ -160,7 +160,11 @@ def prepared(
     `progress` reports the spectrum that `scale_to` needs, as of `response_spectrum`. Raises InputError.
     """
     require_type(record, Record, "record")
-    corrected = _corrected(record, start, duration, correct, corner, taper)
+    arguments = record, start, duration, correct, corner, taper
+    try:
+        corrected = _kept(*arguments)
+    except TypeError:  # what cannot be hashed is refused by the correction
+        corrected = _corrected(*arguments)
     if scale_to is None:
         return corrected, positive("scale", scale)
     if scale != 1:
@@ -169,14 +173,18 @@ def prepared(
     return replace(corrected, metadata=metadata), scale_to.factor(corrected, progress)
 
 
-@lru_cache(maxsize=8)  # records are equal only if they are the same
 def _corrected(
     record: Record, start: float | None, duration: float | None, correct: bool, corner: float, taper: float
 ) -> Corrected:
-    """The processed record, of which several scales are made."""
+    """The processed record."""
     if correct:
         return baseline_corrected(record, start=start, duration=duration, corner=corner, taper=taper)
     return uncorrected(record, start=start, duration=duration)
+
+
+_kept = lru_cache(maxsize=8)(
+    _corrected
+)  # for several scales of one record; records are equal only if they are the same
 
 
 def asce7_spectrum(period: ArrayLike, sds: float, sd1: float, long_period: float = 8.0) -> Array:

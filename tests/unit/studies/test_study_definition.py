@@ -198,6 +198,23 @@ def test_quantities_are_those_of_the_summary_the_characterisation_and_formulas()
     assert [column.unit for column in study.keep.columns()][:2] == ["N", "m"]
 
 
+def test_extremes_of_formulas_are_over_all_steps_where_a_run_records_them() -> None:
+    """With few rows; an extreme that no run records is that of the rows."""
+    text = {
+        "least_force": "least(normal_force_1)",
+        "force": "peak(top_force_E1)",
+        "far": "most(sliding_4)",
+        "tilt": "peak(tilt_2_psi)",
+    }
+    study = load_study(cheap_study(quantities=text, axes={}, sampling=None, keep=["minimum_normal_force_1"]))
+    few = simulate(replace(study.scene(1), output_step=2.0))
+    found, _ = study.keep.values(few, {})
+    assert found["least_force"] == found["minimum_normal_force_1"] < few.history.normal_force[:, 0].min()
+    assert found["force"] == few.summary["peak_top_force"]["E1"] > abs(few.history.top_force[:, 0]).max()
+    assert found["far"] == few.summary["peak_sliding"][3] >= few.history.sliding[:, 3].max()
+    assert found["tilt"] == abs(few.history.tilt_angles[:, 0, 0]).max()
+
+
 def test_what_a_run_does_not_have_is_none() -> None:
     keep = Keep(("peak_sliding", "peak_temperature"), (("one", "1 / (peak_sliding_1 * 0)"),), 6, ())
     found, _ = keep.values(simulate(load_scene("fenz-test1")), {})
