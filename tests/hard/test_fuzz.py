@@ -24,8 +24,8 @@ from msfp_gen.result import Result
 
 @pytest.fixture(scope="module")
 def short() -> dict[str, Any]:
-    """150 scenes of a few models, five of them held against the second method."""
-    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "150", "--seed", "7", "--check", "5"]
+    """90 scenes of a few models, three of them held against the second method."""
+    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "--scenes", "90", "--seed", "7", "--check", "3"]
     done = subprocess.run([*command, "--short"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout)
@@ -33,9 +33,9 @@ def short() -> dict[str, Any]:
 
 
 def test_every_scene_ends_right_or_with_a_name(short: dict[str, Any]) -> None:
-    assert short["scenes"] == sum(short["ends"].values()) == 150 and short["faults"] == []
-    assert short["sensible"] > 20 and short["sensible_failures"] == []
-    assert short["checked"] == 5 and short["largest_deviation"] <= 1.0
+    assert short["scenes"] == sum(short["ends"].values()) == 90 and short["faults"] == []
+    assert short["sensible"] > 10 and short["sensible_failures"] == []
+    assert short["checked"] == 3 and short["largest_deviation"] <= 1.0
 
 
 @pytest.mark.slow
@@ -103,6 +103,7 @@ def undamped(scene: Scene) -> Scene:
     return replace(scene, bearing=scene.bearing.replace(contact_damping=0.0))
 
 
+@pytest.mark.slow  # a layout of its own
 def test_no_step_goes_over_a_moment_without_a_solution() -> None:
     """A mass thrown against a rim; its normal force has no bound at 1.376 s. The default used to step over that and go
     on with 13 kJ where there had been 0.2 kJ. A run with a tolerance 300 times smaller ends there too."""

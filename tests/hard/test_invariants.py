@@ -73,7 +73,7 @@ def test_rows_between_steps_keep_to_the_friction_disc(layout: tuple[int, int, in
     assert np.linalg.norm(simulate(scene).history.friction_state, axis=2).max() < 1 + rtol
 
 
-@holds(6, 200, scene=scenes(law="isotropic"))
+@holds(6, 200, quick={"scene": scenes(law="isotropic", layouts=[(5, 2, 2)])}, scene=scenes(law="isotropic"))
 def test_energy_balances_with_the_isotropic_law(scene: Scene) -> None:
     run = run_of(scene)
     energy = run.history.energy

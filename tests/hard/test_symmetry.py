@@ -18,9 +18,9 @@ MIRRORS = {"E1-E3": np.diag([1.0, -1.0]), "E2-E3": np.diag([-1.0, 1.0])}
 
 
 @st.composite
-def spatial(draw, law: str = "report"):  # type: ignore[no-untyped-def]
+def spatial(draw, law: str = "report", layouts=LAYOUTS):  # type: ignore[no-untyped-def]
     """A stack led about within the reach of its outer surfaces, rows a hundredth of the run apart."""
-    layout = draw(st.sampled_from(LAYOUTS))
+    layout = draw(st.sampled_from(layouts))
     bearing = draw(bearings(layout))
     motion = draw(motions(0.9 * capacity(bearing)))
     top = Top.rig(LOAD, 1e8, 0.0, 0.0 if layout == (2, 1, 0) else 1e6)
@@ -71,7 +71,9 @@ def test_quarter_turn_holds_to_the_square_of_the_tilt(scene: Scene) -> None:
     assert worst < square + 2e-3
 
 
-@holds(4, 100, scene=spatial("isotropic"), angle=st.floats(0.1, 6.2))
+@holds(
+    4, 100, quick={"scene": spatial("isotropic", [(5, 2, 2)])}, scene=spatial("isotropic"), angle=st.floats(0.1, 6.2)
+)
 def test_any_turn_of_the_isotropic_law_holds_to_the_square_of_the_tilt(scene: Scene, angle: float) -> None:
     worst, square = apart(scene, turn(angle))
     assert worst < square + 2e-3
@@ -80,7 +82,7 @@ def test_any_turn_of_the_isotropic_law_holds_to_the_square_of_the_tilt(scene: Sc
 @pytest.mark.parametrize(("law", "exact"), [("report", False), ("isotropic", True)])
 def test_the_laws_differ_under_an_eighth_of_a_turn(law: str, exact: bool) -> None:
     """A path that stays small turns corners: the isotropic law turns with it to 1e-3, the report's does not."""
-    bearing = a_stack((3, 1, 1), [2.0, 2.0], yield_displacement=2e-3)
+    bearing = a_stack((5, 2, 2), [2.0, 0.6, 0.6, 2.0], yield_displacement=2e-3)
     motion = Motion.figure_eight(0.006, 1.0, cycles=1.0, lead_in=2.0)
     scene = Scene(bearing, motion, a_rig(), Effects(bouc_wen=law), Solver(rtol=1e-6), output_step=0.05)  # type: ignore[arg-type]
     assert (apart(scene, turn(np.pi / 4))[0] < 1e-3) == exact

@@ -105,12 +105,12 @@ def test_condensed_form_equals_the_reports(word: str, spin: str) -> None:
 
 
 EFFECTS: tuple[dict[str, str], ...] = ({}, {"dimension": "planar"}, {"bouc_wen": "isotropic"}, {"sliders": "massless"})
-OFTEN = {"velocity": "bouc_wen", "pvt": "dimension", "custom": "sliders"}  # each law with another effect
+OFTEN = {"pvt": "dimension", "custom": "sliders"}  # a law with an effect that changes its equations
 
 
 @pytest.mark.parametrize(
     ("word", "effects"),
-    thinned(product(LAWS, EFFECTS), lambda word, effects: not effects or OFTEN[word] in effects),
+    thinned(product(LAWS, EFFECTS), lambda word, effects: not effects or OFTEN.get(word) in effects),
     ids=str,
 )
 def test_tangent_of_a_stage_is_consistent(word: str, effects: dict[str, Any]) -> None:
@@ -254,7 +254,7 @@ def test_all_methods_agree() -> None:
 
 
 @pytest.mark.parametrize("solver", [{}, {"rtol": 1e-3}])
-@pytest.mark.parametrize("word", ["report", "isotropic"])
+@pytest.mark.parametrize("word", thinned(["report", "isotropic"], lambda word: word == "report"))
 def test_friction_that_grows_with_velocity_never_pushes(word: str, solver: dict[str, Any]) -> None:
     """With |slip| for the velocity this record stops: a light slider runs away while its surface unloads."""
     run = simulate(slowed(scene_of("ridgecrest-clc", {"bouc_wen": word}, solver, duration=16.0)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import scene_of
+from support import scene_of, thinned
 from support.stacks import a_stack
 
 from msfp_gen import (
@@ -30,8 +30,8 @@ RADIUS, HEIGHT, MU, OFFSET, WEIGHT, GRAVITY = 2.2, 0.1, 0.06, 0.08, 1e6, 9.8
 
 def pendulum(d_y: float, T: float) -> Bearing:
     """A single pendulum whose top plate is the slider."""
-    surface = Surface(RADIUS, 0.5, MU, d_y, contact_damping=T)
-    return Bearing(Layout(2, 1, 0), HEIGHT, [surface], [Body(0.1, 0.05, 200.0, (1.0, 2.0))], gravity=GRAVITY)
+    surface = Surface(RADIUS, 0.5, MU, d_y, 1e8, 1e3, contact_damping=T)
+    return Bearing(Layout(2, 1, 0), HEIGHT, [surface], [Body(0.1, 0.05, 200.0, (1.0, 2.0), 0.1)], gravity=GRAVITY)
 
 
 def off_centre(law: str, d_y: float, T: float, motion: Motion, **solver: Any) -> Scene:
@@ -39,7 +39,7 @@ def off_centre(law: str, d_y: float, T: float, motion: Motion, **solver: Any) ->
     angle = np.arcsin(OFFSET / RADIUS)
     held = float(np.tan(angle) / MU * (RADIUS - HEIGHT) / RADIUS)
     state = InitialState(q=((0.0, angle, 0.0),), v=((0.0, 0.0, 0.0),), h=((held, 0.0),))
-    effects, top = Effects(bouc_wen=law, rims=False), Top.mass(WEIGHT / GRAVITY, 1.0, 0.0)
+    effects, top = Effects(bouc_wen=law), Top.mass(WEIGHT / GRAVITY, 1.0, 0.0)
     settings = Solver(**{"rtol": 1e-4, **solver})
     return Scene(pendulum(d_y, T), motion, top, effects=effects, solver=settings, initial_state=state, output_step=0.05)
 
@@ -125,7 +125,7 @@ def test_explicit_and_implicit_method_agree(law: str) -> None:
         bearing,
         motion,
         Top.rig(1e5, 1e8, 1e3, 1e7, 1e4),
-        effects=Effects(bouc_wen=law, dimension="planar", rims=False),
+        effects=Effects(bouc_wen=law),
         output_step=0.01,
         solver=Solver(rtol=1e-6),
     )
@@ -134,7 +134,7 @@ def test_explicit_and_implicit_method_agree(law: str) -> None:
     assert distance(simulate(scene), explicit) < 2e-4
 
 
-@pytest.mark.parametrize("law", ["report", "plastic"])
+@pytest.mark.parametrize("law", thinned(["report", "plastic"], lambda law: law == "report"))
 def test_quasistatic_steps_equal_the_integrated_run(law: str) -> None:
     """Closed-form steps of a planar model without masses, with contact damping, against the implicit method."""
     effects = {"bouc_wen": law, "dimension": "planar", "sliders": "massless"}
@@ -163,7 +163,7 @@ def test_plastic_friction_is_along_the_slip() -> None:
 def test_a_run_that_creeps_says_so() -> None:
     """A Bouc-Wen law long stuck off the centre, and not a plastic one."""
     motion = Motion.harmonic(0.02 * 9.81 / (2 * np.pi) ** 2, 1.0, cycles=30, lead_in=10.0)
-    creeping, held = (simulate(off_centre(law, 5e-4, 1e-4, motion)) for law in ("isotropic", "plastic"))
+    creeping, held = (simulate(off_centre(law, 5e-4, 1e-4, motion)) for law in ("report", "plastic"))
     assert [note.kind for note in held.notes] == []
     (note,) = creeping.notes
     moved = float(np.ptp(creeping.history.sliding))

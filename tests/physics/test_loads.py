@@ -28,7 +28,7 @@ RIG = Top.rig(WEIGHT, stiffness=1e9, damping=1e3, rotational_stiffness=1e10, rot
 
 def double(**more: Any) -> Scene:
     """A double pendulum on a stiff rig."""
-    given = {"motion": PUSH, "top": RIG, "output_step": 0.05, **more}
+    given = {"motion": PUSH, "top": RIG, "output_step": 0.05, "effects": Auto(rims=True), **more}
     return Scene(presets.bearing("double-fp"), **given)
 
 
@@ -74,7 +74,7 @@ def test_a_planar_run_with_turning_plates_is_the_spatial_one() -> None:
     assert difference < 5e-3 * np.abs(full.history.top_force[:, 0]).max()
 
 
-@pytest.mark.parametrize("effects", [Auto(), Effects(top_rotation=True)], ids=["auto", "everything"])
+@pytest.mark.parametrize("effects", [Auto(rims=True), Effects(top_rotation=True)], ids=["auto", "everything"])
 def test_energy_closes_with_loads_and_turning_plates(effects: Auto | Effects) -> None:
     load = Load.harmonic((0.0, 0.0, 0.3 * WEIGHT), frequency=0.2, cycles=4)
     scene = double(

@@ -147,8 +147,13 @@ assert callable(providers.is_local_module_file)
 providers.is_local_module_file = lambda path: False  # type: ignore[assignment]
 
 
-def holds(few: int, many: int, **strategies: Any) -> Callable[[Callable[..., None]], Callable[[int], None]]:
-    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`."""
+def holds(
+    few: int, many: int, quick: dict[str, Any] | None = None, **strategies: Any
+) -> Callable[[Callable[..., None]], Callable[[int], None]]:
+    """A property as a test: `few` examples, always the same ones; `many` under the mark `slow`.
+
+    quick: strategies of the few, where those of the many need models that no other test builds.
+    """
 
     def wrap(check: Callable[..., None]) -> Callable[[int], None]:
         @pytest.mark.parametrize("examples", [few, pytest.param(many, marks=pytest.mark.slow)])
@@ -162,7 +167,8 @@ def holds(few: int, many: int, **strategies: Any) -> Callable[[Callable[..., Non
                 suppress_health_check=calm,
                 phases=[Phase.generate],
             )
-            profile(given(**strategies)(check))()
+            chosen = {**strategies, **(quick or {})} if examples == few else strategies
+            profile(given(**chosen)(check))()
 
         test.__name__, test.__doc__ = check.__name__, check.__doc__
         return test

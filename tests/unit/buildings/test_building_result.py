@@ -55,7 +55,7 @@ def test_summary_is_that_of_the_rows():
     weight = made().axial_loads.sum()
     assert s["weight"] == pytest.approx(weight, rel=1e-9)
     shear = np.hypot(*found.base_reaction[:, :2].T).max()
-    assert 1.05 * shear > s["peak_base_shear"]["radial"] >= shear
+    assert 1.05 * shear > s["peak_base_shear"]["radial"] > (1 - 1e-12) * shear  # sums in another order
     assert s["base_shear_ratio"] == s["peak_base_shear"]["radial"] / s["weight"]
     roof = found.node("floor 3")[:, 2, :2]
     assert s["floors"][3]["peak_acceleration"]["radial"] >= np.hypot(*roof.T).max()
@@ -148,11 +148,11 @@ def test_bearings_of_other_layouts_have_no_values_where_they_have_no_surface():
     from msfp_gen import presets
 
     given = made()
-    single = replace(given.bearings[0], bearing=presets.bearing("single-fp").replace(gravity=given.gravity))
-    found = simulate(replace(given, bearings=[single, *given.bearings[1:]], duration=0.1))
+    double = replace(given.bearings[0], bearing=presets.bearing("double-fp").replace(gravity=given.gravity))
+    found = simulate(replace(given, bearings=[double, *given.bearings[1:]], duration=0.1))
     values = found.dataset["sliding"].to_numpy()
-    assert np.isfinite(values[:, 0, 0]).all() and np.isnan(values[:, 0, 1:]).all() and np.isfinite(values[:, 1:]).all()
-    assert len(found.bearings[0].summary["peak_sliding"]) == 1
+    assert np.isfinite(values[:, 0, :2]).all() and np.isnan(values[:, 0, 2:]).all() and np.isfinite(values[:, 1:]).all()
+    assert len(found.bearings[0].summary["peak_sliding"]) == 2
 
 
 def test_a_failed_run_states_how_it_ended():
