@@ -144,8 +144,6 @@ int msfp_port_cause(msfp_port *port, int status);
 
 /* ---- ends.c: what a motion of the ends is to the equations ---- */
 
-/* Angles psi, theta, phi (2.1) of a rotation vector, with derivatives: both [order][3]. */
-void msfp_end_angles(const double rotation[MSFP_ORDERS][3], double angles[MSFP_ORDERS][3]);
 /* Motion of the base over a step of length h [s]. */
 void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *motion);
 /* Force on the top plate over a step: what the motion of end B adds to springs that are fixed horizontally where end B
@@ -157,12 +155,6 @@ void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_p
 #if MSFP_TOP_ROTATION
 /* Rotation psi, theta of end B over a step. */
 void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support);
-#endif
-
-#if MSFP_TOP_ROTATION
-/* Angular velocities [direction][3] of the axis of end B at unit rates of its rotation vector, and
- * derivatives of its present angular velocity by that vector. rotation [order][3]. */
-void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3]);
 #endif
 
 /* ---- derivatives.c ---- */
