@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from msfp_gen.jit.cache import MANIFEST_NAME, cache_root
+
+# Before NumPy is imported, here and in what the tests start: threads of BLAS in each of several processes wait for each
+# other's cores, and tests of spectra took ten times as long.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 _BEFORE = pytest.StashKey[set[str]]()
 

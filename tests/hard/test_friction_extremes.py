@@ -112,9 +112,12 @@ FRICTIONS = {
 }
 
 
-@pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS)
-def test_friction_however_spread_follows_the_reference(friction: list[float]) -> None:
-    assert off_the_reference(triple(friction=friction), rows=30) < 2e-3
+OFTEN = ("half everywhere", "inner 100 times outer", "three without")
+
+
+@pytest.mark.parametrize("kind", thinned(FRICTIONS, lambda kind: kind in OFTEN))
+def test_friction_however_spread_follows_the_reference(kind: str) -> None:
+    assert off_the_reference(triple(friction=FRICTIONS[kind]), rows=30) < 2e-3
 
 
 @pytest.mark.parametrize("start", [0.01, 0.5, 1.3])

@@ -117,6 +117,7 @@ def test_it_conforms_to_the_standard(unit: Path) -> None:
     assert objections(unit, 2) == []
 
 
+@pytest.mark.slow  # another unit to build
 def test_a_unit_for_co_simulation_alone_steps(unit: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is built without an archiver."""
     monkeypatch.setenv("AR", "no-such-ar")

@@ -54,6 +54,7 @@ def shaken(time: float) -> Array:
     return found
 
 
+@pytest.mark.slow  # another unit to build
 def test_a_supported_mass_lifts_off_and_lands(tmp_path: Path) -> None:
     """A unit for Co-Simulation alone. On the mean the contacts carry the weight, and none of them pulls."""
     scene = replace(mass(), effects=UPLIFT)
