@@ -65,13 +65,10 @@ typedef struct {
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
     double lanes[MSFP_SURFACE_PARAMETERS_SIZE][MSFP_LANES]; /* the parameters of the surfaces, [parameter][surface] */
     double top[MSFP_TOP_PARAMETERS_SIZE];
-    double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met */
+    double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met; 2: it holds the slider */
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
     double settlement_ratio;    /* compliance of spring and unilateral contacts over that of the spring alone */
     double weight;              /* of the moving bodies and the supported mass [N] */
-#if MSFP_GRADIENTS
-    int held_rim; /* surface, from 1, whose rim pulls too while a step to its release is differentiated; 0: none */
-#endif
 } msfp_parameters;
 
 /* Fill `p`. gravity [m/s^2]; bodies [MSFP_NB + 1][MSFP_BODY_VALUES]; surfaces [MSFP_NB][MSFP_SURFACE_VALUES];

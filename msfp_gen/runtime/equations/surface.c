@@ -18,18 +18,11 @@ static void rim_coordinates(const msfp_work *w, int j, double *x)
 #endif
 }
 
-#if MSFP_GRADIENTS
-#define HELD(p, j) ((p)->held_rim == (j) + 1)
-#else
-#define HELD(p, j) 0
-#endif
-
 /* Whether the rim of surface j needs no evaluation: comparing cosines of the tilt avoids an arc cosine. With uplift the
  * gap follows from the separation too. */
 static int rim_is_clear(const msfp_parameters *p, const msfp_work *w, int j)
 {
-    const double *body = w->body[j + 1];
-    return !MSFP_UPLIFT && !HELD(p, j) && msfp_body_cp(body) * body[MSFP_BODY_CT] > p->rim_cosine[j];
+    return !MSFP_UPLIFT && msfp_body_cp(w->body[j + 1]) * w->body[j + 1][MSFP_BODY_CT] > p->rim_cosine[j];
 }
 #endif
 
@@ -55,7 +48,8 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
     w->rim_rate[j] = out[MSFP_RIM_DG];
     if (MSFP_UPLIFT && out[MSFP_RIM_G] >= 0.0)
         return;
-    if (out[MSFP_RIM_FC] < 0.0 || HELD(p, j)) { /* a rim only pushes: docs/model.md, choice 4 */
+    const int held = MSFP_GRADIENTS && p->rim_cosine[j] > 1.0; /* while a step to its release is differentiated */
+    if (out[MSFP_RIM_FC] < 0.0 || held) { /* a rim only pushes: docs/model.md, choice 4 */
         memcpy(w->rim[j], out, sizeof out);
         w->rim_active[j] = 1;
     }

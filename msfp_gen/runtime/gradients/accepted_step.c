@@ -110,7 +110,8 @@ static int accepted_columns(msfp_run *run, int rim, int fixed)
             g->group[i].h[c] = fixed ? -g->group[i].now.t[c] : 0.0;
         step_columns(run, &g->group[i]);
     }
-    status = msfp_record_rows_columns(run);
+    if (run->row_count > g->row_count)
+        status = msfp_record_rows_columns(run);
     for (int i = 0; i < g->groups && rim >= 0; ++i) {
         msfp_columns dt;
         msfp_event_time_columns(run, &g->group[i], rim, dt);
@@ -130,7 +131,7 @@ static int take_step_to_event(msfp_run *run, int j, int meets)
         run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_KC] =
             run->parameters.surface[j][MSFP_SURFACE_PARAMETERS_CC] = 0.0;
     else
-        run->parameters.held_rim = j + 1;
+        run->parameters.rim_cosine[j] = 2.0; /* a rim that pulls too */
     for (int i = 0; i < 4 && fabs(gap) > tolerance; ++i) {
         const int status = msfp_step_implicit(run, h, &error);
         if (status)
