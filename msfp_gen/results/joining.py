@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,9 @@ class Joint:
         Number of rows of each segment.
     output_step
         Distance of rows [s]; rows at the end of a segment between them are left out. None: rows of every step.
+    before
+        Values of what only later models record, in the rows of earlier ones: name -> row. Others have their first
+        value.
 
     Attributes
     ----------
@@ -37,7 +41,14 @@ class Joint:
 
     """
 
-    def __init__(self, ends: Sequence[Ends], counts: Sequence[int], output_step: float | None = None) -> None:
+    def __init__(
+        self,
+        ends: Sequence[Ends],
+        counts: Sequence[int],
+        output_step: float | None = None,
+        before: Mapping[str, Array] = MappingProxyType({}),
+    ) -> None:
+        self._before = before
         self._first = [first for first, _ in ends]
         end = {name: values[0] for name, values in ends[0][1].energy.items()} if ends else {}
         self._added = [end]  # energies at the end of the segment before; those of the first are not used
@@ -59,11 +70,10 @@ class Joint:
         if len(self._first) == 1:
             return rows
         given, last = rows.arrays(), self._first[-1].arrays()
-        # What only later models record, such as temperature, has its first value before.
+        missing = {name: self._before.get(name, last[name][0]) for name in last if name not in given}
         columns: dict[str, Any] = dict.fromkeys(quantities())
-        columns |= {
-            name: given[name] if name in given else np.tile(last[name][0], (len(rows.time), 1)) for name in last
-        }
+        columns |= {name: given[name] for name in last if name in given}
+        columns |= {name: np.tile(value, (len(rows.time), 1)) for name, value in missing.items()}
         start = self._first[0]
         columns["displacement"] = rows.base_displacement - rows.top_displacement
         columns["displacement"] -= start.base_displacement[0] - start.top_displacement[0]
@@ -77,12 +87,14 @@ class Joint:
         return continued
 
 
-def joined(parts: Sequence[History], output_step: float | None = None) -> History:
+def joined(
+    parts: Sequence[History], output_step: float | None = None, before: Mapping[str, Array] = MappingProxyType({})
+) -> History:
     """The histories of consecutive segments as one; see `Joint`."""
     if len(parts) == 1:
         return parts[0]
     ends = [(taken(part, slice(0, 1)), taken(part, slice(-1, None))) for part in parts]
-    joint = Joint(ends, [len(part.time) for part in parts], output_step)
+    joint = Joint(ends, [len(part.time) for part in parts], output_step, before)
     return concatenated(
         [
             joint.continued(index, taken(part, slice(*rows)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending
+from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.monitors import monitor_options
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import load_values
@@ -135,6 +137,18 @@ def start_run(
         **options,
     )
     return run, frame.azimuth
+
+
+def start_temperatures(segments: Sequence[Segment], scene: Scene) -> dict[str, Array]:
+    """The temperature of every surface at the start [degC] as "temperature"; nothing if the last model has none.
+
+    It is that of the rows of earlier models without heat, and of the friction law in them.
+    """
+    law = segments[-1].model.effects.law
+    if law is None or not law.depends_on_temperature:
+        return {}
+    parameters = [law_parameters(law, scene.bearing, index) for index in range(scene.bearing.layout.surfaces)]
+    return {"temperature": np.array([each["start_temperature"] for each in parameters])}
 
 
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:

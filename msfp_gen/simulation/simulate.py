@@ -45,7 +45,7 @@ from msfp_gen.simulation.memory import outgrown, require_room
 from msfp_gen.simulation.notes import history_notes, landing_notes
 from msfp_gen.simulation.outcome import extremes_of, message_of, provenance_of
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
-from msfp_gen.simulation.segment import Segment, start_run
+from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
 from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
 from msfp_gen.simulation.streamed_rows import StreamedRows
 
@@ -207,9 +207,9 @@ class RunSequence:
 
         with_initial_row: record the initial state of a run that failed before its first row, if that state is finite.
         """
-        last, sprung = self.segments[-1], is_sprung(self.scene.top)
+        last = self.segments[-1]
         if self.stream is not None:
-            rows_on_disk = StreamedRows(self.segments, self.given.output_step, sprung)
+            rows_on_disk = StreamedRows(self.segments, self.given)
             if rows_on_disk.count:
                 return rows_on_disk.written(partial(_result, self), self.stream)
         if with_initial_row and not any(segment.run.row_count for segment in self.segments):
@@ -217,8 +217,9 @@ class RunSequence:
         parts = [(s, rows) for s in self.segments if len(rows := finite_rows(s.run.rows))]
         if not parts:
             raise RunError(message_of(self.scene, last), status=last.status)
+        sprung, before = is_sprung(self.given.top), start_temperatures(self.segments, self.given)
         histories = [history_of(segment.model, rows, segment.azimuth, sprung) for segment, rows in parts]
-        return _result(self, joined(histories, self.given.output_step))
+        return _result(self, joined(histories, self.given.output_step, before))
 
 
 def settle(scene: Scene) -> Scene:

@@ -18,23 +18,26 @@ from msfp_gen.results.joining import Joint, concatenated
 from msfp_gen.results.row_unpacking import finite_rows, history_of
 from msfp_gen.results.streaming import write_blocks
 from msfp_gen.results.thinning import blocks, thinned
+from msfp_gen.scene.top import is_sprung
+from msfp_gen.simulation.segment import Segment, start_temperatures
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
-    from msfp_gen.simulation.segment import Segment
+    from msfp_gen.scene.scene import Scene
 
 
 class StreamedRows:
     """The rows of all segments of a run, those in files and the last ones that the runs hold.
 
-    output_step: of the scene. sprung: whether the top has a vertical spring. Without a row, `count` is 0.
+    Without a row, `count` is 0.
     """
 
-    def __init__(self, segments: Sequence[Segment], output_step: float | None, sprung: bool) -> None:
-        parts = [_SegmentRows(segment, sprung) for segment in segments if segment.run.row_count]
+    def __init__(self, segments: Sequence[Segment], scene: Scene) -> None:
+        parts = [_SegmentRows(segment, is_sprung(scene.top)) for segment in segments if segment.run.row_count]
         self._parts = [part for part in parts if part.count]
         ends = [(part.history(0, 1), part.history(part.count - 1, part.count)) for part in self._parts]
-        self._joint = Joint(ends, [part.count for part in self._parts], output_step)
+        before = start_temperatures(segments, scene)
+        self._joint = Joint(ends, [part.count for part in self._parts], scene.output_step, before)
 
     @property
     def count(self) -> int:
