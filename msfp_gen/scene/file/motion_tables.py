@@ -179,9 +179,6 @@ class RecordMotion(MotionTable):
     def _motion(self) -> Motion:
         from msfp_gen.motions.records import ScaleTo
 
-        if (self.file is None) == (self.bundled is None):
-            found = "neither is" if self.file is None else "both are"
-            raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
         source = self.bundled or _digests(self.files)
         record = _records.value(fingerprint((source, self.components, self.rotated_by)), self._record)
         target = None if self.scale_to is None else ScaleTo(**self.scale_to)
@@ -191,6 +188,9 @@ class RecordMotion(MotionTable):
     @property
     def files(self) -> tuple[Path, ...]:
         """The files of the record; none where it comes with the package."""
+        if (self.file is None) == (self.bundled is None):
+            found = "neither is" if self.file is None else "both are"
+            raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
         return tuple(_existing(file) for file in ([self.file] if isinstance(self.file, str) else self.file or ()))
 
     def _record(self) -> Record:
