@@ -16,7 +16,7 @@ from msfp_gen.motions.time_grid import TIME_TOLERANCE, Resolution, TimeGrid, dis
 from msfp_gen.result import Result
 from msfp_gen.simulation.segment import time_grid
 
-PLANAR = Effects(dimension="planar", sliders="massless", rims=False)
+PLANAR = Effects(dimension="planar", sliders="massless")
 RIG = Top.rig(112e3, stiffness=1e6, damping=5.0, rotational_stiffness=1e6)
 
 

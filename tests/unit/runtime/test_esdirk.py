@@ -78,7 +78,7 @@ def pendulum(method, step):
         bearing=replace(bearing, surfaces=[surface]),
         motion=Motion.harmonic(0.2, 0.05, cycles=1.0),
         top=Top.mass(1e5, 1e3, 0.5),
-        effects=Effects(dimension="planar", rims=False),
+        effects=Effects(dimension="planar"),
         solver=Solver(method=method, rtol=1e-9, atol_angle=10.0, max_step=step, first_step=step),
         duration=4.0,
     )

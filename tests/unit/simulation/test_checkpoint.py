@@ -132,7 +132,7 @@ def refusal(scene: Scene, path: Path, **options: Any) -> str:
         ({}, {"rtol": 2e-4}, {}, "solver.rtol was 0.0001, now it is 0.0002"),
         ({}, {}, {"duration": 40.0}, "duration was not given, now it is 40.0"),
         ({}, {}, {"output_step": 0.1}, "output_step was not given, now it is 0.1"),
-        ({"rims": False}, {}, {}, "effects.rims was True, now it is False"),
+        ({"bouc_wen": "isotropic"}, {}, {}, "effects.bouc_wen was 'report', now it is 'isotropic'"),
         ({}, {}, {"motion": Motion.harmonic(0.02, 0.04)}, "motion.kind was 'harmonic', now it is 'pieces'"),
     ],
 )
