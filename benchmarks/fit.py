@@ -7,12 +7,15 @@ Usage: python benchmarks/fit.py [NUMBER OF FITS]; half an hour for 100, a minute
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import t
 
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
 from msfp_gen.common.arrays import Array
@@ -97,49 +100,63 @@ def changed(scene: Scene, paths: Sequence[str], factors: Array) -> Scene:
 
 
 def coverage(count: int) -> None:
-    """Share of the intervals that contain the true value, over random bearings, amplitudes, starts and noise."""
-    print("| bearing | noise [% of the peak] | correlation | fits | intervals that contain the true value | least of one "
-          "value | CPU time over that of a search at 1e-4 | intervals wider by the runs [median, %] |")  # fmt: skip
+    """Share of the intervals that contain the true value, over random bearings, amplitudes, starts and noise.
+
+    The search alone has the intervals of independent noise, of runs at the tolerance of the scene.
+    """
+    print("| bearing | noise [% of the peak] | correlation | all intervals | of the worst value | of the search alone | "
+          "CPU time over that of the search | wider by the runs |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|")
     for name, (scene, paths, amplitudes) in DEVICES.items():
-        rows: dict[tuple[float, float], list[tuple[list[float], float, float, float]]] = {}
+        rows: dict[tuple[float, float], list[Covered]] = {}
         for seed in range(count):
             rng = np.random.default_rng(seed)
             true = changed(scene, paths, rng.uniform(0.8, 1.25, len(paths)))
             exact = replace(true, solver=replace(scene.solver, rtol=TRUTH_RTOL))
             clean = clean_tests(exact, [float(rng.choice(each)) for each in amplitudes])
             start = changed(true, paths, rng.uniform(0.75, 1.33, len(paths)))
-            offsets = [OFFSET * float(np.abs(test.force).max()) * rng.standard_normal() for test in clean]
-            for level in LEVELS:
-                for correlation in (0.0, CORRELATION):
-                    tests = [
-                        replace(t, force=t.force + o + level * np.abs(t.force).max() * noise(correlation, rng))
-                        for t, o in zip(clean, offsets, strict=True)
-                    ]
-                    truth = [*(u.start for u in unknowns_of(true, paths)), *offsets]
-                    rows.setdefault((level, correlation), []).append(covered(start, tests, paths, truth))
+            peaks = [float(np.abs(test.force).max()) for test in clean]
+            offsets = [OFFSET * peak * rng.standard_normal() for peak in peaks]
+            truth = np.array([*(u.start for u in unknowns_of(true, paths)), *offsets])
+            for case in itertools.product(LEVELS, (0.0, CORRELATION)):
+                errors = [o + case[0] * p * noise(case[1], rng) for p, o in zip(peaks, offsets, strict=True)]
+                tests = [replace(test, force=test.force + error) for test, error in zip(clean, errors, strict=True)]
+                rows.setdefault(case, []).append(covered(start, tests, paths, truth))
         for (level, correlation), found in rows.items():
-            hits = np.array([hit for hit, _, _, _ in found], dtype=float)
-            before, after = np.sum([(b, a) for _, b, a, _ in found], axis=0)
-            wider = 100 * np.median([w for _, _, _, w in found])
-            print(f"| {name} | {100 * level:g} | {correlation:g} | {count} | {100 * np.nanmean(hits):.1f} % | "
-                  f"{100 * np.nanmean(hits, axis=0).min():.0f} % | {after / before:.1f} | {wider:.2g} |", flush=True)  # fmt: skip
+            hits = np.array([each.hits for each in found])
+            alone = np.mean([each.alone for each in found])
+            ratio = sum(each.whole for each in found) / sum(each.search for each in found)
+            print(f"| {name} | {100 * level:g} | {correlation:g} | {100 * np.nanmean(hits):.1f} % | "
+                  f"{100 * np.nanmean(hits, axis=0).min():.0f} % | {100 * alone:.0f} % | {ratio:.1f} | "
+                  f"{100 * np.mean([each.wider for each in found]):.2g} % |", flush=True)  # fmt: skip
     print()
 
 
-def covered(
-    start: Scene, tests: list[Measurement], paths: Sequence[str], truth: Sequence[float]
-) -> tuple[list[float], float, float, float]:
-    """Which intervals contain the truth (NaN without an interval); CPU times of the first search and of the whole fit;
-    and by how much the error of the runs makes the widest-grown interval wider.
+class Covered(NamedTuple):
+    """Of one fit: which intervals contain the true value, NaN without an interval; the same of the search alone.
+
+    whole, search: CPU times. wider: by the error of the runs, the mean of all intervals.
     """
+
+    hits: Array
+    alone: Array
+    whole: float
+    search: float
+    wider: float
+
+
+def covered(start: Scene, tests: list[Measurement], paths: Sequence[str], truth: Array) -> Covered:
+    """A fit, and its search alone."""
     prepared, clock = start_fit(start, tests, paths, offset=True), time.process_time()
-    least_squares(prepared, *search_range(prepared), 100)
-    before, clock = time.process_time() - clock, time.process_time()
+    x, end = least_squares(prepared, *search_range(prepared), 100)
+    search, clock = time.process_time() - clock, time.process_time()
     found = fit(start, tests, paths, offset=True).estimates
-    after = time.process_time() - clock
-    hits = [float(e.low <= t <= e.high) if np.isfinite(e.high) else np.nan for e, t in zip(found, truth, strict=True)]
-    return hits, before, after, max(e.run_error / ((e.high - e.low) / 2 - e.run_error) for e in found)
+    whole = time.process_time() - clock
+    low, high, error = np.array([(e.low, e.high, e.run_error) for e in found]).T
+    hits = np.where(np.isfinite(high), (low <= truth) & (truth <= high), np.nan)
+    deviation = np.sqrt(np.diag(np.linalg.inv(end.jacobian.T @ end.jacobian)) * end.variance)
+    alone = np.abs(x - truth / prepared.scale) <= t.ppf(0.975, len(end.residuals) - len(x)) * deviation
+    return Covered(hits, alone, whole, search, float(np.mean(error / ((high - low) / 2 - error))))
 
 
 def bias(scene: Scene) -> None:
