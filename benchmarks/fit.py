@@ -22,6 +22,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.studies.calibration.fitting import search_range, start_fit
 from msfp_gen.studies.calibration.residuals import Residuals
 from msfp_gen.studies.calibration.search import least_squares
+from msfp_gen.studies.calibration.solution import solve
 from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 
 AMPLITUDES = (0.02, 0.06, 0.12)  # [m]
@@ -160,16 +161,19 @@ def covered(start: Scene, tests: list[Measurement], paths: Sequence[str], truth:
 
 
 def bias(scene: Scene) -> None:
-    """Errors of values fitted to exact tests, by the tolerance of the runs of the fit."""
+    """Errors of values fitted to exact tests, which have no noise, and half widths of their intervals."""
     truth = [scene.bearing.surfaces[i].friction for i in (0, 1, 3)]
-    exact = clean_tests(replace(scene, solver=replace(scene.solver, rtol=1e-7)))
+    exact = clean_tests(replace(scene, solver=replace(scene.solver, rtol=TRUTH_RTOL)))
     begin = (scene.bearing.arrays()["friction"] * [1.3, 0.8, 0.8, 1.2]).tolist()
     start = replace(scene, bearing=scene.bearing.replace(friction=begin))
-    print("| `solver.rtol` | error of friction, surface 1 | surfaces 2 and 3 | surface 4 |\n|---|---|---|---|")
+    print("| `solver.rtol` | rtol of the last runs | friction, surface 1 | surfaces 2 and 3 | surface 4 |")
+    print("|---|---|---|---|---|")
     for rtol in (1e-4, 1e-5, 1e-6):
         found = fit(replace(start, solver=replace(start.solver, rtol=rtol)), exact, PATHS)
-        errors = [abs(e.value / value - 1) for e, value in zip(found.estimates, truth, strict=True)]
-        print(f"| {rtol:g} | {' | '.join(f'{100 * error:.2g} %' for error in errors)} |")
+        errors = [100 * abs(e.value / value - 1) for e, value in zip(found.estimates, truth, strict=True)]
+        halves = [50 * (e.high - e.low) / e.value for e in found.estimates]
+        cells = [f"{error:.2g} of {half:.2g} %" for error, half in zip(errors, halves, strict=True)]
+        print(f"| {rtol:g} | {found.rtol:g} | {' | '.join(cells)} |")
     print()
 
 
@@ -200,7 +204,7 @@ class Differences(Residuals):
 
 
 def cost(scene: Scene, seeds: int) -> None:
-    """CPU time of fits with exact Jacobians, and by finite differences with the same search, in turn.
+    """CPU time of fits with exact Jacobians, and by finite differences with the same treatment, in turn.
 
     Means of three sets of tests, which differ in their noise. The differences are those of the values at the end.
     """
@@ -214,23 +218,23 @@ def cost(scene: Scene, seeds: int) -> None:
     for paths in SETS:
         totals = {name: np.zeros(4) for name in ("exact", "forward", "central")}
         for seed in range(seeds):
-            made, best, end = noisy(clean, seed)[0], None, None
+            made, best = noisy(clean, seed)[0], None
             for name, total in totals.items():
                 prepared = start_fit(start, made, paths)
                 kind = Residuals if name == "exact" else Differences
                 tried = kind(prepared.tests, prepared.scenes, prepared.unknowns, False)
                 tried.central = name == "central"
                 clock = time.process_time()
-                x, at = least_squares(tried, *search_range(tried), 100)
+                found = solve(tried, *search_range(tried), 100)
                 taken = time.process_time() - clock
-                best, end = (x, at) if best is None else (best, end)
-                deviation = np.sqrt(np.diag(np.linalg.inv(end.jacobian.T @ end.jacobian)) * end.variance)
-                total += (tried.count, getattr(tried, "runs", tried.count), taken, (np.abs(x - best) / deviation).max())
+                best = found if best is None else best
+                gap = (np.abs(found.x - best.x) / best.spread.deviation).max()
+                total += (tried.count, getattr(tried, "runs", tried.count), taken, gap)
         for name, total in totals.items():
             count, runs, taken, gap = total / seeds
             ratio = taken * seeds / totals["exact"][2]
             apart = "-" if name == "exact" else f"{gap:.1g}"
-            print(f"| {len(best)} | {name} | {count:.1f} | {runs:.0f} | {ratio:.1f} | {apart} |", flush=True)
+            print(f"| {len(paths)} | {name} | {count:.1f} | {runs:.0f} | {ratio:.1f} | {apart} |", flush=True)
     print()
 
 
