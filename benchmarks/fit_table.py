@@ -14,13 +14,13 @@ import numpy as np
 from quick import parser, pick
 from results_page import TABLE_42
 from scipy.optimize import least_squares
-from scipy.stats import t
 
 from msfp_gen import Scene, load_scene, simulate
 from msfp_gen.analysis.transitions import RIMS, STOPS, stopping_displacement, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.result import Result
-from msfp_gen.studies.calibration.intervals import correlation_of, spread_of, weak
+from msfp_gen.studies.calibration.intervals import identified, spread_of, weak
+from msfp_gen.studies.calibration.noise import Noise
 
 LOAD = 112e3  # axial load of the preset [N]
 SMALL = 1e-7  # change of a coefficient in which rows are linear
@@ -94,14 +94,14 @@ def fitted(names: Sequence[str], free: Sequence[int]) -> Array:
         max_nfev=pick(None, 2),
     )
     freedom = len(PRINTED) - len(free)
-    spread = spread_of(found.jac * found.x, 2 * found.cost / freedom, names)
-    deviation = np.sqrt(np.diag(spread.covariance)) * found.x
-    half = t.ppf(0.975, freedom) * deviation
+    known = identified(found.jac * found.x, names)
+    spread = spread_of(known, [Noise(2 * found.cost / freedom, np.eye(1, len(PRINTED))[0], freedom)])
+    deviation, half = spread.deviation * found.x, spread.half * found.x
     print("| coefficient | Appendix A | fitted | standard deviation | 95 % interval |\n|---|---|---|---|---|")
     for name, begin, value, error, width in zip(names, start, found.x, deviation, half, strict=True):
         print(f"| {name} | {begin:g} | {value:.4f} | {error:.4f} | {value - width:.3f} to {value + width:.3f} |")
-    print(f"\ncondition {spread.condition:.3g}; root mean square of the residuals {percent(found.fun)}")
-    print(*spread.unidentified, *weak(names, found.x, half, correlation_of(spread.covariance)), "", sep="\n")
+    print(f"\ncondition {known.condition:.3g}; root mean square of the residuals {percent(found.fun)}")
+    print(*known.lines, *weak(names, found.x, half, spread.correlation), "", sep="\n")
     return computed(simulate(push(friction(found.x))))
 
 

@@ -59,7 +59,10 @@ def fit(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
 ) -> None:
-    """Fit friction and other values of a scene to laboratory tests, with 95 % intervals."""
+    """Fit friction and other values of a scene to laboratory tests, with 95 % intervals.
+
+    Runs have the solver.rtol of the scene, then smaller ones until their error is small against the intervals.
+    """
     from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
@@ -78,6 +81,7 @@ def fit(
         make_folder(output, "--output")
     for each in prepared.scenes:
         build(each, gradients=True)
+        build(each)  # tighter runs at the end have no derivatives
     line = Progress("fit")
     with line as update:
 

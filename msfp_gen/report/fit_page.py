@@ -20,14 +20,17 @@ if TYPE_CHECKING:
 
 TERMS = (
     ("value, start", "the number after the fit, and before it, in the scene that was given."),
-    ("95 % interval", "where the true value lies in 95 of 100 such fits, if the model is right and the errors of the "
-     "tests are independent noise. It contains no error of the model, of the load cell or of the gauges."),
+    ("95 % interval", "where the true value lies in 95 of 100 such fits, if the model is right. It contains the noise "
+     "of the tests, also where it is correlated, and the error of the runs; no error of the model, of the load cell or "
+     "of the gauges."),
+    ("error of the runs", "of a value, from the errors of the runs at the stated rtol and of their derivatives. By so "
+     "much the interval is longer at both ends."),
     ("bounds", "between which the value was sought."),
     ("correlation", "of the errors of two values. Near +1 or −1 the tests determine only one combination of both."),
     ("condition", "of the Jacobian, with columns of unit length: 1 where every value has an effect of its own; above "
      "1e4 a combination of values is not determined."),
     ("residual", "fitted less measured force. In the figures it should be a band about zero without a pattern; where "
-     "there is one, the model misses something, and the intervals are too narrow."),
+     "there is one, the model misses something, which the intervals contain as correlated noise and nothing more."),
     ("deviation", "root mean square of the residuals."),
     ("correlation of consecutive residuals", "near 0 for independent noise; from 0.5 the page has a note."),
     ("weight", "of the residuals of a test: 2 counts as a standard deviation half as large."),
@@ -97,8 +100,13 @@ def _count(number: int, noun: str) -> str:
 def _values(found: Fit) -> Table:
     """The table of estimates with the change from the start and the bounds."""
     table = estimate_table(found)
-    rows = [(*row, _change(each), _bounds(each)) for row, each in zip(table.rows, found.estimates, strict=True)]
-    return Table(table.title, (*table.columns, "change", "bounds"), rows)
+    pairs = zip(table.rows, found.estimates, strict=True)
+    rows = [(*row, _run_error(each), _change(each), _bounds(each)) for row, each in pairs]
+    return Table(table.title, (*table.columns, "error of the runs", "change", "bounds"), rows)
+
+
+def _run_error(estimate: Estimate) -> str:
+    return f"{estimate.run_error:.2g}" if np.isfinite(estimate.run_error) else "not measured"
 
 
 def _change(estimate: Estimate) -> str:
@@ -143,8 +151,8 @@ def _provenance(found: Fit) -> Table:
         ("numpy", np.__version__),
         ("scipy", scipy.__version__),
         ("optimiser", 'scipy.optimize.least_squares, method "trf", exact Jacobian'),
-        ("intervals", "Laplace, Student's t"),
+        ("intervals", "Laplace with autocorrelated noise of each test, Student's t, and the error of the runs"),
         ("method of the runs", solver.method),
-        ("rtol of the runs", f"{solver.rtol:g}"),
+        ("rtol of the runs", f"{solver.rtol:g} in the search, {found.rtol:g} at its end"),
     ]
     return Table("versions and methods", (), rows)

@@ -40,3 +40,8 @@ class Solver:
     def angle_tolerance(self) -> float:
         """Absolute tolerance of angles [rad]: `atol_angle` or its default."""
         return 1e-2 * self.rtol if self.atol_angle is None else self.atol_angle
+
+    def tightened(self, factor: float) -> Solver:
+        """These options with tolerances divided by a factor."""
+        angle = None if self.atol_angle is None else self.atol_angle / factor
+        return replace(self, rtol=self.rtol / factor, atol_angle=angle)

@@ -8,24 +8,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.studies.calibration.fitted_test import FittedTest
-from msfp_gen.studies.calibration.intervals import CORRELATED, correlation_of, lag_one, spread_of, weak
+from msfp_gen.studies.calibration.intervals import lag_one, weak
 from msfp_gen.studies.calibration.measurement import Measurement, read_measurement
 from msfp_gen.studies.calibration.outcome import Estimate, Fit
-from msfp_gen.studies.calibration.residuals import Evaluation, Progress, Residuals, scenes_of
-from msfp_gen.studies.calibration.search import least_squares
+from msfp_gen.studies.calibration.residuals import Progress, Residuals, scenes_of
+from msfp_gen.studies.calibration.solution import SMALL, Solution, solve
 from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
-CONFIDENCE = 0.95
-AT_BOUND = 1e-3  # of the range: distance from a bound within which a value is at it
-NOISY_RUNS = 1.0  # standard errors of the step that is left at the end, from which the fit has a note
+CORRELATED = 0.5  # correlation of consecutive residuals from which the fit has a note
 GIVES_WAY = 0.02  # of the largest displacement: movement of the rig from which the fit has a note
 
 
@@ -43,7 +40,8 @@ def fit(
     """Values of some parameters for which runs of a scene give the forces that tests have measured.
 
     Every evaluation runs every test once, with the derivatives of its force (docs/gradients.md), in threads on all
-    cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf").
+    cores. `scipy.optimize.least_squares` makes the next step within the bounds (method "trf"). Runs begin with the
+    tolerance of the scene, and go on with smaller ones until their error is small against the intervals.
 
     Parameters
     ----------
@@ -63,7 +61,7 @@ def fit(
         Called during the runs, in their threads, with the number of the evaluation, its share that is done and the
         last deviation [N]. An exception in it ends the fit.
     max_evaluations
-        At most so many evaluations.
+        At most so many evaluations in the search; tighter runs at its end are not counted.
 
     Returns
     -------
@@ -80,8 +78,8 @@ def fit(
     """
     residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress)
     start, low, high = search_range(residuals)
-    x, end = least_squares(residuals, start, low, high, max_evaluations)
-    return _outcome(scene, residuals, x, end, (low, high))
+    found = solve(residuals, start, low, high, max_evaluations)
+    return _outcome(scene, residuals, found, (low, high))
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
@@ -125,61 +123,46 @@ def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def _outcome(scene: Scene, residuals: Residuals, x: Array, end: Evaluation, limits: tuple[Array, Array]) -> Fit:
-    """The fit at x, with its intervals. end: the evaluation there. limits: bounds of x."""
-    from scipy.stats import t
-
+def _outcome(scene: Scene, residuals: Residuals, found: Solution, limits: tuple[Array, Array]) -> Fit:
+    """The fit of a solution, with its intervals. limits: bounds of the unknowns over their scales."""
     scale, size = residuals.scale, len(residuals.unknowns)
-    names = [u.name for u in residuals.unknowns]
-    names += [f"offset of {test.name}" for test in residuals.tests if residuals.with_offset]
     units = [u.unit for u in residuals.unknowns] + ["N"] * residuals.offsets
     starts = [u.start for u in residuals.unknowns] + [0.0] * residuals.offsets
-    freedom = max(len(end.residuals) - len(x), 1)
-    spread = spread_of(end.jacobian, end.variance, names)
-    deviation = np.sqrt(np.diag(spread.covariance)) * scale
-    half = t.ppf(0.5 + CONFIDENCE / 2, freedom) * deviation
-    values, correlation = x * scale, correlation_of(spread.covariance)
-    near = _at_bound(x, end, *limits)
+    values, half = found.x * scale, found.half * scale
     bounds = list(zip(*((limit * scale).tolist() for limit in limits), strict=True))
     estimates = tuple(
         Estimate(*row)
         for row in zip(
-            names,
+            residuals.names,
             units,
             values.tolist(),
             starts,
-            deviation.tolist(),
+            (found.spread.deviation * scale).tolist(),
             (values - half).tolist(),
             (values + half).tolist(),
+            (found.run_error * scale).tolist(),
             bounds,
-            near.tolist(),
+            found.at_bound.tolist(),
             strict=True,
         )
     )
-    tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, end.forces, strict=True))
-    lines = weak(names[:size], values[:size], half[:size], correlation[:size, :size])
+    tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, found.end.forces, strict=True))
+    lines = weak(residuals.names[:size], values[:size], half[:size], found.spread.correlation[:size, :size])
     return Fit(
         scene=changed_scene(scene, residuals.unknowns, values[:size]),
         estimates=estimates,
-        correlation=correlation,
-        condition=spread.condition,
+        correlation=found.spread.correlation,
+        condition=found.known.condition,
         tests=tests,
-        unidentified=(*spread.unidentified, *lines),
-        notes=tuple(_notes(estimates, tests, float(scene.top.stiffness), end.step_in_errors(end.step(~near)))),  # type: ignore[attr-defined]
+        unidentified=(*found.known.lines, *lines),
+        notes=(*_notes(estimates, tests, float(scene.top.stiffness)), *_error_notes(residuals, found)),  # type: ignore[attr-defined]
         evaluations=residuals.count,
+        rtol=found.rtol,
     )
 
 
-def _at_bound(x: Array, end: Evaluation, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Which unknowns are at a bound, or have their minimum beyond it."""
-    near = np.isfinite(low) & (np.minimum(x - low, high - x) < AT_BOUND * (high - low))
-    beyond = x + end.step(~near)
-    found: NDArray[np.bool_] = near | (beyond < low) | (beyond > high)
-    return found
-
-
-def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float, step_left: float) -> list[str]:
-    """What limits the fit. stiffness: of the rig [N/m]. step_left: in standard errors, at the end of the search."""
+def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness: float) -> list[str]:
+    """What limits the values of the fit. stiffness: of the rig [N/m]."""
     bound = "is at its bound; its interval, and those of the others, have no meaning"
     lines = [f"{estimate.name} {bound}" for estimate in estimates if estimate.at_bound]
     for test in tests:
@@ -189,14 +172,34 @@ def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness
                 f"{test.measured.name}: the rig of the scene gives way by {100 * share:.2g} % of the displacement; "
                 "raise top.stiffness where the test measured the displacement across the bearing"
             )
-    if step_left > NOISY_RUNS:
+    return lines
+
+
+def _error_notes(residuals: Residuals, found: Solution) -> list[str]:
+    """What makes the intervals wider than noise without correlation would."""
+    lines, spread = [], found.spread
+    if not np.isfinite(found.run_error).all():
         lines.append(
-            f"the errors of the runs limit this fit: its last step would be {step_left:.2g} standard errors; give a "
-            "smaller solver.rtol"
+            f"the errors of the runs could not be measured, so values have no interval: runs with "
+            f"rtol = {residuals.rtol:g} fail ({found.failure})"
         )
-    if (correlation := lag_one([test.residual for test in tests])) > CORRELATED:
+    else:
+        some = np.isfinite(spread.half) & ~found.at_bound
+        wider = found.run_error[some] / np.maximum(spread.half[some], np.finfo(float).tiny)
+        if (wider > SMALL).any():
+            remedy = (
+                f"runs with a smaller one fail ({found.failure})" if found.failure else "give a smaller solver.rtol"
+            )
+            lines.append(
+                f"the errors of the runs limit this fit: intervals are wider by up to {100 * wider.max():.2g} % for "
+                f"them, with rtol = {found.rtol:g}; {remedy}"
+            )
+    if (correlation := lag_one(residuals.split(found.end.residuals))) > CORRELATED:
+        independent = np.sqrt(found.end.variance) * np.linalg.norm(found.known.factors, axis=1)
+        some = np.isfinite(spread.deviation) & (independent > 0)
+        wider = (spread.deviation[some] / independent[some]).max(initial=1.0)
         lines.append(
-            f"residuals are correlated ({correlation:.2f}), so the model misses part of the tests and the intervals "
-            "are too narrow"
+            f"residuals are correlated ({correlation:.2f}): intervals are wider for it, by a factor of up to "
+            f"{wider:.2g}, and contain no other error of a model that misses part of the tests"
         )
     return lines

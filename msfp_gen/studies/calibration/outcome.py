@@ -27,8 +27,9 @@ class Estimate:
         name: path of the parameter, tied paths separated by `=`; `offset of FILE` for an offset of force.
         unit: SI unit.
         value, start: after and before the fit [unit].
-        deviation: standard deviation [unit]; infinite where the tests do not determine the value.
-        low, high: 95 % interval [unit].
+        deviation: standard deviation from the noise of the tests [unit]; infinite where the value is not determined.
+        low, high: 95 % interval [unit], which contains the error of the runs.
+        run_error: of the value, from the error of the runs [unit]; infinite where it could not be measured.
         bounds: between which the value was sought [unit]; infinite for an offset.
         at_bound: whether the value is at one of its bounds, where the interval has no meaning.
     """
@@ -40,12 +41,13 @@ class Estimate:
     deviation: float
     low: float
     high: float
+    run_error: float = 0.0
     bounds: tuple[float, float] = (-np.inf, np.inf)
     at_bound: bool = False
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
-        spread = f"{self.low:.4g} ... {self.high:.4g}" if np.isfinite(self.deviation) else "not determined"
+        spread = f"{self.low:.4g} ... {self.high:.4g}" if np.isfinite(self.high) else "not determined"
         return f"{self.name} = {self.value:.5g}{unit} ({spread}){', at its bound' if self.at_bound else ''}"
 
 
@@ -62,6 +64,7 @@ class Fit:
         unidentified: one line for each set of parameters that the tests do not tell apart, or do not see.
         notes: lines on what limits the intervals.
         evaluations: number of times that all tests were run.
+        rtol: relative tolerance of the last runs.
     """
 
     scene: Scene
@@ -72,6 +75,7 @@ class Fit:
     unidentified: tuple[str, ...]
     notes: tuple[str, ...]
     evaluations: int
+    rtol: float
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of a parameter, by its path. Raises KeyError."""
@@ -81,7 +85,9 @@ class Fit:
         """The fit in ten lines at most."""
         rows = sum(len(test.force) for test in self.tests)
         plural = "" if len(self.tests) == 1 else "s"
-        lines = [f"fit of {len(self.tests)} test{plural}, {rows} rows, {self.evaluations} evaluations"]
+        lines = [
+            f"fit of {len(self.tests)} test{plural}, {rows} rows, {self.evaluations} evaluations, rtol {self.rtol:g}"
+        ]
         lines += [f"  {estimate}" for estimate in self.estimates[:SHOWN]]
         if len(self.estimates) > SHOWN:
             lines.append(f"  and {len(self.estimates) - SHOWN} more in .estimates")
@@ -96,7 +102,7 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers in SI as plain values; None where a value is not determined."""
-        names = ("name", "unit", "value", "start", "deviation", "low", "high", "bounds", "at_bound")
+        names = ("name", "unit", "value", "start", "deviation", "low", "high", "run_error", "bounds", "at_bound")
         return {
             "estimates": [{n: _plain(getattr(e, n)) for n in names} for e in self.estimates],
             "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
@@ -108,6 +114,7 @@ class Fit:
             "unidentified": list(self.unidentified),
             "notes": list(self.notes),
             "evaluations": self.evaluations,
+            "rtol": self.rtol,
         }
 
     def save(self, folder: str | Path) -> list[Path]:

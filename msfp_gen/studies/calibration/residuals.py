@@ -1,4 +1,4 @@
-"""Residuals of a fit and their exact Jacobian: one run with gradients for each test, at the same time."""
+"""Residuals of a fit and their exact Jacobian: one run for each test, at the same time."""
 
 from __future__ import annotations
 
@@ -87,6 +87,21 @@ class Residuals:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
+    def names(self) -> list[str]:
+        """Of the unknowns."""
+        return [u.name for u in self.unknowns] + [f"offset of {test.name}" for test in self.tests[: self.offsets]]
+
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance of the runs."""
+        return self.scenes[0].solver.rtol
+
+    def tighten(self, factor: float) -> None:
+        """Make later runs at tolerances divided by this factor."""
+        self.scenes = tuple(replace(scene, solver=scene.solver.tightened(factor)) for scene in self.scenes)
+        self._last = None
+
+    @property
     def largest(self) -> float:
         """Largest force of all tests [N]."""
         return float(max(np.abs(test.force).max() for test in self.tests))
@@ -106,15 +121,24 @@ class Residuals:
         """The evaluation at x; the last one is kept, since an optimiser asks for its Jacobian afterwards."""
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
-            self.count += 1
-            self._last = key, self._evaluate(x * self.scale)
-            if self._last[1].failure is None:
-                self.deviation = float(np.sqrt(np.mean(self._last[1].residuals ** 2))) * self.largest
+            self._last = key, self.evaluate(x)
         return self._last[1]
 
-    def _evaluate(self, values: Array) -> Evaluation:
+    def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
+        """The evaluation at x; with a Jacobian, shape (N, k), it has this one and its runs no derivatives."""
+        self.count += 1
+        found = self._evaluate(x * self.scale, jacobian)
+        if found.failure is None:
+            self.deviation = float(np.sqrt(np.mean(found.residuals**2))) * self.largest
+        return found
+
+    def split(self, rows: Array) -> list[Array]:
+        """Rows of all tests as those of each."""
+        return np.split(rows, np.cumsum([len(test.time) for test in self.tests])[:-1])
+
+    def _evaluate(self, values: Array, jacobian: Array | None) -> Evaluation:
         size, forces, residuals, blocks = len(self.unknowns), [], [], []
-        for index, (test, run) in enumerate(zip(self.tests, self._runs(values[:size]), strict=True)):
+        for index, (test, run) in enumerate(zip(self.tests, self._runs(values[:size], jacobian is None), strict=True)):
             if isinstance(run, RunError | InputError):
                 rows = sum(len(each.time) for each in self.tests)
                 return Evaluation(np.full(rows, FAILED), np.zeros((rows, len(values))), (), run)
@@ -125,13 +149,15 @@ class Residuals:
                 shift[:, index] = 1.0
             forces.append(force)
             residuals.append(test.weight * (force - test.force) / self.largest)
-            blocks.append(test.weight * np.column_stack([slopes, shift]) * self.scale / self.largest)
-        return Evaluation(np.concatenate(residuals), np.concatenate(blocks), tuple(forces))
+            if jacobian is None:
+                blocks.append(test.weight * np.column_stack([slopes, shift]) * self.scale / self.largest)
+        whole = np.concatenate(blocks) if jacobian is None else jacobian
+        return Evaluation(np.concatenate(residuals), whole, tuple(forces))
 
-    def _runs(self, values: Array) -> list[Run]:
+    def _runs(self, values: Array, slopes: bool) -> list[Run]:
         """Runs of all tests at these values, at the same time; the error of a run that fails."""
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
-            build_model(spec.layout, spec.effects, gradients=True)
+            build_model(spec.layout, spec.effects, gradients=slopes)
         shares = np.zeros(len(self.tests))
 
         def run(index: int) -> Run:
@@ -143,7 +169,7 @@ class Residuals:
                         self.progress(self.count, float(shares.mean()), self.deviation)
 
             try:
-                return self._run(index, values, show)
+                return self._run(index, values, slopes, show)
             except (RunError, InputError) as error:
                 return error
 
@@ -153,19 +179,20 @@ class Residuals:
             found = dict(pool.results(run, {index: (index,) for index in range(len(self.tests))}))
         return [found[index] for index in range(len(self.tests))]
 
-    def _run(self, index: int, values: Array, show: Callable[[float, float], None]) -> tuple[Array, Array]:
-        """Force of a run at the times of a test, shape (T,), and its derivatives, shape (T, k)."""
+    def _run(
+        self, index: int, values: Array, slopes: bool, show: Callable[[float, float], None]
+    ) -> tuple[Array, Array]:
+        """Force of a run at the times of a test, shape (T,), and its derivatives, shape (T, k), or (T, 0) without."""
         test, scene = self.tests[index], changed_scene(self.scenes[index], self.unknowns, values)
         paths = [member.path for unknown in self.unknowns for member in unknown.members]
-        result = simulate(scene, gradients=paths, gradient_errors=False, progress=show)
-        assert result.gradients is not None
+        result = simulate(scene, gradients=paths if slopes else (), gradient_errors=False, progress=show)
         time, at = result.history.time, test.time - test.time[0]
-        columns = dict(zip(paths, result.gradients.rows["top_force"][:, :, 0], strict=True))
-        slopes = [sum(columns[member.path] for member in unknown.members) for unknown in self.unknowns]
-        return (
-            np.interp(at, time, result.history.top_force[:, 0]),
-            np.column_stack([np.interp(at, time, np.asarray(slope)) for slope in slopes]),
-        )
+        force = np.interp(at, time, result.history.top_force[:, 0])
+        if result.gradients is None:
+            return force, np.zeros((len(at), 0))
+        rows = dict(zip(paths, result.gradients.rows["top_force"][:, :, 0], strict=True))
+        columns = [sum(rows[member.path] for member in unknown.members) for unknown in self.unknowns]
+        return force, np.column_stack([np.interp(at, time, np.asarray(column)) for column in columns])
 
 
 def scenes_of(scene: Scene, tests: Sequence[Measurement]) -> tuple[Scene, ...]:

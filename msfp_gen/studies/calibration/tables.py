@@ -25,7 +25,8 @@ def fit_tables(found: Fit) -> list[Table]:
 def estimate_table(found: Fit) -> Table:
     """Values, intervals and starts."""
     columns = ("parameter", "value", "95 % interval", "start", "unit")
-    return Table(f"fitted in {found.evaluations} evaluations", columns, [_row(e) for e in found.estimates])
+    title = f"fitted in {found.evaluations} evaluations, the last with rtol {found.rtol:g}"
+    return Table(title, columns, [_row(e) for e in found.estimates])
 
 
 def correlation_table(found: Fit) -> Table:
@@ -52,6 +53,6 @@ def residual_table(found: Fit) -> Table:
 
 
 def _row(estimate: Estimate) -> tuple[str, ...]:
-    spread = f"{estimate.low:.4g} to {estimate.high:.4g}" if np.isfinite(estimate.deviation) else "not determined"
+    spread = f"{estimate.low:.4g} to {estimate.high:.4g}" if np.isfinite(estimate.high) else "not determined"
     value = f"{estimate.value:.5g}" + (" (bound)" if estimate.at_bound else "")
     return estimate.name, value, spread, f"{estimate.start:.4g}", estimate.unit or "-"

@@ -27,12 +27,12 @@ def fitted(name: str, load: float | None = None) -> FittedTest:
 
 def made(tests: list[FittedTest], **changes: object) -> Fit:
     estimates = (
-        Estimate("bearing.surfaces[0].friction", "", 0.03, 0.04, 0.001, 0.028, 0.032, (0.004, 0.4)),
-        Estimate("bearing.surfaces[0].radius", "m", 0.47, 0.473, np.inf, -np.inf, np.inf, (0.1, 1.0)),
-        Estimate("offset of a.csv", "N", 12.5, 0.0, 3.0, 6.5, 18.5),
+        Estimate("bearing.surfaces[0].friction", "", 0.03, 0.04, 0.001, 0.028, 0.032, 5e-5, (0.004, 0.4)),
+        Estimate("bearing.surfaces[0].radius", "m", 0.47, 0.473, np.inf, -np.inf, np.inf, np.inf, (0.1, 1.0)),
+        Estimate("offset of a.csv", "N", 12.5, 0.0, 3.0, 6.5, 18.5, 0.5),
     )
     correlation = np.array([[1.0, np.nan, 0.25], [np.nan, np.nan, np.nan], [0.25, np.nan, 1.0]])
-    found = Fit(scene_of("fenz-test2"), estimates, correlation, 12.5, tuple(tests), (), (), 7)
+    found = Fit(scene_of("fenz-test2"), estimates, correlation, 12.5, tuple(tests), (), (), 7, 1e-6)
     return replace(found, **changes)  # type: ignore[arg-type]
 
 
@@ -45,9 +45,10 @@ def test_numbers_and_limits_stand_on_the_page(tmp_path: Path) -> None:
     html = write_fit_report(found, tmp_path / "fit.html").read_text(encoding="utf-8")
     text = texts(html)
     assert "2 values of the scene and 1 offset of force fitted to 2 laboratory tests of 400 rows" in text
-    assert "0.028 to 0.032 0.04 - -25.0 % 0.004 to 0.4" in text
-    assert "not determined 0.473 m -0.6 % 0.1 to 1" in text
-    assert "6.5 to 18.5 0 N - none" in text
+    assert "0.028 to 0.032 0.04 - 5e-05 -25.0 % 0.004 to 0.4" in text
+    assert "not determined 0.473 m not measured -0.6 % 0.1 to 1" in text
+    assert "6.5 to 18.5 0 N 0.5 - none" in text
+    assert "0.0001 in the search, 1e-06 at its end" in text
     assert "+0.250" in text and "condition 12.5" in text
     assert "not seen by the tests: x" in text and "hm" in text and "Nothing was found" not in text
     assert "b &lt;i&gt;.csv" in html and "b <i>" not in html

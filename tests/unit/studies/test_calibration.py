@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t
 from support import Array, scene_of
 
 from msfp_gen import InputError, Measurement, Motion, RunError, Scene, fit, load_scene, simulate
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.studies.calibration import read_measurement, search
-from msfp_gen.studies.calibration.fitting import start_fit
-from msfp_gen.studies.calibration.intervals import correlation_of, spread_of
+from msfp_gen.studies.calibration.fitting import search_range, start_fit
+from msfp_gen.studies.calibration.intervals import identified, spread_of
+from msfp_gen.studies.calibration.noise import Noise
 
 ROWS = 200
 NOISE = 0.005  # of the largest force
@@ -50,11 +52,12 @@ def near() -> Scene:
 
 @cache
 def loop(amplitude: float, axial_load: float | None = None) -> tuple[Array, Array, Array]:
-    """Time, displacement and force of one cycle, from a run."""
+    """Time, displacement and force of one cycle, from a run at a tight tolerance."""
     motion = Motion.harmonic(amplitude, 0.1, cycles=1.0)
     top = rig().top if axial_load is None else replace(rig().top, axial_load=axial_load)  # type: ignore[call-arg]
     step = motion.duration / (ROWS - 1)
-    scene = replace(rig(), motion=motion, motion_table=None, duration=None, output_step=step, top=top)
+    solver = replace(rig().solver, rtol=1e-7)
+    scene = replace(rig(), motion=motion, motion_table=None, duration=None, output_step=step, top=top, solver=solver)
     time, run = np.linspace(0, motion.duration, ROWS), simulate(scene).history
     return time, motion.evaluate(time)[:, 0], np.interp(time, run.time, run.top_force[:, 0])
 
@@ -81,7 +84,7 @@ def test_known_friction_is_recovered_from_two_amplitudes_with_noise_and_offset()
         estimate = found[path]
         assert abs(estimate.value - true) < 4 * estimate.deviation < 0.1 * true
         assert estimate.low < estimate.value < estimate.high
-        assert estimate.high - estimate.low == pytest.approx(2 * 1.966 * estimate.deviation, rel=1e-3)  # Student's t
+        assert estimate.high - estimate.value - estimate.run_error == pytest.approx(1.97 * estimate.deviation, rel=0.02)
     for test, true in zip(tests, (150.0, -100.0), strict=True):
         estimate = found[f"offset of {test.name}"]
         assert abs(estimate.value - true) < 4 * estimate.deviation < 40
@@ -120,16 +123,18 @@ def test_friction_and_lever_arm_from_one_amplitude_are_named() -> None:
 def test_covariance_and_names_of_a_linear_fit() -> None:
     x = np.linspace(-1, 1, 50)
     jacobian = np.column_stack([x, x**2, 2 * x, np.zeros(50)])
-    found = spread_of(jacobian, 0.04, "abcd")
-    assert found.unidentified[0] == "not seen by the tests: d"
-    assert found.unidentified[1].startswith("cannot be told apart by these tests: a, c;")
-    assert np.isinf(found.condition)
-    assert found.covariance[1, 1] == pytest.approx(0.04 / (x**4).sum())
-    assert np.isinf(np.diag(found.covariance)[[0, 2, 3]]).all()
-    correlation = correlation_of(found.covariance)
-    assert correlation[1, 1] == pytest.approx(1.0) and np.isnan(correlation[0]).all()
-    whole = spread_of(jacobian[:, :2], 1.0, "ab")
-    assert whole.covariance == pytest.approx(np.linalg.inv(jacobian[:, :2].T @ jacobian[:, :2]))
+    white = [Noise(0.04, np.eye(1, 50)[0], 46.0)]
+    known = identified(jacobian, "abcd")
+    assert known.lines[0] == "not seen by the tests: d"
+    assert known.lines[1].startswith("cannot be told apart by these tests: a, c;")
+    assert np.isinf(known.condition)
+    found = spread_of(known, white)
+    assert found.deviation[1] == pytest.approx(0.2 / np.sqrt((x**4).sum()))
+    assert found.half[1] == pytest.approx(t.ppf(0.975, 46) * found.deviation[1])
+    assert np.isinf(found.half[[0, 2, 3]]).all() and np.isinf(found.deviation[[0, 2, 3]]).all()
+    assert found.correlation[1, 1] == pytest.approx(1.0) and np.isnan(found.correlation[0]).all()
+    whole = spread_of(identified(jacobian[:, :2], "ab"), white)
+    assert whole.deviation**2 == pytest.approx(0.04 * np.diag(np.linalg.inv(jacobian[:, :2].T @ jacobian[:, :2])))
 
 
 def test_the_jacobian_is_that_of_the_residuals() -> None:
@@ -316,19 +321,39 @@ def test_a_value_at_its_bound_gets_a_note() -> None:
 def test_the_search_ends_where_a_step_is_within_the_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     """Noise of 0.5 %: the rest of the search changes every value by less than its error.
 
-    Exact tests: the errors of the runs decide, which the fit says.
+    Exact tests: the errors of the runs decide. The fit says so, and its intervals contain the true values.
     """
-    found = fit(start(), [measured(0.12, seed=1)], FRICTION)
+    short, whole = (start_fit(start(), [measured(0.12, seed=1)], FRICTION) for _ in range(2))
+    x, end = search.least_squares(short, *search_range(short), 100)
     with monkeypatch.context() as patched:
         patched.setattr(search, "WITHIN", 0.0)
-        whole = fit(start(), [measured(0.12, seed=1)], FRICTION)
-    assert found.evaluations < whole.evaluations
-    for one, other in zip(found.estimates, whole.estimates, strict=True):
-        assert abs(one.value - other.value) < other.deviation
-    time, displacement, force = loop(0.12)
-    exact = fit(start(), [Measurement("exact", time, displacement, force)], FRICTION)
-    assert all("errors of the runs" in note or "residuals are" in note for note in exact.notes), exact.notes
-    assert exact[PATHS[0]].value == pytest.approx(TRUE[0], rel=1e-3)
+        other, _ = search.least_squares(whole, *search_range(whole), 100)
+    assert short.count < whole.count
+    assert end.step_in_errors(x - other) < 1
+    exact = fit(start(), [Measurement("exact", *loop(0.05))], FRICTION)
+    assert any("errors of the runs limit" in note for note in exact.notes), exact.notes
+    assert exact.rtol == pytest.approx(1e-7)
+    for path, true in zip(PATHS, TRUE, strict=True):
+        assert exact[path].low <= true <= exact[path].high
+        assert exact[path].value == pytest.approx(true, rel=2e-3)
+
+
+def test_intervals_are_infinite_where_the_error_of_the_runs_cannot_be_measured() -> None:
+    """Runs at the tolerance of the scene need fewer steps than the limit, tighter ones more."""
+    scene = replace(near(), solver=replace(near().solver, max_steps=600))
+    found = fit(scene, [measured(0.05)], FRICTION[:1])
+    assert found.rtol == 1e-4 and np.isinf(found[PATHS[0]].high) and np.isinf(found[PATHS[0]].run_error)
+    assert found.as_dict()["estimates"][0]["run_error"] is None
+    assert any("could not be measured" in note and "rtol = 1e-06 fail" in note for note in found.notes), found.notes
+    assert "not determined" in repr(found)
+
+
+def test_runs_are_tighter_in_both_tolerances() -> None:
+    scene = replace(near(), solver=replace(near().solver, rtol=1e-5, atol_angle=1e-6))
+    residuals = start_fit(scene, [measured(0.05)], FRICTION)
+    residuals.tighten(100.0)
+    assert residuals.rtol == pytest.approx(1e-7)
+    assert residuals.scenes[0].solver.angle_tolerance == pytest.approx(1e-8)
 
 
 def test_a_fit_that_does_not_converge_says_so() -> None:
