@@ -240,7 +240,7 @@ def cost(scene: Scene, seeds: int) -> None:
 
 if __name__ == "__main__":
     options = parser(__doc__)
-    options.add_argument("fits", nargs="?", type=int, default=FITS, help="number of fits of each row of the first table")
+    options.add_argument("fits", nargs="?", type=int, default=FITS, help="number of fits of each row of coverage")
     number, bearing = options.parse_args().fits, rig()
     coverage(number)
     bias(bearing)

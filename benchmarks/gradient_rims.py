@@ -3,21 +3,21 @@
 Derivatives of sliding displacements and of the force with respect to the capacity of the surface whose rim is met, over
 the largest of each, from some time after an event to the next one; and the error of the sliding displacements
 themselves. Against the derivatives of a run at a tolerance of 1e-11, which are compared first with differences of such
-runs. A table of docs/gradients.md. `--quick`: one scene at one tolerance.
+runs. A table of docs/gradients.md.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from quick import parser, pick
 
 from msfp_gen import Effects, Motion, Result, Scene, load_scene, simulate
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-8)
+TOLERANCES = pick((1e-4, 1e-5, 1e-6, 1e-8), (1e-4,))
 TIGHT = {"rtol": 1e-11, "method": "esdirk4"}
 BEFORE = 0.02  # from an event after it, by which differences are disturbed [s]
 CHANGES = (1, 2, 4)  # of the differences, in steps of 5e-6 of the capacity
@@ -91,11 +91,11 @@ def cells(scene: Scene, path: str, reference: Result, rows: Any) -> list[str]:
 
 def main() -> None:
     """Print the table, and for each scene how well the derivatives of the tight run agree with differences."""
-    quick = "--quick" in sys.argv
+    parser(__doc__).parse_args()
     print("| scene | method | `solver.rtol` | sliding | stated | force | stated | covered | run |")
     print("|---|---|---|---|---|---|---|---|---|")
     agreement = {}
-    for name, (scene, surface, after) in list(scenes().items())[: 1 if quick else None]:
+    for name, (scene, surface, after) in list(scenes().items())[: pick(None, 1)]:
         path = f"bearing.surfaces[{surface}].capacity"
         tight = replace(scene, solver=replace(scene.solver, **TIGHT))
         reference = simulate(tight, gradients=[path], gradient_errors=False)
@@ -103,7 +103,7 @@ def main() -> None:
         found = reference.gradient.sliding.values[0][rows]
         agreement[name] = share(differences(tight, path)[rows] - found, found)
         for method in ("implicit", "esdirk4"):
-            for rtol in TOLERANCES[:1] if quick else TOLERANCES:
+            for rtol in TOLERANCES:
                 changed = replace(scene, solver=replace(scene.solver, rtol=rtol, method=method))
                 row = cells(changed, path, reference, rows)
                 print(f"| {name} | `{method}` | {rtol:g} | {' | '.join(row)} |", flush=True)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import asin, pi
+from typing import Any
 
 from msfp_gen.common.fields import Quantity
+
+_FUNCTIONS: dict[str, Any] = {"asin": asin, "pi": pi}  # that limits use
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,21 @@ class Bound:
 
     def excess(self, values: Mapping[str, float]) -> float | None:
         """The limit [unit of the value], where the value is beyond it; else None."""
-        limit = float(eval(self.limit, {"__builtins__": {}, "asin": asin, "pi": pi}, dict(values)))
+        names, function = _function(self.limit)
+        limit = float(function(*(values[name] for name in names)))
         return None if values[self.name] < limit or (values[self.name] == limit and not self.open) else limit
 
     @property
     def remedy(self) -> str:
         """What to give, such as `give at most the height of the body`."""
         return f"give {'less than' if self.open else 'at most'} {self.meaning}"
+
+
+@cache
+def _function(limit: str) -> tuple[tuple[str, ...], Callable[..., float]]:
+    """An expression of this package as a function, and the names of its arguments."""
+    names = tuple(name for name in compile(limit, "limit", "eval").co_names if name not in _FUNCTIONS)
+    return names, eval(f"lambda {', '.join(names)}: {limit}", {"__builtins__": {}, **_FUNCTIONS})
 
 
 def rules(values: Iterable[Value]) -> dict[str, Quantity]:

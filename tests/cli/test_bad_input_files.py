@@ -21,7 +21,7 @@ from msfp_gen.buildings.opening import load_scene
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import scene_text
-from msfp_gen.scene.file.motion_tables import RECORDS, _record
+from msfp_gen.scene.file.motion_tables import RECORDS
 from msfp_gen.scene.file.toml_text import dumps
 
 HEAD = "bearing = 'fenz-tfp'\ntop = {kind = 'rig', axial_load = 1e5, stiffness = 1e8, rotational_stiffness = 1e8}\n"
@@ -72,11 +72,11 @@ SCENES = {
     "waves too fast": (motion(kind="circle", amplitude=0.1, angular_frequency=1e9, cycles=1e6), ("motion.cycles",)),
     "a frequency below all": (
         motion(kind="harmonic", amplitude=0.1, frequency=1e-320),
-        ("motion.frequency = 1e-320", "at least 1e-30"),
+        ("motion.frequency = 1e-320", "1e-30 to 1e+30"),
     ),
     "a frequency above all": (
         motion(kind="harmonic", amplitude=0.1, frequency=1e300),
-        ("motion.frequency = 1e+300", "at most 1e+30"),
+        ("motion.frequency = 1e+300", "1e-30 to 1e+30"),
     ),
     "a corner below all": (
         motion(kind="record", bundled="ridgecrest-2019-ci-clc", corner=1e-9),
@@ -85,7 +85,7 @@ SCENES = {
     "no cycle at all": (motion(kind="harmonic", amplitude=0.1, frequency=0.1, cycles=1e-29), ("motion.cycles",)),
     "a rest for ever": (
         motion(kind="harmonic", amplitude=0.1, frequency=0.1, hold=1e300),
-        ("motion.hold = 1e+300", "at most 1e+30"),
+        ("motion.hold = 1e+300", "1e-30 to 1e+30"),
     ),
     "a name with NUL": (GOOD + 'name = "a\\u0000b"', ("name = 'a\\x00b'", "without the NUL character")),
     "a motion whose name has NUL": (
@@ -314,7 +314,6 @@ def test_text_in_a_scene_opens_runs_and_writes_nothing(folder: Path) -> None:
     for trick in TRICKS:
         text = dumps({"name": trick}) + motion(kind="record", file="record.at2", name=trick)
         (folder / "scene.toml").write_text(text)
-        _record.cache_clear()  # a record is read once for all scenes
         with heard() as found:
             scene = load_scene(folder / "scene.toml")
         assert scene.name == scene.motion.name == trick, "kept as it is, and no more"

@@ -24,7 +24,6 @@ from msfp_gen.cli import main
 from msfp_gen.cli.interrupts import signals_as_interrupts
 from msfp_gen.motions import records
 from msfp_gen.result import Result
-from msfp_gen.scene.file.motion_tables import _record
 from msfp_gen.studies.sweep import completed_runs, row_of, sweep_table, write_table
 from msfp_gen.studies.sweep.variations import variations, varied_field
 
@@ -101,7 +100,6 @@ def test_the_terminal_table_fits_80_columns() -> None:
 def test_a_record_is_read_once_unless_it_changes(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     read, found = records.read_record, []
     monkeypatch.setattr(records, "read_record", lambda *paths: found.append(paths) or read(*paths))
-    _record.cache_clear()
     path = tmp_path / "quake.csv"
     path.write_text("time [s], a1 [m/s^2]\n" + "".join(f"{0.02 * k:.2f}, {k % 7 - 3}\n" for k in range(400)))
     scene = tmp_path / "scene.toml"

@@ -318,7 +318,7 @@ def test_constant_friction_emits_nothing_of_a_law() -> None:
     )
     assert "coefficient[" not in header and "MSFP_SURFACE_PARAMETERS_HEATING" not in header
     with_heat = generate(ModelSpec(Layout.tfp(), Effects(friction="pvt"))).files
-    assert "#define MSFP_HEAT 14" in with_heat["msfp_model.h"] and "heat.c" in runtime_sources()
+    assert "#define MSFP_HEAT MSFP_HEAT_STATES" in with_heat["msfp_model.h"] and "heat.c" in runtime_sources()
 
 
 def test_formula_is_part_of_the_models_name() -> None:

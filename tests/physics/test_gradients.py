@@ -162,15 +162,22 @@ def test_works_of_spin_under_a_motion_in_two_directions(spin: str) -> None:
     check_frozen(scene, ["bearing.surfaces[0].friction", "bearing.surfaces[0].radius", "motion.scale"], 1e-5)
 
 
-@pytest.mark.parametrize(("method", "damping", "count"), [("implicit", 8000.0, 600), ("esdirk4", 2000.0, 900)])
-def test_works_through_a_rim_contact_with_the_same_steps(method: str, damping: float, count: int) -> None:
+@pytest.mark.parametrize(
+    ("method", "damping", "count", "sizes"),
+    [("implicit", 8000.0, 640, (5e-8, 2e-7)), ("esdirk4", 2000.0, 900, (2e-7, 1e-6))],
+)
+def test_works_through_a_rim_contact_with_the_same_steps(
+    method: str, damping: float, count: int, sizes: tuple[float, float]
+) -> None:
     """Even steps, of which no stage meets or leaves a rim because of a difference; after some the damper would pull."""
     scene = scene_of("fenz-test2", solver={"method": method}, duration=0.3, stop=None, motion_table=None)
     scene = replace(scene, motion=Motion.harmonic(0.12, 2.0))
     scene = replace(scene, bearing=scene.bearing.replace(rim_damping=damping, **DAMPED))
     paths, steps = ["rim_stiffness", "rim_damping", "radius"], np.linspace(0.0, 0.3, count + 1)[1:]
-    check_frozen(scene, ["bearing.surfaces[0].capacity"], 2e-7, steps=steps)
-    values = check_frozen(scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], 1e-6, 1.0, steps)
+    check_frozen(scene, ["bearing.surfaces[0].capacity"], sizes[0], steps=steps)
+    values = check_frozen(
+        scene, [*(f"bearing.surfaces[0].{name}" for name in paths), "motion.scale"], sizes[1], 1.0, steps
+    )
     gap, force = values["gap"][:, 0], values["rim_force"][:, 0]
     assert np.any((gap < 0) & (force == 0))
     assert values["rim_dissipated"][-1] > 0.3

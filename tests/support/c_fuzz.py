@@ -63,9 +63,11 @@ class Bench:
             "load.knots": np.array([0.0, 0.5, 5.0]), "load.coefficients": load,
             "support.knots": np.array([0.0, 0.5, 5.0]), "support.coefficients": pieces,
             "jumps": np.array([0.3, 0.7]), "q": np.full((nb, nq), 1e-5), "v": np.zeros((nb, nq)),
-            "f": np.full((nb, 2), 0.1), "foot": np.zeros(2), "origin": np.zeros(3), "monitor_heat": np.zeros((2, nb)),
+            "f": np.full((nb, 2), 0.1), "foot": np.zeros(2), "origin": np.zeros(3),
+            "monitor_heat": np.zeros((nb, self.api.sizes["MSFP_HEAT_STATES"])),
             "stops": np.array([0.2, 0.4]), "span_ends": np.array([0.5, 5.0]), "span_steps": np.array([0.1, 0.2]),
-            "monitor_heating": np.full(nb, 1e-6), "law_load": np.tile([1.0, 1e8], (nb, 1)),
+            "monitor_heating": np.full(nb, 1e-6), "monitor_reach": np.full(nb, 0.01),
+            "law_load": np.tile([1.0, 1e8], (nb, 1)),
         }  # fmt: skip
         if nq == 6:  # the unilateral contacts carry the load
             found["q"][:, 3:] = 0.0

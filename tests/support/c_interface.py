@@ -29,11 +29,11 @@ _PLAIN: dict[str, Any] = {
 class Interface:
     """The table of functions of a compiled model: `table.run_new(...)`; integers as attributes, as `table.row_size`.
 
-    enums: enumerator -> number. structs: name -> ctypes.Structure.
+    enums: enumerator -> number. sizes: those and the numbers of `#define`. structs: name -> ctypes.Structure.
     """
 
     def __init__(self, library: str, name: str) -> None:
-        self.enums, self.structs, members = header()
+        self.enums, self.sizes, self.structs, members = header()
         self._library = ctypes.CDLL(library)
         entry = getattr(self._library, name)
         entry.restype = ctypes.POINTER(self.structs["msfp_api"])
@@ -55,8 +55,8 @@ class Interface:
 
 
 @cache
-def header() -> tuple[dict[str, int], dict[str, Any], dict[str, Any]]:
-    """Enumerators, structs, and members of the table: name -> type of a function, None for other members."""
+def header() -> tuple[dict[str, int], dict[str, int], dict[str, Any], dict[str, Any]]:
+    """Enumerators, sizes, structs, and members of the table: name -> type of a function, None for other members."""
     text = re.sub(r"/\*.*?\*/", "", public_header(), flags=re.DOTALL)
     enums = dict(_enumerators(text))
     sizes = enums | {name: int(size) for name, size in re.findall(r"#define (MSFP_\w+) (\d+)", text)}
@@ -69,7 +69,7 @@ def header() -> tuple[dict[str, int], dict[str, Any], dict[str, Any]]:
                 fields.append((member, kind))
                 functions[member] = function
         structs[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
-    return enums, structs, functions
+    return enums, sizes, structs, functions
 
 
 def _enumerators(text: str) -> Iterator[tuple[str, int]]:

@@ -58,7 +58,8 @@ def test_summary_is_that_of_the_rows():
     assert 1.05 * shear > s["peak_base_shear"]["radial"] > (1 - 1e-12) * shear  # sums in another order
     assert s["base_shear_ratio"] == s["peak_base_shear"]["radial"] / s["weight"]
     roof = found.node("floor 3")[:, 2, :2]
-    assert s["floors"][3]["peak_acceleration"]["radial"] >= np.hypot(*roof.T).max()
+    acceleration = np.hypot(*roof.T).max()
+    assert s["floors"][3]["peak_acceleration"]["radial"] > (1 - 1e-12) * acceleration  # C rounds the root otherwise
     assert s["storeys"][0]["peak_drift_ratio"] == s["storeys"][0]["peak_drift"]["radial"] / 3.0
     assert s["minimum_load_ratio"] <= (found.axial_force / made().axial_loads).min() < 1 < s["maximum_load_ratio"]
     moved = np.abs(found.bearing_displacement[:, :, 0]).max()
