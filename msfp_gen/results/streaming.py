@@ -49,11 +49,7 @@ def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[Histo
             if pieces is not None:
                 pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
             file.resize_dimension("time", count)
-            try:
-                digests = _write_rows(file, disk, blocks)
-            except Exception:  # of HDF5, which reads what was not written
-                disk.raise_failure()
-                raise
+            digests = _write_rows(file, disk, blocks)
             file.attrs[DIGEST] = digest_of_dataset(first, {} if pieces is None else {GROUP: pieces}, digests)
         disk.finish()
 
@@ -74,21 +70,39 @@ def _write_rows(file: Any, disk: _Disk, blocks: Iterable[History]) -> dict[str, 
 
 
 class _Disk(io.FileIO):
-    """A file for HDF5, which ends the process where a write fails: a failure is kept and raised between writes."""
+    """A file for HDF5, which ends the process where a write fails or where it reads otherwise than it wrote.
+
+    A failure is kept and raised between the blocks. Until then what HDF5 writes is kept in memory.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "w+")
         self._failure: OSError | None = None
+        self._kept: list[tuple[int, bytes]] = []  # place and bytes of every write after a failure
 
     def write(self, data: Any) -> int:
-        """Write all bytes; after a failure none."""
-        view = memoryview(data).cast("B")
-        done = 0
+        """Write all bytes, in memory from a failure on."""
+        view, start, done = memoryview(data).cast("B"), self.tell(), 0
         try:
             while self._failure is None and done < len(view):
                 done += super().write(view[done:])
         except OSError as error:
             self._failure = error
+        if self._failure is not None:
+            self._kept.append((start + done, bytes(view[done:])))
+        return len(view)
+
+    def readinto(self, buffer: Any) -> int:
+        """Read as many bytes as fit; after a failure those that were kept, and zeros where nothing was written."""
+        view, start = memoryview(buffer).cast("B"), self.tell()
+        count = super().readinto(view) or 0
+        if self._failure is None:
+            return count
+        view[count:] = bytes(len(view) - count)
+        for place, data in self._kept:
+            low, high = max(place, start), min(place + len(data), start + len(view))
+            if low < high:
+                view[low - start : high - start] = data[low - place : high - place]
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
