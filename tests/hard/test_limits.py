@@ -200,7 +200,9 @@ def layout_of(surfaces: int) -> tuple[int, int, int]:
     return surfaces + 1, (surfaces + 1) // 2, surfaces // 2
 
 
-@pytest.mark.parametrize("surfaces", [1, 2, 3, 4, 5, *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 11))])
+@pytest.mark.parametrize(
+    "surfaces", [1, 2, 4, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 5, 6, 7, 8, 9, 10))]
+)
 def test_stacks_of_one_to_ten_surfaces_follow_the_reference(surfaces: int) -> None:
     layout = layout_of(surfaces)
     bearing = a_stack(layout, nested_radii(layout, ratio=0.8))

@@ -18,7 +18,11 @@ BY_TITLE = {device.title: device for device in devices.DEVICES}
 TRIPLE, QUINTUPLE = BY_TITLE["triple"], BY_TITLE["quintuple"]
 
 
-@pytest.mark.parametrize("device", devices.DEVICES, ids=lambda device: device.scene)
+@pytest.mark.parametrize(
+    "device",
+    thinned(devices.DEVICES, lambda device: device.scene != "double-articulated-push"),
+    ids=lambda device: device.scene,
+)
 def test_run_is_within_one_per_cent_of_friction_circles(device):
     result = devices.run(device)
     u = result.history.displacement[:, 0]
@@ -131,7 +135,7 @@ def stack(layout: Layout) -> Bearing:
 
 
 @pytest.mark.parametrize(
-    "counts", thinned([(x,) for x in ANY], lambda counts: counts not in ((3, 2, 0), (3, 0, 2))), ids=str
+    "counts", thinned([(x,) for x in ANY], lambda counts: counts in ((2, 1, 0), (4, 1, 2))), ids=str
 )
 def test_every_layout_is_generated_run_and_drawn(counts, tmp_path):
     layout = Layout(*counts)

@@ -66,7 +66,7 @@ def case(word: str, **effects: Any) -> tuple[Any, ...]:
     return model_of((5, 2, 2), friction=word, **LAWS[word], **effects), bearing, state, h, load, heat
 
 
-@pytest.mark.parametrize("word", LAWS)
+@pytest.mark.parametrize("word", thinned(LAWS, lambda word: word in ("pvt", "custom")))
 def test_coefficient_equals_the_reference(word: str) -> None:
     model, bearing, state, h, load, heat = case(word)
     found = model.evaluate(bearing, state.q, state.v, h, **inputs(state, load), **heat)
@@ -110,7 +110,7 @@ OFTEN = {"pvt": "dimension", "custom": "sliders"}  # a law with an effect that c
 
 @pytest.mark.parametrize(
     ("word", "effects"),
-    thinned(product(LAWS, EFFECTS), lambda word, effects: not effects or OFTEN.get(word) in effects),
+    thinned(product(LAWS, EFFECTS), lambda word, effects: OFTEN.get(word) in effects),
     ids=str,
 )
 def test_tangent_of_a_stage_is_consistent(word: str, effects: dict[str, Any]) -> None:

@@ -113,7 +113,7 @@ def test_energy_closes_and_contact_damping_only_dissipates(law: str) -> None:
     assert 1e-6 * peak < energy["contact_dissipated"][-1] < 0.01 * peak
 
 
-@pytest.mark.parametrize("law", ["report", "plastic"])
+@pytest.mark.parametrize("law", ["report", pytest.param("plastic", marks=pytest.mark.slow)])
 def test_explicit_and_implicit_method_agree(law: str) -> None:
     """One surface with the damping that dopri5 resolves, through a reversal."""
     heavy = {"mass": 50.0, "inertia": (1.0, 1.0)}

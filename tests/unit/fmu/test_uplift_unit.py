@@ -23,6 +23,7 @@ STEP, OPEN = 0.02, 1.0  # [s]; normal force of a contact that hardly touches, at
 UPLIFT = Effects(uplift=True)
 
 
+@pytest.mark.slow
 def test_a_unit_lifts_off_and_lands_as_the_two_port(tmp_path: Path) -> None:
     """The upper end swings by more than its springs are compressed at rest; bit by bit."""
     path = write_fmu(replace(rig(), effects=UPLIFT), tmp_path / "uplift.fmu").path

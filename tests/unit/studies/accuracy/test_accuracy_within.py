@@ -236,6 +236,7 @@ def chosen(name="fenz-test2", **changes):
     return replace(load_scene(name), effects=Auto(**changes), duration=10.0)
 
 
+@pytest.mark.slow
 def test_selected_effects_are_compared_with_all_of_them():
     """Planar and massless for half the error; the estimate holds what that leaves out."""
     found = simulate_within(chosen(), 0.01)
@@ -263,6 +264,7 @@ def test_the_reference_has_heat_where_the_surfaces_have_its_parameters():
     assert largest_error(errors(mine, tight)) <= found.estimate <= 0.01
 
 
+@pytest.mark.slow
 def test_uplift_that_opens_in_the_course_of_a_run_is_modelled_from_the_start(monkeypatch):
     """A jolt of the base in resonance with a sprung mass; the selection foresees neither uplift nor heat."""
     monkeypatch.setattr(error_target, "MOST_STEPS", 1000)  # the ringing is damped, and is not resolved
@@ -273,6 +275,7 @@ def test_uplift_that_opens_in_the_course_of_a_run_is_modelled_from_the_start(mon
     assert found.estimate <= 0.01 and "they leave an error" in found.reasons[0]
 
 
+@pytest.mark.slow
 def test_selected_effects_that_end_a_run_early_are_given_up(monkeypatch):
     real = error_target.run_native
 
@@ -285,6 +288,7 @@ def test_selected_effects_that_end_a_run_early_are_given_up(monkeypatch):
     assert found.result.scene.effects == all_effects(chosen()) and "ends early: no solution" in found.reasons[0]
 
 
+@pytest.mark.slow
 def test_reference_runs_that_fail_end_the_search(monkeypatch):
     real = error_target.run_native
 
