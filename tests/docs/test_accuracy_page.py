@@ -32,6 +32,7 @@ def test_one_command_writes_figures_numbers_and_page(tmp_path, monkeypatch):
     assert re.search(r"\| `implicit` \| 0\.\d+ \|", text) and "| planar |" in text and "| double-push |" in text
 
 
+@pytest.mark.slow
 def test_only_some_scenes_leave_the_page(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(page, "TOLERANCES", (1e-2,))
     monkeypatch.setattr(page, "CASES", (page.Case("A short push", "fenz-monotonic", 0.05, 0.2),))

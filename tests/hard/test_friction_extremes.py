@@ -138,6 +138,7 @@ ORDERS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("layout", "radii"), thinned(ORDERS, lambda layout, _: layout == (5, 3, 1)), ids=str)
 def test_any_number_up_and_down_follows_the_reference(layout: tuple[int, int, int], radii: list[float]) -> None:
     bearing = a_stack(layout, radii, friction=[0.02, 0.04, 0.06, 0.08])

@@ -137,6 +137,7 @@ def test_a_run_whose_energy_does_not_close_says_so() -> None:
     assert not [note for note in finer.notes if note.kind == "energy"]
 
 
+@pytest.mark.slow
 def test_a_residual_is_measured_by_the_force_of_its_rim_too() -> None:
     """Before an interface parts a rim pushes a hundred times more than the normal force. Measured by the latter alone
     Newton was asked for what rounding does not leave, and the run ended as newton."""

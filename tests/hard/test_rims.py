@@ -127,6 +127,7 @@ def test_slow_push_into_every_rim_follows_the_reference(stiffness: float) -> Non
         assert peaks[0] == pytest.approx(peaks[1], rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", [(2, 1, 0), (2, 0, 1)], ids=["bowl", "cap"])
 @pytest.mark.parametrize(("rtol", "most"), [(1e-3, 1.2e-2), (1e-4, 4e-3), (1e-5, 4e-3)])
 def test_energy_put_in_through_a_stiff_rig_is_what_rim_and_friction_have(

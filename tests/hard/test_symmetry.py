@@ -109,6 +109,7 @@ def upside_down(bearing: Bearing) -> Bearing:
     )
 
 
+@pytest.mark.slow
 @holds(6, 100, layout=st.sampled_from([(3, 1, 1), (5, 2, 2), (5, 3, 1)]), data=st.data())
 def test_a_stack_upside_down_gives_the_same_loop(layout: tuple[int, int, int], data: st.DataObject) -> None:
     """Level plates, no weights: force and sliding of every surface, rims included."""

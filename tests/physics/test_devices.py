@@ -46,6 +46,7 @@ def test_quintuple_passes_its_nine_stages_where_friction_circles_say():
         assert met[t.surface] == pytest.approx(t.at.displacement, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("title", "other", "share"), [("double, articulated", 2, 0.0), ("double, rigid slider", 1, 1.0)]
 )

@@ -88,6 +88,7 @@ def test_coefficient_equals_the_reference(word: str) -> None:
     assert found.friction_coefficient == pytest.approx(want, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("word", "spin"), thinned(product(LAWS, ["locked", "patch"]), lambda word, spin: spin == "locked")
 )

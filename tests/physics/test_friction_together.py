@@ -55,6 +55,7 @@ def flight(word: str, **values: Any) -> Result:
     return simulate(lawful(scene, word, **values))
 
 
+@pytest.mark.slow
 def test_flights_under_a_law() -> None:
     """What parts, and when, is a matter of the vertical motion; energy closes; what is open does not heat."""
     plain, hot = flight("constant"), flight("pvt", reference_pressure=10e6)

@@ -127,7 +127,8 @@ def test_differences_with_the_same_steps_in_a_double_pendulum_below_a_mass() -> 
     check_frozen(double(), [*STACK, *MASS, *STATE, "motion.direction"], 5e-5, weak=1.0)
 
 
-@pytest.mark.parametrize("hysteresis", ["report", pytest.param("plastic", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("hysteresis", ["report", "plastic"])
 def test_differences_with_the_same_steps_in_quasi_static_runs(hysteresis: str) -> None:
     without_effect = ("mass", "centroid", "inertia[0]", "rim_radius", "base_height", "damping", "rotational_damping")
     paths = [path for path in (*STACK, *RIG) if path.rpartition(".")[2] not in without_effect]

@@ -239,8 +239,8 @@ def reference(scene: Callable[[], Scene]) -> tuple[Runs, Result, Array]:
     ("scene", "method", "limits"),
     [(slow_contact, "implicit", {1e-4: 1e-4, 1e-5: 3e-5, 1e-6: 5e-6}),
      (slow_contact, "esdirk4", {1e-5: 3e-4, 1e-6: 3e-5}),
-     (massless_contacts, "implicit", {1e-4: 1e-5}),
-     (massless_contacts, "esdirk4", {1e-4: 1e-4, 1e-6: 1e-5})],
+     pytest.param(massless_contacts, "implicit", {1e-4: 1e-5}, marks=slow),
+     pytest.param(massless_contacts, "esdirk4", {1e-4: 1e-4, 1e-6: 1e-5}, marks=slow)],
 )  # fmt: skip
 def test_derivatives_after_rim_contacts_are_as_exact_as_the_run(
     scene: Callable[[], Scene], method: str, limits: dict[float, float]
@@ -289,6 +289,7 @@ def sampled_contact(rtol: float, method: str, max_step: float | None = None) -> 
     return replace(scene, bearing=scene.bearing.replace(rim_damping=8000.0, **DAMPED), solver=solver)
 
 
+@pytest.mark.slow
 def test_the_gradient_after_a_rim_contact_under_a_sampled_motion_improves_with_the_tolerance() -> None:
     """Of forces from a millisecond after the contact on, against differences of runs with steps of 10 microseconds.
 

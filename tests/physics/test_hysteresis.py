@@ -52,6 +52,7 @@ def shaken_off_centre(law: str, d_y: float) -> float:
     return float(run.history.sliding[-1, 0] - run.history.sliding[0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d_y", [5e-4, 1e-4])
 def test_a_stuck_bearing_does_not_creep_under_small_cycles(d_y: float) -> None:
     """The plastic law holds it to a micrometre; the Bouc-Wen law lets it slide back by millimetres."""

@@ -98,6 +98,7 @@ def test_plates_are_settled_where_they_are_tilted_at_the_start() -> None:
         assert needs_settling(double(motion=STILL.rocking(rotation))) is tilted
 
 
+@pytest.mark.slow
 def test_a_settled_run_starts_where_the_settling_ended() -> None:
     tilted = double(motion=STILL.rocking(Rotation.constant(theta=0.01)))
     end, state = simulate(settling_scene(tilted)).history, settle(tilted).initial_state
@@ -106,6 +107,7 @@ def test_a_settled_run_starts_where_the_settling_ended() -> None:
     np.testing.assert_array_equal(state.h, end.friction_state[-1])
 
 
+@pytest.mark.slow
 def test_a_slider_without_friction_finds_the_lowest_point_of_a_tilted_dish() -> None:
     """In statics: with inertia a plate that nothing holds overturns from there."""
     tilted, top = STILL.rocking(Rotation.ramp(theta=0.02, duration=10.0)), Top.prescribed((0.0, 0.0, -WEIGHT))

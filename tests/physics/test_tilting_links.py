@@ -31,6 +31,7 @@ def test_nested_surfaces_slide_as_a_stack_of_bodies(amplitude: float, accuracy: 
     assert np.abs(found - series)[1:].max() > 0.02 * largest
 
 
+@pytest.mark.slow
 def test_stack_and_series_differ_by_the_friction_of_the_inner_surfaces() -> None:
     path, found = links.eight(0.2, 100), []
     for inner in (0.004, 0.002, 0.0002):

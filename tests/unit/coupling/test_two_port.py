@@ -226,6 +226,7 @@ def test_a_node_needs_stiffness_and_is_no_top_of_a_scene():
         Scene(BEARING, Motion.ramp(0.1, 1.0), INTERFACE)
 
 
+@pytest.mark.slow
 def test_an_unloaded_bearing_takes_up_its_load():
     """With uplift it may start without load; lowering the upper end compresses it."""
     two_port = TwoPort(BEARING, INTERFACE, effects=Effects(uplift=True))

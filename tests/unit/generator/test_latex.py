@@ -108,6 +108,7 @@ def test_script_replaces_the_page(tmp_path, monkeypatch):
     assert (tmp_path / "equations.md").read_text(encoding="utf-8") == script.text()
 
 
+@pytest.mark.slow
 def test_every_statement_parses_as_mathematics():
     from matplotlib.mathtext import MathTextParser
 

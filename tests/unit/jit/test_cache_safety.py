@@ -164,6 +164,7 @@ def test_a_full_disk_in_the_middle_of_a_build_leaves_nothing(tmp_path: Path, mon
     assert not list((tmp_path / "models").glob("*.part-*"))
 
 
+@pytest.mark.slow
 def test_builds_killed_at_any_moment(house: Path, tmp_path: Path) -> None:
     """SIGKILL to the build and its compilers, at times spread over its whole length and a little beyond."""
     models, dice = tmp_path / "models", random.Random(1)

@@ -154,6 +154,7 @@ def test_intervals_of_a_grid_take_the_shorter_step_and_end_with_the_run() -> Non
     assert grid.ends.tolist() == [2.0, 6.0] and grid.steps.tolist() == [0.7, 0.5]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     shifts=st.lists(st.sampled_from([0.0, 1e-16, -1e-16, 3e-15, -1e-13, 1e-12, -1e-11, 1e-10]), min_size=5, max_size=5),

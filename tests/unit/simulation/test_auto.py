@@ -182,6 +182,7 @@ def test_the_chosen_effects_give_the_answer_of_all(name: str) -> None:
     assert apart(fewer, simulate(scene)) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_planar_run_lies_in_any_plane() -> None:
     aslant = replace(TEST2, motion=Motion.harmonic(0.05, 0.2, cycles=1, direction=0.7), duration=None)
     result = simulate(replace(aslant, effects=Auto(bouc_wen="isotropic")))
@@ -282,6 +283,7 @@ def kumar() -> Scene:
     return replace(TEST2, bearing=bearing, motion=Motion.harmonic(0.08, 0.5, cycles=8), duration=None, effects=Auto())
 
 
+@pytest.mark.slow
 def test_heat_is_followed_once_it_matters() -> None:
     scene = kumar()
     assert chosen(scene, "friction")[0] == "pv"

@@ -144,6 +144,7 @@ def test_every_number_is_that_of_simulate() -> None:
         assert_same(result, alone(scene))
 
 
+@pytest.mark.slow
 def test_every_number_is_that_of_simulate_for_effects_laws_and_methods() -> None:
     results = simulate_batch(of_every_kind(), workers=2)
     for scene, result in zip(of_every_kind(), results, strict=True):

@@ -49,7 +49,8 @@ def test_uplift_under_a_falling_base_names_surface_and_force() -> None:
     assert len(result.history.time) > 2 and result.history.normal_force.min() > 0
 
 
-@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 1e-4])
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", [0.0, 1e-4])
 def test_massless_sliders_without_a_unique_motion_name_the_remedy(damping: float) -> None:
     """With the law of pressure, velocity and temperature: contact damping is one remedy, inertia the one for all."""
     bearing = presets.bearing("fenz-tfp").replace(reference_pressure=15e6, contact_damping=damping)

@@ -228,6 +228,7 @@ def test_a_checkpoint_with_all_rows_continues_in_a_stream(tmp_path: Path) -> Non
 # ---- memory and disk
 
 
+@pytest.mark.slow
 def test_rows_of_one_long_step_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stuck, the run takes steps of minutes; rows at even times inside them would all be in memory at once."""
     held, take = [], RowFile.take

@@ -315,6 +315,7 @@ def test_command_on_a_test_of_the_report(tmp_path: Path, capsys: Any) -> None:
     assert found["governing"]["peak_force"] == "upper"
 
 
+@pytest.mark.slow
 def test_all_cases_have_the_same_effects() -> None:
     """Auto leaves inertia out at the upper bound of friction only; then all three runs have it."""
     scene = load_scene("fenz-test2")

@@ -77,6 +77,7 @@ def written(folder: Path, test: Measurement, name: str = "test.csv") -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_known_friction_is_recovered_from_two_amplitudes_with_noise_and_offset() -> None:
     tests = [measured(0.03, 1, offset=150.0), measured(0.12, 2, offset=-100.0)]
     found = fit(start(), tests, FRICTION, offset=True)

@@ -184,6 +184,7 @@ def test_study_measures_and_confirms(small):
     assert small.series == ["implicit", "Radau"] and not any(p.wrong for p in small.points)
 
 
+@pytest.mark.slow
 def test_output_is_complete(small, tmp_path):
     paths = output.write(small, tmp_path / "made")
     assert {p.suffix for p in paths} == {".csv", ".json", ".md", ".svg", ".png"}

@@ -117,6 +117,7 @@ def study():
     return model_errors(short(), tolerances=[1e-2, 1e-4], limit=20.0)
 
 
+@pytest.mark.slow
 def test_model_errors_are_measured_against_the_full_model(study):
     assert study.series[:5] == ["as it stands", "planar", "massless", "no rims", "planar massless"]
     worst = {name: study.of(name)[-1].errors.worst_rms for name in study.series}

@@ -122,6 +122,7 @@ def test_reasons_name_the_ringing_and_dopri5():
     assert "filtered" in text and "dopri5" in text and "effects as the scene" in text
 
 
+@pytest.mark.slow
 def test_what_the_estimate_leaves_out_is_stated(monkeypatch):
     assert not simulate_within(load_scene("fenz-monotonic"), 0.02).left_out
     monkeypatch.setattr(error_target, "MOST_STEPS", 1000)  # as for a long scene
@@ -254,6 +255,7 @@ def heating(cycles=3):
     return scene_from_table(table | {"effects": {"dimension": "planar"}, "output_step": 0.05})
 
 
+@pytest.mark.slow
 def test_the_reference_has_heat_where_the_surfaces_have_its_parameters():
     """Without heat the example dissipates 1.6 times as much."""
     scene = heating()
