@@ -1,4 +1,4 @@
-"""What the README shows works as shown."""
+"""What the README and the pages of commands and of Python show works as shown."""
 
 import re
 import subprocess
@@ -12,11 +12,14 @@ from support import ROOT
 from msfp_gen import load_scene
 from msfp_gen.cli import main
 
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README, COMMANDS, PYTHON, PAGES = (
+    (ROOT / name).read_text(encoding="utf-8")
+    for name in ("README.md", "docs/commands.md", "docs/python.md", "docs/pages.md")
+)
 
 
 def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```$", README + PYTHON, flags=re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("code", blocks("python"), ids=lambda code: code.splitlines()[0][:60])
@@ -47,7 +50,7 @@ def test_every_command_is_listed(capsys):
     main(["--help"])
     listed = re.search(r"^Commands:\n(.*?)\n\n", capsys.readouterr().out, flags=re.MULTILINE | re.DOTALL)
     names = {line.split()[0] for line in listed[1].splitlines() if line.startswith("  ") and line[2] != " "}
-    assert names == set(re.findall(r"^\| `msfp-gen (\w+)", README, flags=re.MULTILINE))
+    assert names == set(re.findall(r"^\| `msfp-gen (\w+)", COMMANDS, flags=re.MULTILINE))
 
 
 def test_every_page_is_linked_and_every_link_leads_somewhere():
@@ -55,7 +58,7 @@ def test_every_page_is_linked_and_every_link_leads_somewhere():
     for page in pages:
         for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert link.startswith("http") or (page.parent / link).exists(), f"{page.name}: {link}"
-    linked = set(re.findall(r"\(docs/(\w+)\.md", README))
+    linked = set(re.findall(r"\(docs/(\w+)\.md", README)) | set(re.findall(r"\((\w+)\.md", PAGES))
     assert linked == {page.stem for page in ROOT.glob("docs/*.md")}
 
 
