@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -20,7 +21,8 @@ SITE = Path(__file__).resolve().parent
 ROOT = SITE.parents[1]
 # Pages outside docs/, and files that pages link to.
 PAGES = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")
-FILES = ("LICENSE", "CITATION.cff", "generator/seat.py", "examples", "docs/figures")
+FILES = ("LICENSE", "CITATION.cff", "examples", "docs/figures")
+SOURCES = r"\]\(\.\./((?:generator|msfp_gen)/[^)#]+)\)"  # links of pages to the code
 # A link to a folder or to an example leads to the gallery, where there is one.
 GALLERY_LINKS = {"](examples)": "](gallery/index)", "](../examples)": "](../gallery/index)"}
 NO_GALLERY_LINKS = {"](examples)": "](index.md)", "](../examples)": "](../index.md)"}
@@ -59,7 +61,10 @@ def collect(source: Path, *, gallery: bool) -> None:
         target = source / path.relative_to(ROOT)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
-    for name in FILES:
+    linked = {
+        name for path in (ROOT / "docs").glob("*.md") for name in re.findall(SOURCES, path.read_text(encoding="utf-8"))
+    }
+    for name in (*FILES, *sorted(linked)):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         (shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile)(ROOT / name, source / name)
     (source / "cli.md").write_text(command_page(), encoding="utf-8")
