@@ -20,10 +20,9 @@ from msfp_gen import RunError, Scene, load_scene
 from msfp_gen.common.output import replacing
 from msfp_gen.studies.accuracy import model_errors, output, simulate_within, work_precision
 from msfp_gen.studies.accuracy.error_target import largest_error
-from msfp_gen.studies.accuracy.machine import machine
-from msfp_gen.studies.accuracy.measure import errors
+from msfp_gen.studies.accuracy.output import machine
 from msfp_gen.studies.accuracy.study import Point, Study, without_stop
-from msfp_gen.studies.accuracy.trial import run_native
+from msfp_gen.studies.accuracy.timed_run import errors, run_native
 
 HERE = Path(__file__).resolve().parent
 TARGETS_OF_TABLES = (1e-3, 3e-3, 1e-2, 3e-2)  # bounds of the larger RMS error; the first above the floor is used

@@ -18,9 +18,9 @@ from quick import docs_folder, parser, pick
 
 from msfp_gen import Scene
 from msfp_gen.studies.accuracy import work_precision
-from msfp_gen.studies.accuracy.measure import errors
 from msfp_gen.studies.accuracy.methods import METHODS
 from msfp_gen.studies.accuracy.study import Point, Study
+from msfp_gen.studies.accuracy.timed_run import errors
 
 DAMPING = 1e-4  # [s]
 MARKERS = {"implicit": "o", "esdirk4": "s"}

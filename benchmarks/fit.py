@@ -19,9 +19,9 @@ from scipy.stats import t
 
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
 from msfp_gen.common.arrays import Array
+from msfp_gen.studies.calibration.fit_result import least_squares
 from msfp_gen.studies.calibration.fitting import search_range, start_fit
 from msfp_gen.studies.calibration.residuals import Residuals
-from msfp_gen.studies.calibration.search import least_squares
 from msfp_gen.studies.calibration.solution import solve
 from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 

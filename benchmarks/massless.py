@@ -25,9 +25,10 @@ from msfp_gen.scene.effect_selection import (
     inertia_limit,
     inertia_share,
     minimum_load,
+    motion_time_scale,
     quasistatic,
+    response_time,
 )
-from msfp_gen.scene.slider_response import motion_time_scale, response_time
 
 SLOW, SCENES = pick((200, 300), (3, 4))
 BINS = (0.0, RESPONSE_SHARE, 2 * RESPONSE_SHARE, 4 * RESPONSE_SHARE, 8 * RESPONSE_SHARE, 32 * RESPONSE_SHARE)

@@ -17,8 +17,7 @@ from quick import parser, pick
 from msfp_gen import Effects, Load, Motion, RunError, Scene, Top, load_scene
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.studies.accuracy.error_target import simulate_within
-from msfp_gen.studies.accuracy.measure import Errors, errors, largest_error
-from msfp_gen.studies.accuracy.trial import run_native
+from msfp_gen.studies.accuracy.timed_run import Errors, errors, largest_error, run_native
 
 TARGET = 0.005
 TIGHT = 1e-6  # tolerance of the reference run, or a tenth of that of the run, if this is less

@@ -10,8 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from msfp_gen.buildings.change import Change, earlier_work
-from msfp_gen.buildings.member import Member
+from msfp_gen.buildings.bearing_member import Change, Member, earlier_work
 from msfp_gen.buildings.peaks import Peaks, vectors
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array

@@ -11,7 +11,7 @@ from msfp_gen.buildings.vibration import VerticalModes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
-from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:

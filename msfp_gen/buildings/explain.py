@@ -13,7 +13,7 @@ from msfp_gen.buildings.vibration import undamped
 from msfp_gen.common.fields import ruled_fields
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.scene import explain as one
-from msfp_gen.scene.plausibility import doubtful_values
+from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.node import FREEDOMS, MOTIONS, Node, rigid
+from msfp_gen.buildings.storey import FREEDOMS, MOTIONS, Node, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.inputs import read_input
 from msfp_gen.errors import InputError, MsfpError

@@ -10,9 +10,8 @@ import numpy as np
 
 from msfp_gen.buildings.scene import BuildingBearing, standing_below
 from msfp_gen.buildings.vibration import undamped
-from msfp_gen.results.monitor_notes import RISING
-from msfp_gen.results.note import Note
-from msfp_gen.scene.plausibility import doubtful_values
+from msfp_gen.results.note import RISING, Note
+from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:

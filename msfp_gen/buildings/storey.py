@@ -1,4 +1,4 @@
-"""`Storey` and `BaseSlab`: floors and columns of a frame with rigid diaphragms, and its matrices."""
+"""`Node`, `Storey` and `BaseSlab`: points, floors and columns of a frame with rigid diaphragms, and its matrices."""
 
 from __future__ import annotations
 
@@ -7,11 +7,47 @@ from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.node import FREEDOMS, Node, rigid
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.errors import InputError
+
+FREEDOMS = 6  # of a node: displacements along E1, E2, E3 and rotations about them
+MOTIONS = ("translation along E1", "translation along E2", "translation along E3",
+           "rotation about E1", "rotation about E2", "rotation about E3")  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A point of a building.
+
+    name: a label. position: ndarray, shape (3,), [m]: in plan, and height above the nodes of the bearings. rows:
+    ndarray, shape (6, n): displacements [m] and rotations [rad] of the node from the n coordinates of the building.
+    carries: whether bearings may be attached to the node.
+    """
+
+    name: str
+    position: Array
+    rows: Array
+    carries: bool = False
+
+    def linked(self, position: ArrayLike) -> Array:
+        """Motion of a point [m] that a rigid link connects to the node: rows as those of the node, shape (6, n)."""
+        moved: Array = rigid(np.asarray(position, dtype=float) - self.position) @ self.rows
+        return moved
+
+
+def rigid(arm: ArrayLike) -> Array:
+    """Six motions of a point of a rigid body from those of another, for small rotations: ndarray, shape (6, 6).
+
+    arm: from the latter point to the former, shape (3,) [m].
+    """
+    x, y, z = np.asarray(arm, dtype=float)
+    motion = np.eye(FREEDOMS)
+    motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return motion
+
 
 _POINT = Quantity("m", shape=(2,))
 _INERTIA = Quantity("kg m^2", above=0.0, shape=(3,))

@@ -6,11 +6,9 @@ from dataclasses import fields
 from functools import reduce
 from typing import Any
 
-from msfp_gen.buildings.change import BearingNotes, Change, earlier_work
+from msfp_gen.buildings.bearing_member import BearingNotes, Change, Member, earlier_work
 from msfp_gen.buildings.compiled_run import BuildingRun
-from msfp_gen.buildings.member import Member
-from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
-from msfp_gen.results.note import Note
+from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import next_effects
 from msfp_gen.specification.layout import Effects
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.file import stored_bearing
-from msfp_gen.buildings.node import FREEDOMS, Node
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.buildings.storey import Columns
+from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.file.loader import bearing_table, plain_table, toml_table

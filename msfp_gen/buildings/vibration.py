@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.scene.plausibility import LEAST_DAMPING, USUAL_DAMPING, ringing
+from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, ringing
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building

@@ -13,12 +13,12 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import require_type
 from msfp_gen.coupling.response import Response
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.model.marshalling import bodies_and_surfaces, separations_at_rest, top_values, vector
+from msfp_gen.model.evaluation import bodies_and_surfaces, separations_at_rest, top_values, vector
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, RigTop

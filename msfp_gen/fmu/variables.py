@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from msfp_gen.generator.interface import surface_values
-from msfp_gen.model.marshalling import bodies_and_surfaces, top_values
+from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import RigTop
 from msfp_gen.specification import contract

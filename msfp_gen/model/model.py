@@ -12,10 +12,16 @@ from numpy.typing import ArrayLike
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.jit.build import BuildInfo, Progress, load
-from msfp_gen.model.columns import columns
 from msfp_gen.model.compiled import Stack
-from msfp_gen.model.evaluation import FAILURES, Evaluation, named_vectors
-from msfp_gen.model.marshalling import bodies_and_surfaces, top_values, vector
+from msfp_gen.model.evaluation import (
+    FAILURES,
+    Evaluation,
+    bodies_and_surfaces,
+    columns,
+    named_vectors,
+    top_values,
+    vector,
+)
 from msfp_gen.model.ode import Ode
 from msfp_gen.model.plane import State, into_plane, out_of_plane
 from msfp_gen.scene.friction_parameters import check_bearing, law_parameters

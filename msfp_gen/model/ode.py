@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.model.columns import state_columns, unknown_columns
+from msfp_gen.model.evaluation import state_columns, unknown_columns
 from msfp_gen.motions.piecewise import derivatives
 from msfp_gen.scene.top import is_sprung, load_values
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import Gradients
-from msfp_gen.results.peaks import gradients_of_extremes
+from msfp_gen.results.gradient import Gradients, gradients_of_extremes
 
 if TYPE_CHECKING:
     from msfp_gen.results.run_data import RunData

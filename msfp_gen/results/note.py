@@ -1,8 +1,17 @@
-"""`Note`: the message of a monitor."""
+"""`Note`: the message of a monitor; the notes of a run with one model: time, size and the effects that were added."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from msfp_gen.scene.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
+from msfp_gen.scene.friction_parameters import RANGES
+
+if TYPE_CHECKING:
+    from msfp_gen.scene.effect_switching import Ending
+    from msfp_gen.specification.layout import Effects
 
 
 @dataclass(frozen=True)
@@ -29,3 +38,85 @@ class Note:
     def line(self) -> str:
         """Time, text and action."""
         return f"t = {self.time:.6g} s: {self.text}" + (f"; continued with {self.action}" if self.action else "")
+
+
+_MAX_VELOCITY = RANGES["v"][-1]
+TEXTS = {
+    "rims": "a slider is {most}{value:.3g} m beyond the capacity of surface {surface}; the model has no rims",
+    "uplift": "the normal force of surface {surface} is {value:.4g} N; contacts of the model are rigid and cannot open",
+    "inertia": "the inertial force of body {body} is {most}{value:.2g} of N on surface {surface}; the model has none",
+    "heat": "friction may heat surface {surface} by {most}{value:.3g} K; its friction law does not depend on "
+    "temperature",
+    "law_speed": "the slip velocity of surface {surface} is {most}{value:.3g} m/s; its friction law was checked up to "
+    f"{_MAX_VELOCITY:g} m/s",
+    "law_load": "the normal force of surface {surface} is {value:.4g} N; its friction law was not checked there",
+    "law_temperature": "surface {surface} is at {value:.4g} degC; its friction law was not checked there",
+    "plane": "motion or loads leave the vertical plane of the model",
+    "jammed": "the equations of this model have no solution beyond this time ({status})",
+}
+
+
+RISING = ("rims", "inertia", "heat", "law_speed")
+"""Kinds of notes with one limit, from above."""
+
+
+def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
+    """The notes of a run with one model, in order of the time at which each monitor tripped first.
+
+    Where the run went on with the same model, the value is the one furthest beyond the limit since then. after: the
+    effects with which it continues; None where it does not.
+    """
+    trips, time, status = dict(ending.trips), ending.time, ending.status
+    if after is not None and status == "ok":
+        trips["plane"] = (time, 0, 0.0)
+    if after is not None and status == "uplift":
+        trips["uplift"] = (time, ending.surface, ending.value)
+    if after is not None and status in JAM_STATUSES:
+        trips["jammed"] = (time, ending.surface, ending.value)
+    return [
+        Note(
+            tripped,
+            kind,
+            surface,
+            value,
+            _text(kind, surface, value, status, went_on=tripped < time),
+            ", ".join(_changes(kind, ending.effects, after)),
+        )
+        for kind, (tripped, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
+    ]
+
+
+def _text(kind: str, surface: int, value: float, status: str, went_on: bool) -> str:
+    text = TEXTS[kind].format(
+        surface=surface, value=value, body=surface + 1, status=status, most="up to " if went_on else ""
+    )
+    return f"from here on, {text}" if went_on and kind not in ("plane", "jammed") else text
+
+
+def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:
+    """The notes of a run, with those of its next model.
+
+    Of two of one kind that changed nothing the first stands for both, with the larger value of those in `RISING`.
+    """
+    notes = list(earlier)
+    for note in later:
+        alike = (i for i, each in enumerate(notes) if each.kind == note.kind and not (each.action or note.action))
+        index = next(alike, None)
+        if index is None:
+            notes.append(note)
+        elif note.kind in RISING and note.value > notes[index].value:
+            notes[index] = replace(note, time=notes[index].time)
+    return notes
+
+
+def _changes(kind: str, before: Effects, after: Effects | None) -> list[str]:
+    """The effects that changed after a monitor tripped; after a jam these can be those of inertia or of uplift.
+
+    The monitors of a friction law change none, whatever another monitor changes at the same time.
+    """
+    names = REQUIRED_EFFECTS["uplift"] if kind == "jammed" else REQUIRED_EFFECTS.get(kind, {})
+    return [
+        f"{name} = {getattr(after, name)}"
+        for name in names
+        if after is not None and getattr(before, name) != getattr(after, name)
+    ]

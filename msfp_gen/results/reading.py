@@ -20,10 +20,9 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results import stored_gradient
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import Gradients
+from msfp_gen.results.gradient import SERIES, Gradients
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.note import Note
-from msfp_gen.results.peaks import SERIES
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, stored_groups
 from msfp_gen.scene.scene import Scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING
@@ -11,12 +12,100 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.scene.planarity import scene_plane
-from msfp_gen.scene.slider_response import motion_time_scale, response_time, turned_or_pushed
-from msfp_gen.scene.top import MassTop, RigTop, load_values
+from msfp_gen.scene.standing import standing_of, unsteady
+from msfp_gen.scene.top import MassTop, RigTop, Top, load_values, sprung_mass
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.parts import SceneParts
+
+
+def response_time(bearing: Bearing, top: Top, load: float) -> float:
+    """Longest time in which a body between two sliding surfaces follows a change of its velocity, sqrt(m/k) [s].
+
+    Surfaces share the motion differently while the bodies respond. Sliding friction has no stiffness: k is that of the
+    spheres, N/R of both surfaces, and of the rig above the top plate. load: N, the smallest of the run [N]; inf
+    without load.
+    """
+    longest, radii = 0.0, [surface.radius for surface in bearing.surfaces]
+    held = top.stiffness if isinstance(top, RigTop) else 0.0
+    above = [*(load / radius for radius in radii[1:]), held]
+    for radius, stiffness, body in zip(radii, above, bearing.bodies, strict=True):
+        longest = max(longest, body.mass / (load / radius + stiffness) if load > 0 else inf)
+    return float(np.sqrt(longest))
+
+
+def motion_time_scale(motion: Motion, times: Array) -> float:
+    """Peak velocity of the base over its peak acceleration [s], of `times` [s]; inf where it is at rest."""
+    velocity, acceleration = (np.linalg.norm(motion.evaluate(times, order)[:, :3], axis=1).max() for order in (1, 2))
+    return float(velocity / acceleration) if acceleration > 0 else inf
+
+
+def turned_or_pushed(scene: SceneParts) -> bool:
+    """Whether base or top rotate, or a load history has other components than the vertical one."""
+    turned = scene.top_rotation is not None or np.any(scene.motion.coefficients[:, 3:])
+    return bool(turned or (scene.load is not None and np.any(scene.load.coefficients[:, [0, 1, 3, 4, 5]])))
+
+
+LARGEST_FRICTION = 0.3  # of sliding materials in bearings, with a margin
+RADII = (0.05, 20.0)  # of sliding surfaces [m]
+LEAST_DAMPING = 0.01  # ratio of a vibration on vertical springs below which what it adds depends on the tolerance
+USUAL_DAMPING = 0.02  # ratio that is named as the remedy
+LARGEST_TILT = 0.5  # sliding capacity over radius; beyond it a slider tilts by more than 28 degrees
+
+
+def scene_doubts(scene: SceneParts) -> Iterator[tuple[int, float, str]]:
+    """Those of the bearing of a scene, and of what holds its top plate up."""
+    yield from doubtful_values(scene.bearing)
+    if standing := standing_of(scene):
+        yield from unsteady(*standing[:3])
+    if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
+        turn = np.sqrt((scene.top.vertical_stiffness or 0.0) / mass)
+        given = scene.top.vertical_damping
+        ratio, cure = given / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
+        if ratio < LEAST_DAMPING:
+            name, what = "top.vertical_damping", "the mass vibrates on its vertical spring"
+            yield 0, ratio, ringing(name, given, what, turn, ratio, cure)
+
+
+def ringing(path: str, given: float, what: str, turn: float, ratio: float, cure: float) -> str:
+    """The text of a doubt about a vibration that rings on.
+
+    path: of the damping in messages. given: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
+    the damping ratio `ratio`. cure: damping with which it has `USUAL_DAMPING`.
+    """
+    return (
+        f"{path} = {given:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
+        f"on: accelerations and rotations depend on the tolerance by several per cent; give {cure:.3g} N s/m for "
+        f"{USUAL_DAMPING:.0%}"
+    )
+
+
+def doubtful_values(bearing: Bearing) -> Iterator[tuple[int, float, str]]:
+    """Values that are unlikely: number of the surface, the value, and the text of the doubt with the likely slip."""
+    for number, surface in enumerate(bearing.surfaces, start=1):
+        path = f"bearing.surfaces[{number - 1}]"
+        if surface.friction > LARGEST_FRICTION:
+            text = f"{path}.friction = {surface.friction:g} is unusually high; a fraction is meant, not per cent"
+            yield number, surface.friction, text
+        if not RADII[0] <= surface.radius <= RADII[1]:
+            text = f"{path}.radius = {surface.radius:g} m is outside {RADII[0]:g} to {RADII[1]:g} m; is it in metres?"
+            yield number, surface.radius, text
+        if surface.capacity > LARGEST_TILT * surface.radius:
+            text = (
+                f"{path}.capacity = {surface.capacity:g} m tilts the slider by "
+                f"{surface.capacity / surface.radius:.2g} rad; is it the displacement along the surface, in metres?"
+            )
+            yield number, surface.capacity, text
+        if surface.yield_displacement > 0.1 * surface.capacity:
+            text = (
+                f"{path}.yield_displacement = {surface.yield_displacement:g} m is more than a tenth of the capacity; "
+                "usual are 0.1 to 1 mm"
+            )
+            yield number, surface.yield_displacement, text
+
 
 MIN_LOAD_SHARE = 0.2  # uplift is left out if more than this share of the load at rest remains throughout the run
 UPLIFT_MONITOR_SHARE = 0.05  # share of the load at rest below which the monitor of uplift trips

@@ -10,9 +10,8 @@ import numpy as np
 from msfp_gen.common.fields import Choice, Quantity, ruled_fields
 from msfp_gen.common.tables import Table, vector, yes
 from msfp_gen.scene.bearing import Surface
-from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, damping_share, quasistatic
+from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, damping_share, quasistatic, scene_doubts
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.plausibility import scene_doubts
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:

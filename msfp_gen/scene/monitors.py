@@ -14,8 +14,7 @@ from msfp_gen.scene.effect_selection import (
     rigid_mass_limit,
     slider_period,
 )
-from msfp_gen.scene.friction_parameters import checked_range
-from msfp_gen.scene.friction_selection import heated_contacts, thermal_softening
+from msfp_gen.scene.friction_parameters import checked_range, heated_contacts, thermal_softening
 
 if TYPE_CHECKING:
     from msfp_gen.scene.parts import SceneParts

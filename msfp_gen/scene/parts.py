@@ -12,7 +12,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import Top
 from msfp_gen.specification import contract

@@ -1,4 +1,4 @@
-"""The notes that follow from the rows and events of a whole run; those of monitors: `results/monitor_notes.py`."""
+"""The notes that follow from the rows and events of a whole run; those of monitors: `results/note.py`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
-from msfp_gen.scene.effect_selection import rigid_mass_limit
-from msfp_gen.scene.plausibility import scene_doubts
+from msfp_gen.scene.effect_selection import rigid_mass_limit, scene_doubts
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
 from msfp_gen.results.joining import joined
-from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
-from msfp_gen.results.note import Note
+from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
 from msfp_gen.results.thinning import thinned_history

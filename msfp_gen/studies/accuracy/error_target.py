@@ -16,11 +16,9 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_selection import slider_period
 from msfp_gen.simulation.simulate import Progress, simulate
-from msfp_gen.studies.accuracy.attempt import Attempt
 from msfp_gen.studies.accuracy.effects import effects_for, with_all_effects
-from msfp_gen.studies.accuracy.measure import errors, largest_error
-from msfp_gen.studies.accuracy.tables import AFTER_IMPACTS, attempt_table, reason_table, ringing_left_out, within_table
-from msfp_gen.studies.accuracy.trial import CUT_OFF, Trial, dopri5_cost, run_native
+from msfp_gen.studies.accuracy.output import AFTER_IMPACTS, attempt_table, reason_table, ringing_left_out, within_table
+from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Attempt, Trial, dopri5_cost, errors, largest_error, run_native
 
 if TYPE_CHECKING:
     from msfp_gen.common.tables import Table

@@ -11,7 +11,6 @@ import numpy as np
 
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
-from msfp_gen.studies.accuracy.measure import best_reference
 from msfp_gen.studies.accuracy.methods import METHODS
 from msfp_gen.studies.accuracy.opensees import run_opensees
 from msfp_gen.studies.accuracy.series import run_series
@@ -29,7 +28,7 @@ from msfp_gen.studies.accuracy.study import (
     trial_line,
     without_stop,
 )
-from msfp_gen.studies.accuracy.trial import CUT_OFF, Trial, refused_trial, run_native
+from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Trial, best_reference, refused_trial, run_native
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene

@@ -14,7 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.specification.layout import Layout
 from msfp_gen.studies.accuracy.series import Link, Series
-from msfp_gen.studies.accuracy.trial import OK, Trial, comparison_times, require_base_motion_only
+from msfp_gen.studies.accuracy.timed_run import OK, Trial, comparison_times, require_base_motion_only
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene

@@ -19,7 +19,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
-from msfp_gen.studies.accuracy.trial import OK, ROWS, Trial, comparison_times, require_base_motion_only
+from msfp_gen.studies.accuracy.timed_run import OK, ROWS, Trial, comparison_times, require_base_motion_only
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing

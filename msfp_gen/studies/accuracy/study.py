@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from msfp_gen.errors import InputError
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.accuracy.effects import with_all_effects
-from msfp_gen.studies.accuracy.measure import Errors, Reference, best_reference, errors
 from msfp_gen.studies.accuracy.methods import METHODS, Method, methods_named
-from msfp_gen.studies.accuracy.trial import CUT_OFF, REFUSED, Trial
+from msfp_gen.studies.accuracy.timed_run import CUT_OFF, REFUSED, Errors, Reference, Trial, best_reference, errors
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene

@@ -10,8 +10,7 @@ from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.scene.friction_parameters import proportional
-from msfp_gen.scene.friction_selection import select_friction
+from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.either import simulate
 from msfp_gen.specification.friction_laws import Law, law_of

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.studies.calibration.fit_result import WITHIN, least_squares
 from msfp_gen.studies.calibration.intervals import Identified, Spread, identified, spread_of
 from msfp_gen.studies.calibration.noise import noise_of
 from msfp_gen.studies.calibration.residuals import Evaluation, Residuals
-from msfp_gen.studies.calibration.search import WITHIN, least_squares
 
 FIRST, NEXT = 100.0, 10.0  # by which the tolerance is divided, first and later; see docs/fit.md
 LEAST = 1e-7  # tolerance beyond which a second division does not go

@@ -9,7 +9,7 @@ import numpy as np
 from msfp_gen.common.tables import Table
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.calibration.outcome import Estimate, Fit
+    from msfp_gen.studies.calibration.fit_result import Estimate, Fit
 
 
 def fit_tables(found: Fit) -> list[Table]:

@@ -11,8 +11,7 @@ from scipy.io import mmwrite
 from scipy.linalg import eigh
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.node import FREEDOMS, rigid
-from msfp_gen.buildings.storey import BaseSlab, Storey
+from msfp_gen.buildings.storey import FREEDOMS, BaseSlab, Storey, rigid
 from msfp_gen.errors import InputError
 
 MASS, STIFFNESS, HEIGHT = 2e5, 3e8, 3.5

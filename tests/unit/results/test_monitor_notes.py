@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects
-from msfp_gen.results.monitor_notes import joined_notes, monitor_notes
+from msfp_gen.results.note import joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending
 
 

@@ -7,8 +7,8 @@ import pytest
 from support import Array
 
 from msfp_gen.errors import RunError
+from msfp_gen.studies.calibration.fit_result import least_squares
 from msfp_gen.studies.calibration.residuals import Evaluation
-from msfp_gen.studies.calibration.search import least_squares
 
 NOISE = 1e-3 * np.random.default_rng(3).standard_normal(60)
 SLOPE = np.linspace(-1.0, 1.0, 60)

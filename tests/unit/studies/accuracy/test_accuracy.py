@@ -13,10 +13,20 @@ from support import scene_of
 from msfp_gen import Auto, Effects, InputError, Motion, RunError, Solver, Stop, load_scene
 from msfp_gen.cli import main
 from msfp_gen.studies.accuracy import output, study, work_precision
-from msfp_gen.studies.accuracy.measure import ERRORS, Reference, best_reference, errors
 from msfp_gen.studies.accuracy.methods import METHODS, methods_named
 from msfp_gen.studies.accuracy.study import Point, Study, is_wrong, rerun_to_end, run_tolerances, without_stop
-from msfp_gen.studies.accuracy.trial import CUT_OFF, OK, REFUSED, ROWS, Trial, comparison_times
+from msfp_gen.studies.accuracy.timed_run import (
+    CUT_OFF,
+    ERRORS,
+    OK,
+    REFUSED,
+    ROWS,
+    Reference,
+    Trial,
+    best_reference,
+    comparison_times,
+    errors,
+)
 
 TIME = comparison_times(1.0)
 FAMILIES = {"a": "a", "b": "b", "c": "a"}

@@ -14,12 +14,11 @@ from support.peers import opensees_runs
 from msfp_gen import InputError, Motion, RunError, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
 from msfp_gen.studies.accuracy import model_errors, models, opensees, output
-from msfp_gen.studies.accuracy.measure import errors
 from msfp_gen.studies.accuracy.methods import METHODS
 from msfp_gen.studies.accuracy.models import VARIANTS
 from msfp_gen.studies.accuracy.series import Series, run_series
 from msfp_gen.studies.accuracy.study import without_stop
-from msfp_gen.studies.accuracy.trial import OK, ROWS, run_native
+from msfp_gen.studies.accuracy.timed_run import OK, ROWS, errors, run_native
 
 NAMED = {variant.name: variant for variant in VARIANTS}
 FENZ = presets.bearing("fenz-tfp")

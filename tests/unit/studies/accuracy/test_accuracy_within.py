@@ -28,11 +28,10 @@ from msfp_gen import (
 from msfp_gen.cli import main
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.studies.accuracy import error_target, simulate_within, trial
+from msfp_gen.studies.accuracy import error_target, simulate_within, timed_run
 from msfp_gen.studies.accuracy.effects import with_all_effects
 from msfp_gen.studies.accuracy.error_target import CANDIDATE_TOLERANCES, largest_error
-from msfp_gen.studies.accuracy.measure import errors
-from msfp_gen.studies.accuracy.trial import CUT_OFF, run_native
+from msfp_gen.studies.accuracy.timed_run import CUT_OFF, errors, run_native
 
 
 def truth(scene, rtol):
@@ -172,13 +171,13 @@ def test_a_short_pulse_is_in_the_estimate(load):
 
 def test_dopri5_is_timed_or_refused(monkeypatch):
     scene = load_scene("fenz-test2")
-    assert "about" in trial.dopri5_cost(scene)[0]
+    assert "about" in timed_run.dopri5_cost(scene)[0]
     massless = replace(scene, effects=replace(scene.effects, sliders="massless"))
-    assert "cannot run" in trial.dopri5_cost(massless)[0]
-    burst = trial.run_native("implicit", scene, 1e-2, 1.0, 0)
+    assert "cannot run" in timed_run.dopri5_cost(massless)[0]
+    burst = timed_run.run_native("implicit", scene, 1e-2, 1.0, 0)
     for status, words in (("ok", "takes"), ("newton", "fails here"), (CUT_OFF, "at its rate")):
-        monkeypatch.setattr(trial, "run_native", lambda *a, s=status, **k: replace(burst, status=s))
-        assert words in trial.dopri5_cost(scene)[0]
+        monkeypatch.setattr(timed_run, "run_native", lambda *a, s=status, **k: replace(burst, status=s))
+        assert words in timed_run.dopri5_cost(scene)[0]
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
-"""`Member`: a bearing in the run of a building, with the monitors of what its model leaves out."""
+"""`Member`: a bearing in the run of a building, its monitors, and its change to another model where one asks for it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.two_port import compiled_port, scene_at_rest
 from msfp_gen.errors import InputError
 from msfp_gen.model.model import Model, build_model
+from msfp_gen.results.note import Note
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_switching import Ending, stopping_monitors
 from msfp_gen.scene.monitors import monitor_options
@@ -21,6 +23,45 @@ if TYPE_CHECKING:
     from msfp_gen.model.compiled import Port
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
+
+BearingNotes = tuple[tuple[int, Note], ...]
+"""Notes of monitors, each with the bearing that it is about, from 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A bearing that continues with another model.
+
+    bearing: from 0. effects: those that changed. rows: how many the run had. work: integrals of the powers of the
+    bearing until then [J]. build: of the new model. notes: of the monitors of the earlier one.
+    """
+
+    bearing: int
+    effects: dict[str, Any]
+    rows: int
+    work: list[float]
+    build: str
+    notes: tuple[Note, ...]
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """As plain data."""
+        return {**vars(self), "notes": [vars(note) for note in self.notes]}
+
+    @classmethod
+    def of_table(cls, table: dict[str, Any]) -> Change:
+        """The inverse of `table`."""
+        return cls(**{**table, "notes": tuple(Note(**each) for each in table["notes"])})
+
+
+def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]) -> Array:
+    """Integrals of the powers of a bearing before its model of a row began, shape (rows, integrals) [J]."""
+    found = np.zeros(shape)
+    for change in changes:
+        if change.bearing == bearing:
+            found[change.rows :] = change.work
+    return found
+
 
 KEPT = ("normal", "sliding", "kinetic", "potential", "rim_stored", "seat_stored", "work")  # of the row of a bearing
 
