@@ -46,8 +46,9 @@ def fine(scene: Scene, rtol: float, output_step: float, max_step: float | None =
 
 
 def check_free(scene: Scene, sizes: Mapping[str, float], limit: float, away: float = 0.0) -> None:
-    """Force, angles, energies agree with differences to `limit` of the largest derivative, the noise of differences, and
-    what a run that meets a rim states as the error of its derivatives.
+    """Force, angles, energies agree with differences to `limit` of the largest derivative and the noise of differences.
+
+    Where a rim is met, also to the error that the run states of its derivatives.
 
     Of energies it is that of any energy: they share one balance, and small terms are checked with the same steps.
     Rows within `away` [s] of an event are left out, which the differences shift; and the first row. Differences must
