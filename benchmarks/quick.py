@@ -50,6 +50,6 @@ def installed(module: str, part: str) -> bool:
     try:
         import_module(module)
     except Exception as error:  # OpenSeesPy raises RuntimeError where a library of the system is missing
-        print(f"left out, since {module} cannot be imported ({error}); make peers: {part}", flush=True)
+        print(f"left out, since {module} cannot be imported ({error}); pip install -e .[peers]: {part}", flush=True)
         return False
     return True

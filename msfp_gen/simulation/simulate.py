@@ -137,18 +137,8 @@ def simulate(
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
     if gradient_errors and parameters and any(event.kind == "rim_contact" for event in result.events):
-
-        def again(changed: Scene) -> Result:
-            return simulate(
-                changed,
-                progress=progress,
-                strict=strict,
-                gradients=gradients,
-                energy_gradients=energy_gradients,
-                gradient_errors=False,
-            )
-
-        return with_gradient_errors(result, again)
+        again = partial(simulate, progress=progress, strict=strict, gradients=gradients, gradient_errors=False)
+        return with_gradient_errors(result, partial(again, energy_gradients=energy_gradients))
     return result
 
 

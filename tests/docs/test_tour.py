@@ -1,4 +1,4 @@
-"""The functions that docs/tour.md follows are where it says, in the order in which a run meets them."""
+"""The functions and files that docs/tour.md names are where it says."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_every_function_is_in_its_file() -> None:
 
 
 def test_every_file_and_every_name_exists() -> None:
-    """Files in backquotes lie in the package or in the runtime; functions of C are defined there."""
+    """Files in backquotes lie in the package or in the runtime; kernels and functions of C occur there."""
     sources = {path: path.read_text(encoding="utf-8") for path in (ROOT / "msfp_gen" / "runtime").rglob("*.c")}
     for file in re.findall(r"`([\w/.]+\.(?:py|c|jinja))`", PAGE):
         folders = (ROOT, ROOT / "msfp_gen", ROOT / "msfp_gen" / "runtime")

@@ -69,6 +69,7 @@ def check_free(scene: Scene, sizes: Mapping[str, float], limit: float, away: flo
             assert noise <= (3e-2 if name in TERMS else 2e-2) * largest, about
             errors = result.gradient.get(f"{name}_error")
             stated = 0.0 if errors is None else float(errors.values[index][rows].max())
+            assert stated <= 2e-2 * largest, about
             assert error <= limit * largest + noise + stated, about
 
 
