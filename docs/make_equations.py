@@ -55,6 +55,11 @@ stack.
 - $E$ are energies [J], $D$ powers that are dissipated and $\dot{W}$ powers of the input [W]; those of friction are
   $\dot{E}_f$, stored, $D_c$, dissipated by contact damping, $D_d$ by the drilling moment, and $D_f$ by the rest.
 - $c_n(s)$ are the Stumpff functions, $c_1(x^2) = \sin x/x$ and $c_2(x^2) = (1 - \cos x)/x^2$.
+- $\operatorname{if}(x, a, b)$ is $a$ for $x > 0$ and $b$ otherwise; $\operatorname{decay}(x)$ is $e^{-x}$ for $x > 0$
+  and 1 otherwise.
+- Friction over a slip is of planar models without masses. In a step of such a model the body above turns by
+  $\alpha + \beta\,\Delta\omega'$, $Y^0$ and $Y^1$ are $Y$ at its ends and $\bar{N}$ is the mean normal force. $W_f$ is
+  the work [J] that friction stores and $W_d$ the work that it dissipates.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
 
 TITLES = {
@@ -78,6 +83,8 @@ TITLES = {
     "base_power": "Power of a rotating base",
     "lock_power": "Power of the moment that locks the spin",
     "rotation_angles": "Angles (2.1) of the rotation vector of an end of a two-port, with two derivatives",
+    "slid_friction": "Friction over the slip of a step in closed form: (3.18) integrated, (3.19)",
+    "slip_work": "Work of friction over that slip",
 }
 
 
@@ -99,8 +106,8 @@ def assembled_section() -> list[str]:
 
 def program_sections() -> list[str]:
     """The statements of every program."""
-    spec = ModelSpec(Layout.tfp(), Effects(bouc_wen="report"))
-    programs = {program.name: program for program in derive(spec).programs}
+    shown = (Effects(dimension="planar", sliders="massless", bouc_wen="report"), Effects(bouc_wen="report"))
+    programs = {p.name: p for effects in shown for p in derive(ModelSpec(Layout.tfp(), effects)).programs}
     parts = []
     for name, title in TITLES.items():
         rows = [f"{left} &= {right}" for left, right in statements(programs[name])]

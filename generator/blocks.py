@@ -28,6 +28,10 @@ class Blocks:
     friction: Block
     shear: Block
     stage: Block
+    slip: Block
+    slip_end: Block
+    slid: Block
+    slip_work: Block
     unknowns: Block
     contact: Block
     report_contact: Block
@@ -181,6 +185,23 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("Z", "-", "Z likewise", 0)
         .scalar("tau", "s", "beta + T, with beta the diagonal entry of the stage formula; 0 outside of a step")
         .scalar("rest", "-", "T/(beta + T)")
+        .build(),
+        "slip": new("slip")
+        .scalar("Y", "-", "Y at the start of a step whose slip determines it")
+        .scalar("turn", "rad", "rotation of the body above in the step, less beta omega'")
+        .scalar("beta", "s", "diagonal entry of the stage formula of that rotation")
+        .build(),
+        "slip_end": new("slip_end")
+        .scalar("Y", "-", "Y at the end of the step")
+        .scalar("N", "N", "mean of the normal forces at its ends")
+        .build(),
+        "slid": new("slid")
+        .scalar("Y", "-", "Y at the end of the step")
+        .scalar("g", "-", "friction force over -mu N: Y + T dY/dt")
+        .build(),
+        "slip_work": new("slip_work")
+        .scalar("stored", "J", "stored in the step")
+        .scalar("lost", "J", "dissipated by plastic slip in the step")
         .build(),
         "unknowns": new("unknowns")
         .scalar("psi", "rad", "psi~, first angle of the normal's position (2.85)", 0)

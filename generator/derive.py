@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, rotation, seat, top
+from . import body, columns, contact, energy, laws, rotation, seat, slip, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -76,6 +76,8 @@ def derive(spec: ModelSpec) -> Equations:
     ]
     if effects.top_rotation:
         programs += [top.upright(blocks), rotation.axis_turn(blocks)]
+    if effects.permits_quasistatic_steps:
+        programs += [slip.slid_friction(blocks, effects.bouc_wen), slip.slip_work(blocks, effects.bouc_wen)]
     if effects.rims:
         programs.append(contact.rim(blocks))
     if effects.uplift:

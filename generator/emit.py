@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields
 import sympy as sp
 
 from msfp_gen.specification import contract, rows
-from msfp_gen.specification.hysteresis import is_plastic
 from msfp_gen.specification.layout import Effects, ModelSpec
 from msfp_gen.version import __version__
 
@@ -258,7 +257,6 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "scalars": scalar_quantities,
         "local_inputs": len(equations.blocks.local.fields) + len(equations.blocks.shear.fields) + (law is not None),
         "law": law,
-        "plastic": is_plastic(spec.effects.bouc_wen),
         "flows": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL,
         "values": value_enums(spec.effects),

@@ -15,6 +15,37 @@ class Step(sp.Function):  # type: ignore[misc]
         return sp.Integer(0)
 
 
+class Select(sp.Function):  # type: ignore[misc]
+    """Of three arguments the second where the first is positive, else the third, to which the derivative belongs."""
+
+    nargs = 3
+
+    def fdiff(self, argindex: int = 2) -> sp.Expr:
+        """0 for the condition; 1 for the chosen argument and 0 for the other."""
+        chosen = Step(self.args[0])
+        return (sp.Integer(0), chosen, 1 - chosen)[argindex - 1]
+
+
+class Decay(sp.Function):  # type: ignore[misc]
+    """exp(-x), and 1 where x is not positive; there the exponential is not evaluated."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """-exp(-x) or 0."""
+        return -Step(self.args[0]) * Decay(self.args[0])
+
+
+class Clamp(sp.Function):  # type: ignore[misc]
+    """The argument bounded to -1 .. 1, with the derivative 1 inside and 0 on the bounds."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """1 or 0."""
+        return Step(1 - Modulus(self.args[0]))
+
+
 class ArcTan2(sp.Function):  # type: ignore[misc]
     """atan2 of a sine and a cosine, with the derivative that holds off the branch cut."""
 

@@ -39,6 +39,8 @@ DIFFERENTIATED = {
     "top_power": False,
     "base_power": False,
     "lock_power": False,
+    "slid_friction": False,
+    "slip_work": False,
 }
 """Programs that are differentiated, and whether the block of their results is at hand where this is done."""
 

@@ -90,6 +90,10 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "friction": {"Y": r"Y_{@}", "Z": r"Z_{@}"},
     "shear": {"Y": r"g_{1@}", "Z": r"g_{2@}"},
     "stage": {"Y": r"Y^{0}_{@}", "Z": r"Z^{0}_{@}", "tau": r"\tau_{@}", "rest": r"\rho_{@}"},
+    "slip": {"Y": r"Y^{0}_{@}", "turn": r"\alpha_{@}", "beta": r"\beta"},
+    "slip_end": {"Y": r"Y^{1}_{@}", "N": r"\bar{N}_{@}"},
+    "slid": {"Y": r"Y_{@}", "g": r"g_{1@}"},
+    "slip_work": {"stored": r"W_{f@}", "lost": r"W_{d@}"},
     "unknowns": {"psi": r"\tilde{\psi}_{@}", "theta": r"\tilde{\theta}_{@}", "N": r"N_{@}"},
     "contact": {
         "M": r"M_{@,#}",
@@ -177,6 +181,8 @@ PLACES: dict[str, dict[str, str]] = {
     "base_power": {"b": "1", "base": "g", "f": "1", "m": "1", "out": "1"},
     "lock_power": {"b": "k", "l": "k", "out": "k"},
     "rotation_angles": {"t": "", "out": ""},
+    "slid_friction": {"par": r"\gamma", "s": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
+    "slip_work": {"par": r"\gamma", "s": r"\gamma", "e": r"\gamma", "out": r"\gamma"},
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
     "angular_balance": {"par": "k", "b": "k", "lo": "k-1", "ml": "k-1", "up": "k", "mu": "k", "out": "k"},
 }
@@ -198,6 +204,15 @@ class Latex(LatexPrinter):  # type: ignore[misc]
 
     def _print_Step(self, expr: sp.Function, exp: Any = None) -> str:
         return self._function("H", expr, exp)
+
+    def _print_Select(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("if", expr, exp)
+
+    def _print_Decay(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("decay", expr, exp)
+
+    def _print_Clamp(self, expr: sp.Function, exp: Any = None) -> str:
+        return self._function("clamp", expr, exp)
 
     def _print_ArcTan2(self, expr: sp.Function, exp: Any = None) -> str:
         return self._function("atan2", expr, exp)

@@ -112,7 +112,7 @@ def lower(program: Program) -> Kernel:
     values = needed_statements(program.statements, results)
     if not program.tangents:
         return Kernel(program, values, (), ())
-    functions = {s.expression: s.target for s in program.statements if s.expression.is_Function}
+    functions = {s.expression: s.target for s in values if s.expression.is_Function}
     targets = {s for name in program.tangents for s in program.results[name].free_symbols}
     active = active_inputs(program)  # symbols with a nonzero tangent
     partials: list[Statement] = []

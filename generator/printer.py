@@ -34,6 +34,17 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
     def _print_Step(self, expr: sp.Function) -> str:
         return f"msfp_heaviside({self._print(expr.args[0])})"
 
+    def _print_Select(self, expr: sp.Function) -> str:
+        condition, chosen, other = (self._print(argument) for argument in expr.args)
+        return f"({condition} > 0.0 ? {chosen} : {other})"
+
+    def _print_Decay(self, expr: sp.Function) -> str:
+        argument = self._print(expr.args[0])
+        return f"({argument} > 0.0 ? msfp_exp(-({argument})) : 1.0)"
+
+    def _print_Clamp(self, expr: sp.Function) -> str:
+        return f"fmax(-1.0, fmin(1.0, {self._print(expr.args[0])}))"
+
     def _print_ArcTan2(self, expr: sp.Function) -> str:
         return f"msfp_angle({self._print(expr.args[0])}, {self._print(expr.args[1])})"
 

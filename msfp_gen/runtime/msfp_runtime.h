@@ -105,8 +105,8 @@ typedef struct {
     double fp[MSFP_NB][2]; /* [-] */
     int same_base;         /* the base has not moved since the last evaluation in this work area */
 #if MSFP_CLOSED_FORM
-    int closed_form;      /* Y is a function of the slip of the whole step, from fp */
-    double turn[MSFP_NB]; /* [rad] the rotation of a body in the step is beta v + turn */
+    int closed_form; /* Y is a function of the slip of the whole step, and fp is not used */
+    double slip[MSFP_NB][MSFP_SLIP_SIZE];
 #endif
 } msfp_seed;
 

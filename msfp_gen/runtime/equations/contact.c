@@ -179,22 +179,25 @@ MSFP_INLINE int jacobian_row(int r) { return r < MOMENT ? r : r == MOMENT ? MOME
 
 #if MSFP_CLOSED_FORM
 /* Y of all surfaces after the slip of the step, and their contacts; slope: dg/d(angular velocity of the body)
- * [s/rad]. */
-MSFP_INLINE int closed_form_stage(const msfp_parameters *p, lanes *all, const msfp_seed *seed, double *slope)
+ * [s/rad], or NULL. */
+MSFP_INLINE int closed_form_stage(const msfp_parameters *p, const msfp_work *w, const msfp_seed *seed, lanes *all,
+                                  double *slope)
 {
+    static const double unit[INPUTS] = { [MSFP_LOCAL_DWY] = 1.0 };
     double finite = 0.0;
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
-        const double per_turn = msfp_slip_per_turn(p->surface[j]), T = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
-        const double rate = per_turn * all->local[MSFP_LOCAL_DWY * LANES + s];
-        const double slip = seed->beta * rate + per_turn * seed->turn[j];
-        const double Y = msfp_friction_after_slip(all->stage[s], slip);
-        const double turned = per_turn * seed->beta * msfp_friction_slope(Y, slip);
-        all->g[s] = msfp_sheared(Y, rate, T, turned, per_turn, &slope[s]);
-        all->stage[s] = Y; /* the kernel leaves Y as it is, and gives its rate */
-        all->stage[MSFP_STAGE_TAU * LANES + s] = T;
+        double slid[MSFP_SLID_SIZE], slopes[MSFP_SLID_SIZE];
+        if (slope) {
+            msfp_slid_friction_tangent(p->surface[j], seed->slip[j], w->local[j], slid, unit, slopes);
+            slope[s] = slopes[MSFP_SLID_G];
+        } else
+            msfp_slid_friction(p->surface[j], seed->slip[j], w->local[j], slid);
+        all->g[s] = slid[MSFP_SLID_G];
+        all->stage[s] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
+        all->stage[MSFP_STAGE_TAU * LANES + s] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
         all->stage[MSFP_STAGE_REST * LANES + s] = 1.0;
-        finite += Y;
+        finite += slid[MSFP_SLID_Y];
     }
     msfp_contact_lanes(&p->lanes[0][0], all->stage, all->local, all->g, all->out);
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
@@ -260,7 +263,7 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
         double slope[LANES];
-        const int status = closed_form_stage(p, &all, seed, slope);
+        const int status = closed_form_stage(p, w, seed, &all, condensed ? slope : NULL);
         if (status == MSFP_OK && condensed)
             condense_closed_form(&p->lanes[0][0], &all, slope, condensed);
         scatter(&all, w, g);

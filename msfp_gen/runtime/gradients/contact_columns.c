@@ -31,58 +31,6 @@ static const struct {
 /* Indices in the block of a contact. The moment comes first, then what the equations of the unknowns contain. */
 static const int result[RESULTS] = MSFP_CONTACT_RESULT_LIST;
 
-#if MSFP_CLOSED_FORM
-/* Derivatives of Y after a slip (msfp_friction_after_slip): with respect to Y before, and to the slip. */
-MSFP_INLINE void slip_slopes(double Y, double slip, double slopes[2])
-{
-    const double end = msfp_friction_after_slip(Y, slip);
-    slopes[1] = msfp_friction_slope(end, slip);
-    if (MSFP_PLASTIC || Y * slip < 0.0)
-        slopes[0] = slopes[1]; /* a function of Y + slip, from the start or from where friction is zero */
-    else
-        slopes[0] = fabs(Y) < 1.0 ? (1.0 - end * end) / (1.0 - Y * Y) : 1.0;
-}
-
-/* The block `stage` where Y is a function of the slip of the step, and the rate of that slip. */
-MSFP_INLINE double closed_form_stage(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w, int j,
-                                     double *stage)
-{
-    const double *par = p->surface[j], per_turn = msfp_slip_per_turn(par), rate = per_turn * w->local[j][MSFP_LOCAL_DWY];
-    stage[MSFP_STAGE_Y] = msfp_friction_after_slip(seed->fp[j][0], seed->beta * rate + per_turn * seed->turn[j]);
-    stage[MSFP_STAGE_TAU] = par[MSFP_SURFACE_PARAMETERS_TD];
-    stage[MSFP_STAGE_REST] = 1.0;
-    return rate;
-}
-
-/* Columns of that block and of g. */
-MSFP_INLINE void closed_form(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d, int j,
-                             double *dstage, double *dg)
-{
-    const double *par = p->surface[j], *dpar = dp->surface[j], T = par[MSFP_SURFACE_PARAMETERS_TD];
-    const double per_turn = msfp_slip_per_turn(par), turning = w->local[j][MSFP_LOCAL_DWY];
-    const double rate = per_turn * turning, slip = seed->beta * rate + per_turn * seed->turn[j], Y0 = seed->fp[j][0];
-    const double Y = msfp_friction_after_slip(Y0, slip), left = msfp_friction_slope(Y, rate);
-    double slopes[2];
-    slip_slopes(Y0, slip, slopes);
-    for (int c = 0; c < C; ++c) {
-        const double dper = per_turn * (dpar[MSFP_SURFACE_PARAMETERS_R * C + c] / par[MSFP_SURFACE_PARAMETERS_R] -
-                                        dpar[MSFP_SURFACE_PARAMETERS_DY * C + c] / par[MSFP_SURFACE_PARAMETERS_DY]);
-        const double drate = dper * turning + per_turn * d->local[j][MSFP_LOCAL_DWY * C + c];
-        const double dslip =
-            seed->beta * drate + dat->beta[c] * rate + dper * seed->turn[j] + per_turn * dat->turn[j][c];
-        const double dY = slopes[0] * dat->f[j][0][c] + slopes[1] * dslip, dT = dpar[MSFP_SURFACE_PARAMETERS_TD * C + c];
-        const int free = !MSFP_PLASTIC || fabs(Y + T * rate) < 1.0;
-        const double bend = !MSFP_PLASTIC && Y * rate > 0.0 ? -2.0 * Y * dY : 0.0;
-        const double shear = MSFP_PLASTIC ? 1.0 : left;
-        dg[c] = free ? dY + shear * (dT * rate + T * drate) + T * rate * bend : 0.0;
-        dstage[MSFP_STAGE_Y * C + c] = dY;
-        dstage[MSFP_STAGE_TAU * C + c] = dT;
-        dstage[MSFP_STAGE_REST * C + c] = 0.0;
-    }
-}
-#endif
-
 /* The block `stage` of surface j, as msfp_contacts forms it. */
 MSFP_INLINE void contact_stage(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w, int j,
                                double *stage)
@@ -93,8 +41,13 @@ MSFP_INLINE void contact_stage(const msfp_parameters *p, const msfp_seed *seed, 
     for (int i = 0; i < FRICTION; ++i)
         stage[MSFP_STAGE_Y + i] = seed->fp[j][i];
 #if MSFP_CLOSED_FORM
-    if (seed->closed_form)
-        closed_form_stage(p, seed, w, j, stage);
+    if (seed->closed_form) {
+        double slid[MSFP_SLID_SIZE];
+        msfp_slid_friction(p->surface[j], seed->slip[j], w->local[j], slid);
+        stage[MSFP_STAGE_Y] = slid[MSFP_SLID_Y];
+        stage[MSFP_STAGE_TAU] = T;
+        stage[MSFP_STAGE_REST] = 1.0;
+    }
 #else
     (void)w;
 #endif
@@ -244,7 +197,13 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
         inputs[i] = blocks[input[i].block] + input[i].index * C;
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
-        closed_form(p, dp, seed, dat, w, d, j, dstage, unknowns);
+        double dslid[MSFP_SLID_SIZE * C];
+        msfp_slid_friction_direction(p->surface[j], seed->slip[j], w->local[j], dp->surface[j], dat->slip[j],
+                                     d->local[j], dslid);
+        memset(dstage, 0, sizeof dstage);
+        memcpy(dstage + MSFP_STAGE_Y * C, dslid + MSFP_SLID_Y * C, sizeof(msfp_columns));
+        memcpy(dstage + MSFP_STAGE_TAU * C, dp->surface[j] + MSFP_SURFACE_PARAMETERS_TD * C, sizeof(msfp_columns));
+        memcpy(unknowns, dslid + MSFP_SLID_G * C, sizeof(msfp_columns));
         results_columns(slopes, inputs, INPUTS, rows, j, d->contact[j]);
         return;
     }

@@ -21,13 +21,13 @@ typedef struct {
     double top[MSFP_TOP_PARAMETERS_SIZE * MSFP_COLUMNS];
 } msfp_parameter_columns;
 
-/* Of a state and its inputs, and of the stage formula of Y, Z: f is fp of msfp_seed. */
+/* Of a state and its inputs, and of the stage formula of Y, Z: f is fp and slip that of msfp_seed. */
 typedef struct {
     msfp_columns base[3][6], load[6];
     int base_moves; /* whether those of the base may differ from zero */
     msfp_columns q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
     msfp_columns foot[2], foot_beta, beta;
-    msfp_columns turn[MSFP_NB]; /* of a quasi-static step */
+    double slip[MSFP_NB][MSFP_SLIP_SIZE * MSFP_COLUMNS]; /* of a quasi-static step, instead of f */
 } msfp_point_columns;
 
 /* Of the results of one evaluation: blocks of msfp_work. */

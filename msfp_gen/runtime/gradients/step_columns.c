@@ -263,8 +263,8 @@ static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_group *group)
         for (int c = 0; c < C; ++c) {
             const double q = now->q[k][ANGLE][c];
             Q[k][ANGLE][c] = q + r * r / (1.0 + 2.0 * r) * (q - group->before[k][c]);
-            dat->turn[k][c] = Q[k][ANGLE][c] - q;
-            dat->f[k][0][c] = now->f[k][0][c];
+            dat->slip[k][MSFP_SLIP_Y * C + c] = now->f[k][0][c];
+            dat->slip[k][MSFP_SLIP_TURN * C + c] = Q[k][ANGLE][c] - q;
             group->before[k][c] = q;
         }
     memcpy(dat->foot, now->foot, sizeof dat->foot);

@@ -62,6 +62,8 @@ MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i)
 }
 
 #if MSFP_CLOSED_FORM
+#include "msfp_gradient_kernels.h"
+
 enum { ANGLE = 1 };
 
 /* What the work of the next step uses of the end of this one, at the point and evaluation of the group. */
@@ -79,53 +81,26 @@ static void ends(const msfp_group *group, const msfp_power_columns *before, msfp
     }
 }
 
-/* Derivatives of msfp_friction_loss with respect to Y before the slip, and to the slip. */
-static void loss_slopes(double Y, double slip, double slopes[2])
-{
-    const double sign = slip < 0.0 ? -1.0 : 1.0, y0 = sign * Y;
-    double y = y0, rest = fabs(slip);
-    slopes[0] = slopes[1] = 0.0;
-    if (MSFP_PLASTIC) {
-        slopes[0] = slopes[1] = sign * (y + rest > 1.0);
-        return;
-    }
-    if (!msfp_unload_to_zero(&y, &rest))
-        return;
-    const double decay = msfp_exp(-2.0 * rest), left = (1.0 - y) * decay, sum = 1.0 + y + left;
-    const double end = (1.0 + y - left) / sum;
-    slopes[1] = sign * end * end * end;
-    /* (end^3 - y^3)/(1 - y^2) without cancellation; after unloading a function of y + rest */
-    slopes[0] = y0 < 0.0 ? slopes[1]
-                         : sign * (1.0 - 2.0 * decay / sum) * (end * end + end * y + y * y) / (1.0 + y);
-}
-
 /* As friction_work of quasistatic.c. */
 static void friction_work(const msfp_run *run, const msfp_group *group, const msfp_history_columns *to,
                           msfp_columns work[WORKS])
 {
-    const msfp_history_columns *from = &group->history;
     for (int k = 0; k < NB; ++k) {
-        const double *par = run->parameters.surface[k], *dpar = group->parameters.surface[k];
-        const double mu = par[MSFP_SURFACE_PARAMETERS_MU], dy = par[MSFP_SURFACE_PARAMETERS_DY];
-        const double Y = run->now.f[k][0], end = run->next.f[k][0], per_turn = msfp_slip_per_turn(par);
-        const double turn = run->next.q[k][ANGLE] - run->now.q[k][ANGLE];
-        const double N = 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k]);
-        const double loss = msfp_friction_loss(Y, per_turn * turn), stored = 0.5 * (end * end - Y * Y);
-        double slopes[2];
-        loss_slopes(Y, per_turn * turn, slopes);
+        const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = run->now.f[k][0],
+                                              [MSFP_SLIP_TURN] = run->next.q[k][ANGLE] - run->now.q[k][ANGLE] };
+        const double end[MSFP_SLIP_END_SIZE] = {
+            run->next.f[k][0], 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k])
+        };
+        double dslip[MSFP_SLIP_SIZE * C] = { 0 }, dend[MSFP_SLIP_END_SIZE * C], done[MSFP_SLIP_WORK_SIZE * C];
         for (int c = 0; c < C; ++c) {
-            const double dmu = dpar[MSFP_SURFACE_PARAMETERS_MU * C + c], ddy = dpar[MSFP_SURFACE_PARAMETERS_DY * C + c];
-            const double dR = dpar[MSFP_SURFACE_PARAMETERS_R * C + c], dY = group->now.f[k][0][c];
-            const double dN = 0.5 * (from->normal[k][c] + to->normal[k][c]);
-            const double dscale = dN * mu * dy + N * (dmu * dy + mu * ddy), scale = N * mu * dy;
-            const double dper = per_turn * (dR / par[MSFP_SURFACE_PARAMETERS_R] - ddy / dy);
-            const double dslip =
-                dper * turn + per_turn * (group->next.q[k][ANGLE][c] - group->now.q[k][ANGLE][c]);
-            work[MSFP_WORK_FRICTION_STORED][c] +=
-                dscale * stored + scale * (end * group->next.f[k][0][c] - Y * dY);
-            work[MSFP_WORK_FRICTION_DISSIPATED][c] +=
-                dscale * loss + scale * (slopes[0] * dY + slopes[1] * dslip);
+            dslip[MSFP_SLIP_Y * C + c] = group->now.f[k][0][c];
+            dslip[MSFP_SLIP_TURN * C + c] = group->next.q[k][ANGLE][c] - group->now.q[k][ANGLE][c];
+            dend[MSFP_SLIP_END_Y * C + c] = group->next.f[k][0][c];
+            dend[MSFP_SLIP_END_N * C + c] = 0.5 * (group->history.normal[k][c] + to->normal[k][c]);
         }
+        msfp_slip_work_direction(run->parameters.surface[k], slip, end, group->parameters.surface[k], dslip, dend, done);
+        msfp_add_columns(&work[MSFP_WORK_FRICTION_STORED], (msfp_columns *)done + MSFP_SLIP_WORK_STORED, 1.0, 1);
+        msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0, 1);
     }
 }
 

@@ -15,7 +15,10 @@ int msfp_is_quasistatic(const msfp_run *run)
 }
 
 #if MSFP_CLOSED_FORM
+#include "msfp_kernels.h"
+
 enum { NB = MSFP_NB, ANGLE = 1 }; /* theta, the unknown of a planar body */
+static const double largest_change = 0.4; /* of Y in a step, as extrapolated */
 
 /* What the next step uses of a state. */
 static void store_state(msfp_step_history *to, const msfp_point *at, const msfp_work *w)
@@ -49,8 +52,9 @@ static void parabola(const msfp_run *run, msfp_stage *s, double h)
     for (int k = 0; k < NB; ++k) {
         const double now = run->now.q[k][ANGLE];
         s->Q[k][ANGLE] = now + r * r / (1.0 + 2.0 * r) * (now - run->step_history.q[k]);
-        s->seed.turn[k] = s->Q[k][ANGLE] - now;
-        s->seed.fp[k][0] = run->now.f[k][0];
+        s->seed.slip[k][MSFP_SLIP_Y] = run->now.f[k][0];
+        s->seed.slip[k][MSFP_SLIP_TURN] = s->Q[k][ANGLE] - now;
+        s->seed.slip[k][MSFP_SLIP_BETA] = s->beta;
     }
     s->seed.cq = s->seed.beta = s->beta;
     s->seed.cv = 1.0;
@@ -71,7 +75,7 @@ static void guess(const msfp_run *run, msfp_stage *s, double h, int extrapolate)
     for (int k = 0; k < NB; ++k) {
         const double turn =
             extrapolate ? h * (run->now.v[k][ANGLE] + 0.5 * h * run->now.a[k][ANGLE]) + cubic_term(run, k, h) : 0.0;
-        s->at.v[k][ANGLE] = (turn - s->seed.turn[k]) / s->beta;
+        s->at.v[k][ANGLE] = (turn - s->seed.slip[k][MSFP_SLIP_TURN]) / s->beta;
     }
 }
 
@@ -108,6 +112,20 @@ static double reversal_error(const msfp_run *run, double h)
     return worst * worst;
 }
 
+/* Change of Y of surface k when the body turns by `turn` [rad], which is at most the slip over d_y. */
+static double friction_change(const msfp_run *run, int k, double turn)
+{
+    static const double rates[MSFP_LOCAL_SIZE];
+    const double *par = run->parameters.surface[k];
+    const double bound = fabs(turn) * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
+    if (bound <= largest_change)
+        return bound;
+    const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = run->now.f[k][0], [MSFP_SLIP_TURN] = turn };
+    double slid[MSFP_SLID_SIZE];
+    msfp_slid_friction(par, slip, rates, slid);
+    return fabs(slid[MSFP_SLID_Y] - slip[MSFP_SLIP_Y]);
+}
+
 double msfp_limit_step(const msfp_run *run, double h)
 {
     for (int k = 0; k < NB; ++k) {
@@ -117,15 +135,9 @@ double msfp_limit_step(const msfp_run *run, double h)
             h = fmax(-v / a, 0.02 * h);
     }
     for (int k = 0; k < NB; ++k) {
-        const double *par = run->parameters.surface[k], v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE],
-                     Y = run->now.f[k][0];
-        for (int i = 0; i < 20; ++i) {
-            const double slip = msfp_slip_per_turn(par) * h * (v + 0.5 * h * a);
-            if (fabs(slip) <= 0.4 ||
-                fabs(msfp_friction_after_slip(Y, slip) - Y) <= 0.4) /* Y never changes by more than the slip */
-                break;
+        const double v = run->now.v[k][ANGLE], a = run->now.a[k][ANGLE];
+        for (int i = 0; i < 20 && friction_change(run, k, h * (v + 0.5 * h * a)) > largest_change; ++i)
             h *= 0.7;
-        }
     }
     return h;
 }
@@ -152,12 +164,15 @@ static double second_difference(const msfp_run *run, double h, const double *pow
 static void friction_work(const msfp_run *run, double work[MSFP_WORKS])
 {
     for (int k = 0; k < NB; ++k) {
-        const double *par = run->parameters.surface[k], Y = run->now.f[k][0], end = run->next.f[k][0];
-        const double turn = run->next.q[k][ANGLE] - run->now.q[k][ANGLE];
-        const double scale = 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k]) *
-                             par[MSFP_SURFACE_PARAMETERS_MU] * par[MSFP_SURFACE_PARAMETERS_DY];
-        work[MSFP_WORK_FRICTION_STORED] += scale * 0.5 * (end * end - Y * Y);
-        work[MSFP_WORK_FRICTION_DISSIPATED] += scale * msfp_friction_loss(Y, msfp_slip_per_turn(par) * turn);
+        const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = run->now.f[k][0],
+                                              [MSFP_SLIP_TURN] = run->next.q[k][ANGLE] - run->now.q[k][ANGLE] };
+        const double end[MSFP_SLIP_END_SIZE] = {
+            run->next.f[k][0], 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k])
+        };
+        double done[MSFP_SLIP_WORK_SIZE];
+        msfp_slip_work(run->parameters.surface[k], slip, end, done);
+        work[MSFP_WORK_FRICTION_STORED] += done[MSFP_SLIP_WORK_STORED];
+        work[MSFP_WORK_FRICTION_DISSIPATED] += done[MSFP_SLIP_WORK_LOST];
     }
 }
 

@@ -34,7 +34,6 @@
 #define MSFP_UPLIFT 0
 #define MSFP_CLOSED_FORM 0 /* friction is a function of the slip of a step: planar, massless, constant coefficient */
 #define MSFP_TOP_ROTATION 0 /* the support of the top plate rotates as prescribed */
-#define MSFP_PLASTIC 0 /* friction is elastic-perfectly plastic */
 #define MSFP_LAW 0 /* mu = constant */
 #define MSFP_LAW_VALUES 0 /* numbers of the friction law, the last ones of a surface */
 #define MSFP_HEAT 0 /* states of the temperature of a surface */
@@ -621,6 +620,71 @@ static inline double msfp_stage_tau(const double *block)
 static inline double msfp_stage_rest(const double *block)
 {
     return block[2];
+}
+
+/* slip */
+enum {
+    MSFP_SLIP_Y = 0, /* [-] Y at the start of a step whose slip determines it */
+    MSFP_SLIP_TURN = 1, /* [rad] rotation of the body above in the step, less beta omega' */
+    MSFP_SLIP_BETA = 2, /* [s] diagonal entry of the stage formula of that rotation */
+    MSFP_SLIP_SIZE = 3
+};
+static inline double msfp_slip_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_slip_turn(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_slip_beta(const double *block)
+{
+    return block[2];
+}
+
+/* slip_end */
+enum {
+    MSFP_SLIP_END_Y = 0, /* [-] Y at the end of the step */
+    MSFP_SLIP_END_N = 1, /* [N] mean of the normal forces at its ends */
+    MSFP_SLIP_END_SIZE = 2
+};
+static inline double msfp_slip_end_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_slip_end_N(const double *block)
+{
+    return block[1];
+}
+
+/* slid */
+enum {
+    MSFP_SLID_Y = 0, /* [-] Y at the end of the step */
+    MSFP_SLID_G = 1, /* [-] friction force over -mu N: Y + T dY/dt */
+    MSFP_SLID_SIZE = 2
+};
+static inline double msfp_slid_Y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_slid_g(const double *block)
+{
+    return block[1];
+}
+
+/* slip_work */
+enum {
+    MSFP_SLIP_WORK_STORED = 0, /* [J] stored in the step */
+    MSFP_SLIP_WORK_LOST = 1, /* [J] dissipated by plastic slip in the step */
+    MSFP_SLIP_WORK_SIZE = 2
+};
+static inline double msfp_slip_work_stored(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_slip_work_lost(const double *block)
+{
+    return block[1];
 }
 
 /* unknowns */

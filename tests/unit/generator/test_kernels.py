@@ -1,0 +1,203 @@
+"""Emitted kernels as compiled, against formulas that share nothing with their programs, and against differences."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import pytest
+from support import Array
+
+from msfp_gen import Effects, Layout
+from msfp_gen.generator import generate
+from msfp_gen.generator.derive import Equations, derive
+from msfp_gen.generator.gradients import COLUMNS, DIFFERENTIATED
+from msfp_gen.jit.build import runtime_sources
+from msfp_gen.jit.compiler import FLAGS, find_compiler
+from msfp_gen.specification.layout import ModelSpec
+
+QUASISTATIC = {"dimension": "planar", "sliders": "massless", "rims": False}
+SHOWN = ("slid_friction", "slip_work")
+
+
+class Kernels:
+    """Some kernels of a model, which take and return {block: {field: value}} and {field: value}."""
+
+    def __init__(self, folder: Path, names: tuple[str, ...], effects: dict[str, object]) -> None:
+        spec = ModelSpec(Layout(2, 1, 0), Effects(**effects), gradients=not effects.get("uplift"))  # type: ignore[arg-type]
+        equations: Equations = derive(spec)
+        self.programs = {p.name: p for p in equations.programs if p.name in names}
+        assert set(self.programs) == set(names)
+        header = "msfp_gradient_kernels.h" if spec.gradients else "msfp_kernels.h"
+        source = f'#include "{header}"\n'
+        for program in self.programs.values():
+            blocks = [use.alias for use in program.inputs]
+            source += self._wrapped(program.name, [*blocks, "out"])
+            if spec.gradients and program.name in DIFFERENTIATED:
+                at_hand = ["out"] if DIFFERENTIATED[program.name] else []
+                moved = [*blocks, *at_hand, *(f"d{name}" for name in [*blocks, *at_hand]), "dout"]
+                source += self._wrapped(f"{program.name}_direction", moved)
+        for name, content in (runtime_sources() | generate(spec).files | {"kernels.c": source}).items():
+            (folder / name).write_text(content, encoding="utf-8")
+        flags = [*FLAGS["c"], "-fvisibility=default", "-Werror", "-shared"]
+        subprocess.run([*find_compiler().command, *flags, "kernels.c", "-o", "k.so", "-lm"], cwd=folder, check=True)
+        self.library = ctypes.CDLL(str(folder / "k.so"))
+
+    @staticmethod
+    def _wrapped(name: str, arguments: list[str]) -> str:
+        given = ", ".join(f"{'' if a in ('out', 'dout') else 'const '}double *{a}" for a in arguments)
+        return f"void {name}_({given}) {{ msfp_{name}({', '.join(arguments)}); }}\n"
+
+    def __call__(self, name: str, **given: dict[str, float]) -> dict[str, float]:
+        """Values of the results."""
+        program = self.programs[name]
+        assert program.output is not None
+        fields = [f.name for f in program.output.block.fields]
+        out = np.zeros(len(fields))
+        self._call(name, [*self._blocks(name, given), out])
+        return dict(zip(fields, out, strict=True))
+
+    def slopes(self, name: str, alias: str, field: str, **given: dict[str, float]) -> dict[str, float]:
+        """Derivatives of the results with respect to one input."""
+        program = self.programs[name]
+        assert program.output is not None
+        blocks, fields = self._blocks(name, given), [f.name for f in program.output.block.fields]
+        moves = [np.zeros((len(block), COLUMNS)) for block in blocks]
+        for use, move in zip(program.inputs, moves, strict=True):
+            if use.alias == alias:
+                move[[f.name for f in use.block.fields].index(field)] = np.arange(1, COLUMNS + 1)
+        out = np.zeros((len(fields), COLUMNS))
+        self._call(f"{name}_direction", [*blocks, *moves, out])
+        assert np.allclose(out, np.outer(out[:, 0], np.arange(1, COLUMNS + 1)), rtol=1e-12, atol=1e-12)
+        return dict(zip(fields, out[:, 0], strict=True))
+
+    def _blocks(self, name: str, given: dict[str, dict[str, float]]) -> list[Array]:
+        return [
+            np.array([given.get(use.alias, {}).get(f.name, 0.0) for f in use.block.fields])
+            for use in self.programs[name].inputs
+        ]
+
+    def _call(self, name: str, arrays: list[Array]) -> None:
+        getattr(self.library, f"{name}_")(*(ctypes.c_void_p(array.ctypes.data) for array in arrays))
+
+
+SURFACE = {"sign": -1.0, "R": 0.5, "mu": 0.1, "dy": 0.01, "td": 0.02}
+PER_TURN = 50.0  # -sign R/d_y
+START, SLIPS = (-1.0, -0.6, 0.0, 0.3, 0.9, 1.0), (-3.0, -0.5, -1e-3, 1e-3, 0.2, 0.8, 40.0)
+
+
+class BoucWen:
+    """dY/ds is 1 while friction unloads, then 1 - Y^2; it dissipates the integral of Y^3 ds against the slip."""
+
+    def parts(self, Y: float, slip: float) -> tuple[int, mp.mpf, mp.mpf]:
+        """Sign of the slip, y along it once friction does not unload, the slip left."""
+        sign = 1 if slip > 0 else -1
+        unloading = min(max(-sign * mp.mpf(Y), 0), abs(slip))
+        return sign, sign * mp.mpf(Y) + unloading, abs(slip) - unloading
+
+    def after(self, Y: float, slip: float) -> mp.mpf:
+        sign, y, rest = self.parts(Y, slip)
+        return sign * (y if rest == 0 or y == 1 else mp.tanh(mp.atanh(y) + rest))
+
+    def sheared(self, Y: float, speed: float) -> mp.mpf:
+        return Y + SURFACE["td"] * speed * (1 - Y**2 if Y * speed > 0 else 1)
+
+    def lost(self, Y: float, slip: float) -> mp.mpf:
+        _, y, rest = self.parts(Y, slip)
+        return rest if y == 1 else mp.quad(lambda x: mp.tanh(mp.atanh(y) + x) ** 3, mp.linspace(0, rest, 9))
+
+    def slopes(self, Y: float, slip: float) -> tuple[mp.mpf, mp.mpf]:
+        """Of `lost`, by Y and by the slip."""
+        sign, y, rest = self.parts(Y, slip)
+        end = sign * self.after(Y, slip)
+        by_slip = end**3 if rest else mp.mpf(0)
+        return sign * ((end**3 - y**3) / (1 - y**2) if sign * Y >= 0 else by_slip), sign * by_slip
+
+
+class Plastic:
+    """Y + s between -1 and 1; the slip beyond is dissipated."""
+
+    def after(self, Y: float, slip: float) -> mp.mpf:
+        return max(min(Y + mp.mpf(slip), mp.mpf(1)), mp.mpf(-1))
+
+    def sheared(self, Y: float, speed: float) -> mp.mpf:
+        return self.after(Y, SURFACE["td"] * speed)
+
+    def lost(self, Y: float, slip: float) -> mp.mpf:
+        return abs(Y + mp.mpf(slip) - self.after(Y, slip))
+
+    def slopes(self, Y: float, slip: float) -> tuple[mp.mpf, mp.mpf]:
+        slope = mp.sign(Y + slip) if abs(Y + slip) > 1 else mp.mpf(0)
+        return slope, slope
+
+
+Friction = tuple[Kernels, BoucWen | Plastic]
+
+
+@pytest.fixture(scope="module", params=["report", "plastic"])
+def friction(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Friction]:
+    kernels = Kernels(tmp_path_factory.mktemp("slip"), SHOWN, QUASISTATIC | {"bouc_wen": request.param})
+    with mp.workdps(25):
+        yield kernels, BoucWen() if request.param == "report" else Plastic()
+
+
+@pytest.mark.parametrize("Y", START)
+def test_friction_after_the_slip_of_a_step(friction: Friction, Y: float) -> None:
+    """Its rotation is turn + beta rate; derivatives against differences where the formula has two sides."""
+    kernels, model = friction
+
+    def slid(Y: float, turn: float, beta: float, rate: float) -> tuple[mp.mpf, mp.mpf]:
+        end = model.after(Y, PER_TURN * (turn + beta * rate))
+        return end, model.sheared(end, PER_TURN * rate)
+
+    for slip, rate in product(SLIPS, (0.0, 0.07, -0.4)):
+        at = [mp.mpf(x) for x in (Y, slip / PER_TURN - 0.01 * rate, 0.01, rate)]
+        given = {
+            "par": SURFACE,
+            "s": dict(zip(("Y", "turn", "beta"), map(float, at), strict=False)),
+            "loc": {"dwy": rate},
+        }
+        found, want = kernels("slid_friction", **given), slid(*at)
+        assert (found["Y"], found["g"]) == pytest.approx(tuple(map(float, want)), abs=2e-15)
+        if abs(Y) == 1.0 or rate == 0.0 or abs(abs(want[1]) - 1) < 1e-9:
+            continue
+        for i, (alias, name) in enumerate((("s", "Y"), ("s", "turn"), ("s", "beta"), ("loc", "dwy"))):
+            low, high = (slid(*at[:i], at[i] + step, *at[i + 1 :]) for step in (-mp.mpf("1e-9"), mp.mpf("1e-9")))
+            slopes = kernels.slopes("slid_friction", alias, name, **given)
+            expected = [float((b - a) / mp.mpf("2e-9")) for a, b in zip(low, high, strict=True)]
+            assert (slopes["Y"], slopes["g"]) == pytest.approx(expected, rel=1e-9, abs=1e-9), (alias, name)
+
+
+@pytest.mark.parametrize("Y", START)
+def test_work_of_friction_over_a_slip(friction: Friction, Y: float) -> None:
+    kernels, model = friction
+    normal, end = 2e4, 0.25
+    size = normal * SURFACE["mu"] * SURFACE["dy"]
+    for slip in SLIPS:
+        given = {"par": SURFACE, "s": {"Y": Y, "turn": slip / PER_TURN}, "e": {"Y": end, "N": normal}}
+        found = kernels("slip_work", **given)
+        assert found["stored"] == pytest.approx(size * (end**2 - Y**2) / 2, rel=1e-14)
+        assert found["lost"] == pytest.approx(size * float(model.lost(Y, slip)), abs=1e-15 * size * (1 + abs(slip)))
+        by_friction = kernels.slopes("slip_work", "par", "mu", **given)
+        assert by_friction == pytest.approx({name: work / SURFACE["mu"] for name, work in found.items()}, rel=1e-13)
+        if abs(Y) == 1.0:  # one-sided
+            continue
+        slopes = [kernels.slopes("slip_work", "s", name, **given)["lost"] / size for name in ("Y", "turn")]
+        by_Y, by_slip = (float(x) for x in model.slopes(Y, slip))
+        assert slopes == pytest.approx([by_Y, PER_TURN * by_slip], abs=1e-14 * PER_TURN)
+        by_length = kernels.slopes("slip_work", "par", "dy", **given)["lost"]  # the slip over d_y shrinks as d_y grows
+        assert by_length * SURFACE["dy"] == pytest.approx(found["lost"] - size * by_slip * slip, abs=1e-12 * size)
+
+
+def test_friction_at_rest_is_elastic(friction: Friction) -> None:
+    """Newton's method starts from bodies at rest: there the slope is that of unloading, also where friction is full."""
+    kernels, _ = friction
+    for Y in (-0.5, 0.5):
+        given = {"par": SURFACE, "s": {"Y": Y}}
+        assert kernels("slid_friction", **given) == {"Y": Y, "g": Y}
+        assert kernels.slopes("slid_friction", "s", "turn", **given)["Y"] == pytest.approx(PER_TURN, rel=1e-15)
