@@ -52,6 +52,7 @@ class Blocks:
     base_motion: Block
     energy: Block
     unilateral: Block
+    unilateral_depth: Block
     friction_power: Block
     closed_rim: Block
     rim_energy: Block
@@ -271,6 +272,10 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("d1", "m/s", "rate of these components", POLAR)
         .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
+        "unilateral_depth": new("unilateral_depth")
+        .scalar("depth", "m", "penetration; negative where the contact is open")
+        .scalar("beyond", "m", "how far the compression points out of the footprint; positive: edge contact")
+        .build(),
         "unilateral": new("unilateral")
         .vector("F", "N", "force on the body above, along E1, E2, E3", POLAR)
         .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)

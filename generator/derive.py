@@ -81,7 +81,7 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.rims:
         programs.append(contact.rim(blocks))
     if effects.uplift:
-        programs += [seat.seat_inside(blocks), seat.seat_edge(blocks)]
+        programs += [seat.seat_depth(blocks), seat.seat_inside(blocks), seat.seat_edge(blocks)]
         programs += [seat.offset(blocks), seat.rim_to_world(blocks)]
         return Equations(spec, blocks, tuple(programs))
     column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))

@@ -15,11 +15,29 @@ from typing import Any
 import sympy as sp
 
 from .blocks import Blocks
-from .functions import Step
+from .functions import Select, Step
 from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale
 
 Symbols = dict[str, Any]
+
+
+def _compression(x: Symbols) -> Vector:
+    """Compression s = -delta [m]."""
+    return scale(sp.Integer(-1), x["d"])
+
+
+def _inside(s: Vector) -> sp.Expr:
+    """Penetration where s points into the footprint."""
+    return sp.sqrt(dot(s, s))
+
+
+def _at_edge(p: Program, par: Symbols, axis: Vector, s: Vector) -> tuple[sp.Expr, Vector, sp.Expr, sp.Expr]:
+    """Penetration at the edge of the footprint; part of s across the axis, its size, and the part along the axis."""
+    along = p.let(dot(s, axis))
+    across = p.let_vector(add(s, scale(-along, axis)), "across")
+    size = p.let(sp.sqrt(dot(across, across)))
+    return par["ca"] * along + par["sa"] * size, across, size, along
 
 
 def _read_inputs(p: Program, b: Blocks) -> tuple[Symbols, Symbols, Vector]:
@@ -29,7 +47,7 @@ def _read_inputs(p: Program, b: Blocks) -> tuple[Symbols, Symbols, Vector]:
     x: Symbols = p.read(b.coordinates, "x", active=("d", "d1"))
     p.declare_rates(x["d"], x["d1"])
     p.declare_rates(slider["t3"], p.let_vector(cross(slider["w"], slider["t3"]), "dt"))  # (2.36)
-    return par, slider, p.let_vector(scale(sp.Integer(-1), x["d"]), "s")
+    return par, slider, p.let_vector(_compression(x), "s")
 
 
 def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Vector, s: Vector) -> Program:
@@ -52,11 +70,25 @@ def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Ve
     return p
 
 
+def seat_depth(b: Blocks) -> Program:
+    """Penetration, negative where the contact is open, and how far the compression points out of the footprint."""
+    p = Program("unilateral_depth", "unilateral contact: penetration, and by how much the footprint is missed")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    slider: Symbols = p.read(b.body, "b", active=False)
+    x: Symbols = p.read(b.coordinates, "x", active=False)
+    s = p.let_vector(_compression(x), "s")
+    edge, _, size, along = _at_edge(p, par, slider["t3"], s)
+    beyond = p.let(par["ca"] * size - par["sa"] * along)
+    depth = Select(beyond, p.let(edge), p.let(_inside(s)))
+    p.write(b.unilateral_depth, {"depth": depth, "beyond": beyond}, tangents=False)
+    return p
+
+
 def seat_inside(b: Blocks) -> Program:
     """Contact whose resultant passes through the footprint: a spring that is equally stiff in every direction."""
     p = Program("unilateral_inside", "unilateral contact: force while the resultant passes through the footprint")
     par, _, s = _read_inputs(p, b)
-    depth = p.let(sp.sqrt(dot(s, s)), "depth")
+    depth = p.let(_inside(s), "depth")
     return _write_force(p, b, par, depth, p.let_vector(scale(1 / depth, s), "n"), s)
 
 
@@ -65,10 +97,8 @@ def seat_edge(b: Blocks) -> Program:
     p = Program("unilateral_edge", "unilateral contact: force while the slider stands on the edge of its footprint")
     par, slider, s = _read_inputs(p, b)
     axis = slider["t3"]
-    along = p.let(dot(s, axis))
-    across = p.let_vector(add(s, scale(-along, axis)), "across")
-    size = p.let(sp.sqrt(dot(across, across)))
-    depth = p.let(par["ca"] * along + par["sa"] * size, "depth")
+    edge, across, size, _ = _at_edge(p, par, axis, s)
+    depth = p.let(edge, "depth")
     normal = p.let_vector(add(scale(par["ca"], axis), scale(p.let(par["sa"] / size), across)), "n")
     return _write_force(p, b, par, depth, normal, s)
 

@@ -12,44 +12,29 @@ static const int signs[NB] = MSFP_SIGNS;
 /* The body whose face is the footprint of surface j. */
 static int slider_of(int j) { return signs[j] > 0 ? j + 1 : j; }
 
-/* Components of the compression along the axis of the slider and across it [m]. */
-static void compression(const msfp_work *w, int j, double *along, double *across)
+/* Penetration of surface j, and whether it stands on the edge of its footprint. */
+static void depth(const msfp_parameters *p, const msfp_work *w, int j, double *found)
 {
-    double d[3], axis[3], square = 0.0;
-    msfp_coordinates_d_get(w->x[j + 1], d);
-    msfp_body_t3_get(w->body[slider_of(j)], axis);
-    *along = -(d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]);
-    for (int i = 0; i < 3; ++i)
-        square += (d[i] + *along * axis[i]) * (d[i] + *along * axis[i]);
-    *across = sqrt(square);
-}
-
-/* Whether the compression points into the footprint. */
-static int inside(const double *par, double along, double across)
-{
-    return across * par[MSFP_SURFACE_PARAMETERS_CA] <= along * par[MSFP_SURFACE_PARAMETERS_SA];
+    msfp_unilateral_depth(p->surface[j], w->body[slider_of(j)], w->x[j + 1], found);
 }
 
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
 {
-    double along, across;
-    const double *par = p->surface[j];
-    compression(w, j, &along, &across);
-    if (inside(par, along, across))
-        return sqrt(along * along + across * across);
-    return par[MSFP_SURFACE_PARAMETERS_CA] * along + par[MSFP_SURFACE_PARAMETERS_SA] * across;
+    double found[MSFP_UNILATERAL_DEPTH_SIZE];
+    depth(p, w, j, found);
+    return found[MSFP_UNILATERAL_DEPTH_DEPTH];
 }
 
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
 {
-    double along, across, *contact = w->unilateral[j];
-    compression(w, j, &along, &across);
+    double found[MSFP_UNILATERAL_DEPTH_SIZE], *contact = w->unilateral[j];
+    depth(p, w, j, found);
     contact[MSFP_UNILATERAL_GRIP] = contact[MSFP_UNILATERAL_STORED] = contact[MSFP_UNILATERAL_LOST] = 0.0;
-    if (msfp_compression(p, w, j) > 0.0) {
-        if (inside(p->surface[j], along, across))
-            msfp_unilateral_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);
-        else
+    if (found[MSFP_UNILATERAL_DEPTH_DEPTH] > 0.0) { /* at zero the normal is not defined */
+        if (found[MSFP_UNILATERAL_DEPTH_BEYOND] > 0.0)
             msfp_unilateral_edge(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);
+        else
+            msfp_unilateral_inside(p->surface[j], w->body[slider_of(j)], w->x[j + 1], contact);
     }
     if (contact[MSFP_UNILATERAL_GRIP] <= 0.0)
         memset(contact, 0, (FORCE + MOMENT) * sizeof *contact);
@@ -61,16 +46,16 @@ void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
 void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j, const double *drim)
 {
     const int k = slider_of(j);
-    double along, across, contact[MSFP_UNILATERAL_SIZE], wrench[FORCE + MOMENT], *dunilateral = w->dunilateral[j];
-    compression(w, j, &along, &across);
+    double found[MSFP_UNILATERAL_DEPTH_SIZE], contact[MSFP_UNILATERAL_SIZE], wrench[FORCE + MOMENT], *dunilateral = w->dunilateral[j];
+    depth(p, w, j, found);
     if (w->unilateral[j][MSFP_UNILATERAL_GRIP] <= 0.0)
         memset(dunilateral, 0, sizeof w->dunilateral[j]);
-    else if (inside(p->surface[j], along, across))
-        msfp_unilateral_inside_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
-                                       dunilateral);
-    else
+    else if (found[MSFP_UNILATERAL_DEPTH_BEYOND] > 0.0)
         msfp_unilateral_edge_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
                                      dunilateral);
+    else
+        msfp_unilateral_inside_tangent(p->surface[j], w->body[k], w->x[j + 1], contact, w->dbody[k], w->dx[j + 1],
+                                       dunilateral);
     msfp_rim_to_world_tangent(w->body[j], w->x[j + 1], w->rim[j], wrench, w->dbody[j], w->dx[j + 1], drim,
                               w->drim_wrench[j]);
     for (int i = 0; i < FORCE * DOF; ++i)

@@ -1591,6 +1591,21 @@ static inline double msfp_unilateral_lost(const double *block)
     return block[8];
 }
 
+/* unilateral_depth */
+enum {
+    MSFP_UNILATERAL_DEPTH_DEPTH = 0, /* [m] penetration; negative where the contact is open */
+    MSFP_UNILATERAL_DEPTH_BEYOND = 1, /* [m] how far the compression points out of the footprint; positive: edge contact */
+    MSFP_UNILATERAL_DEPTH_SIZE = 2
+};
+static inline double msfp_unilateral_depth_depth(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_unilateral_depth_beyond(const double *block)
+{
+    return block[1];
+}
+
 /* friction_power */
 enum {
     MSFP_FRICTION_POWER_STORED = 0, /* [W] stored and recoverable */

@@ -201,3 +201,33 @@ def test_friction_at_rest_is_elastic(friction: Friction) -> None:
         given = {"par": SURFACE, "s": {"Y": Y}}
         assert kernels("slid_friction", **given) == {"Y": Y, "g": Y}
         assert kernels.slopes("slid_friction", "s", "turn", **given)["Y"] == pytest.approx(PER_TURN, rel=1e-15)
+
+
+@pytest.fixture(scope="module")
+def contact(tmp_path_factory: pytest.TempPathFactory) -> Kernels:
+    names = ("unilateral_depth", "unilateral_inside", "unilateral_edge")
+    return Kernels(tmp_path_factory.mktemp("uplift"), names, {"dimension": "planar", "uplift": True})
+
+
+def test_penetration_is_the_largest_over_the_footprint(contact: Kernels) -> None:
+    """Of all directions up to the edge of the footprint; the force is ks times it by the kernel of that contact."""
+    half, tilt, par = 0.3, 0.2, {"ks": 1e7}
+    par |= {"ca": np.cos(half), "sa": np.sin(half)}
+    slider = {"t3x": np.sin(tilt), "t3z": np.cos(tilt)}
+    rng, seen = np.random.default_rng(3), set()
+    for angle in rng.uniform(-np.pi, np.pi, 60):
+        d = 1e-4 * np.array([np.sin(angle), np.cos(angle)])
+        given = {"par": par, "b": slider, "x": {"dx": d[0], "dz": d[1]}}
+        found = contact("unilateral_depth", **given)
+        directions = tilt + np.linspace(-half, half, 20001)
+        penetration = np.max(-d[0] * np.sin(directions) - d[1] * np.cos(directions))
+        assert found["depth"] == pytest.approx(penetration, abs=1e-12)
+        turned = (angle + np.pi - tilt + np.pi) % (2 * np.pi) - np.pi  # of the compression from the axis
+        kind = "inside" if abs(turned) < half else "edge"
+        assert (found["beyond"] > 0) == (kind == "edge")
+        assert abs(found["beyond"]) == pytest.approx(1e-4 * abs(np.sin(abs(turned) - half)), abs=1e-18)
+        if penetration > 0:
+            force = contact(f"unilateral_{kind}", **given)
+            assert np.hypot(force["Fx"], force["Fz"]) == pytest.approx(par["ks"] * found["depth"], rel=1e-12)
+            seen.add(kind)
+    assert seen == {"inside", "edge"}
