@@ -67,6 +67,8 @@ TITLES = {
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
     "gap": "Sliding and gap (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",
+    "spring_stage": "The spring below a supported mass: constants of its stage formula",
+    "resting_foot": "The foot of a supported mass at rest",
     "foot": "The foot of a supported mass on a vertical spring, at the end of a stage",
     "top_wrench": "The top (3.28), (3.29): rig springs, supported mass and outside load",
     "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",

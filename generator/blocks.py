@@ -41,7 +41,9 @@ class Blocks:
     offset: Block
     gap: Block
     top_wrench: Block
+    foot_before: Block
     foot_stage: Block
+    resting_foot: Block
     foot: Block
     support: Block
     upright: Block

@@ -68,6 +68,8 @@ def derive(spec: ModelSpec) -> Equations:
         body.angular_balance(blocks, massless),
         body.body_energy(blocks, massless),
         top.top_wrench(blocks, effects.top_rotation),
+        top.spring_stage(blocks),
+        top.resting_foot(blocks),
         top.foot(blocks),
         top.top_energy(blocks),
         contact.gap(blocks),

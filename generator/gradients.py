@@ -29,6 +29,8 @@ DIFFERENTIATED = {
     "angular_balance": False,
     "body_energy": False,
     "top_wrench": False,
+    "spring_stage": False,
+    "resting_foot": False,
     "foot": True,
     "top_energy": False,
     "gap": True,

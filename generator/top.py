@@ -8,6 +8,7 @@ import sympy as sp
 
 from .blocks import Blocks
 from .body import energy_terms, rate_of_angular_momentum
+from .functions import Select
 from .program import Program, Vector
 from .vectors import add, cross, scale
 
@@ -54,6 +55,36 @@ def vertical_spring(p: Program, par: Symbols, body: Symbols, stage: Symbols) -> 
     zeta = p.let(stage["beta"] * (par["cv"] + par["kv"] * stage["beta"]), "zeta")
     force = p.let(stage["share"] * (spring + zeta * weight), "S")
     return force, stage["mobility"] * (spring - par["m"] * weight)
+
+
+def spring_stage(b: Blocks) -> Program:
+    """Constants of the stage formula of a foot: its balance with y and y' eliminated, solved for y''.
+
+    Where no mass rests on the spring, that of a rig, its end is fixed.
+    """
+    p = Program("spring_stage", "constants of the stage formula of the foot")
+    par: Symbols = p.read(b.top_parameters, "par", active=False)
+    before: Symbols = p.read(b.foot_before, "f", active=False)
+    mass = p.let(par["m"] - par["mz"])
+    beta = p.let(Select(mass, before["beta"], 0))
+    moving = p.let(mass + beta * p.let(par["cv"] + beta * par["kv"]))
+    moving = p.let(Select(mass, moving, 1))
+    constants = {"mobility": Select(mass, 1 / moving, 0), "share": Select(mass, mass / moving, 1)}
+    p.write(b.foot_stage, {"y": before["y"], "y1": before["y1"], "beta": beta, **constants}, tangents=False)
+    return p
+
+
+def resting_foot(b: Blocks) -> Program:
+    """The foot at which the vertical spring carries the mass that rests on it, and moves with the top plate."""
+    p = Program("resting_foot", "height and velocity of the foot while its spring carries the mass at rest")
+    par: Symbols = p.read(b.top_parameters, "par", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    mass = p.let(par["m"] - par["mz"])
+    stiffness = p.let(Select(par["kv"], par["kv"], 1))  # of a damper without a spring nothing settles
+    settlement = p.let(Select(par["kv"], p.let(mass * par["g"]) / stiffness, 0))
+    values = {"y": body["C"][2] - settlement, "y1": Select(mass, body["V"][2], 0)}
+    p.write(b.resting_foot, values, tangents=False)
+    return p
 
 
 def foot(b: Blocks) -> Program:

@@ -27,10 +27,19 @@ def top_blocks(new: Maker) -> dict[str, Block]:
         .vector("F", "N", "-F_top: what the bearing exerts on the top support", POLAR)
         .vector("M", "N m", "-M_top about r_nn", AXIAL)
         .build(),
-        "foot_stage": new("foot_stage")
+        "foot_before": new("foot_before")
         .scalar("y", "m", "y of the foot less beta^2 y'', what the earlier stages give; y outside of a step")
         .scalar("y1", "m/s", "its rate less beta y''; y' outside of a step")
         .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
+        .build(),
+        "resting_foot": new("resting_foot")
+        .scalar("y", "m", "height of the foot at rest, or of the fixed end of the spring")
+        .scalar("y1", "m/s", "its velocity")
+        .build(),
+        "foot_stage": new("foot_stage")
+        .scalar("y", "m", "as in foot_before")
+        .scalar("y1", "m/s", "as in foot_before")
+        .scalar("beta", "s", "the same where a mass rests on the spring; else 0")
         .scalar("mobility", "1/kg", "1/(m + c beta + k beta^2); 0 where no mass rests on the spring")
         .scalar("share", "-", "m times mobility; 1 where no mass rests on the spring")
         .build(),

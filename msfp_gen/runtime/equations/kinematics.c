@@ -213,16 +213,11 @@ double msfp_sprung_mass(const msfp_parameters *p)
 
 void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage)
 {
-    memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
-    if (!msfp_top_is_sprung(p))
-        return;
-    const double mass = msfp_sprung_mass(p), beta = mass > 0.0 ? at->foot_beta : 0.0;
-    const double moving = mass + beta * (p->top[MSFP_TOP_PARAMETERS_CV] + beta * p->top[MSFP_TOP_PARAMETERS_KV]);
-    stage[MSFP_FOOT_STAGE_Y] = at->foot[0];
-    stage[MSFP_FOOT_STAGE_Y1] = at->foot[1];
-    stage[MSFP_FOOT_STAGE_BETA] = beta;
-    stage[MSFP_FOOT_STAGE_MOBILITY] = mass > 0.0 ? 1.0 / moving : 0.0;
-    stage[MSFP_FOOT_STAGE_SHARE] = mass > 0.0 ? mass / moving : 1.0;
+    const double before[MSFP_FOOT_BEFORE_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
+    if (msfp_top_is_sprung(p))
+        msfp_spring_stage(p->top, before, stage);
+    else
+        memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
 }
 
 /* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
@@ -241,11 +236,9 @@ static void move_foot(const msfp_parameters *p, const double *stage, msfp_work *
 void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
 {
     msfp_work w;
-    const double *plate = w.body[NB], stiffness = p->top[MSFP_TOP_PARAMETERS_KV];
     msfp_base(p, at, &w);
     msfp_kinematics(p, at, &w);
-    foot[0] = plate[MSFP_BODY_CZ] - (stiffness > 0.0 ? msfp_sprung_mass(p) * p->gravity / stiffness : 0.0);
-    foot[1] = msfp_sprung_mass(p) > 0.0 ? plate[MSFP_BODY_VZ] : 0.0;
+    msfp_resting_foot(p->top, w.body[NB], foot);
 }
 
 static void split_wrench(const double *wrench, double *force, double *moment)

@@ -79,26 +79,18 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
     }
 }
 
-/* Columns of the block `foot_stage`, which msfp_foot_stage fills. */
-MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point_columns *dat,
-                            const double *stage, double *d)
+/* Columns of the block `foot_stage`, as msfp_foot_stage fills it. */
+MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                            const msfp_point_columns *dat, double *d)
 {
-    const double *top = p->top, *dtop = dp->top, beta = stage[MSFP_FOOT_STAGE_BETA];
-    const double mobility = stage[MSFP_FOOT_STAGE_MOBILITY], mass = msfp_sprung_mass(p);
-    memset(d, 0, MSFP_FOOT_STAGE_SIZE * C * sizeof *d);
-    if (!msfp_top_is_sprung(p))
-        return;
-    memcpy(d + MSFP_FOOT_STAGE_Y * C, dat->foot[0], sizeof dat->foot[0]);
-    memcpy(d + MSFP_FOOT_STAGE_Y1 * C, dat->foot[1], sizeof dat->foot[1]);
-    for (int c = 0; c < C && mass > 0.0; ++c) {
-        const double dbeta = dat->foot_beta[c], dmass = dtop[MSFP_TOP_PARAMETERS_M * C + c];
-        const double moving =
-            dmass + beta * (dtop[MSFP_TOP_PARAMETERS_CV * C + c] + beta * dtop[MSFP_TOP_PARAMETERS_KV * C + c]) +
-            dbeta * (top[MSFP_TOP_PARAMETERS_CV] + 2.0 * beta * top[MSFP_TOP_PARAMETERS_KV]);
-        d[MSFP_FOOT_STAGE_BETA * C + c] = dbeta;
-        d[MSFP_FOOT_STAGE_MOBILITY * C + c] = -mobility * mobility * moving;
-        d[MSFP_FOOT_STAGE_SHARE * C + c] = dmass * mobility - mass * mobility * mobility * moving;
-    }
+    const double before[MSFP_FOOT_BEFORE_SIZE] = { at->foot[0], at->foot[1], at->foot_beta };
+    double dbefore[MSFP_FOOT_BEFORE_SIZE * C];
+    memcpy(dbefore + MSFP_FOOT_BEFORE_Y * C, dat->foot, sizeof dat->foot);
+    memcpy(dbefore + MSFP_FOOT_BEFORE_BETA * C, dat->foot_beta, sizeof dat->foot_beta);
+    if (msfp_top_is_sprung(p))
+        msfp_spring_stage_direction(p->top, before, dp->top, dbefore, d);
+    else
+        memset(d, 0, MSFP_FOOT_STAGE_SIZE * C * sizeof *d);
 }
 
 MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
@@ -112,7 +104,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
     put_polar(dforce, (msfp_columns *)dat->load);
     put_axial(dmoment, (msfp_columns *)dat->load + 3);
     msfp_foot_stage(p, at, stage);
-    foot_stage(p, dp, dat, stage, dstage);
+    foot_stage(p, dp, at, dat, dstage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE], dupright[MSFP_UPRIGHT_SIZE * C] = { 0 }; /* as prescribed */
     msfp_support_axis(at, upright);
@@ -130,7 +122,7 @@ MSFP_COLUMNWISE void msfp_foot_columns(const msfp_parameters *p, const msfp_para
     double stage[MSFP_FOOT_STAGE_SIZE], dstage[MSFP_FOOT_STAGE_SIZE * C];
     if (msfp_top_is_sprung(p)) {
         msfp_foot_stage(p, at, stage);
-        foot_stage(p, dp, dat, stage, dstage);
+        foot_stage(p, dp, at, dat, dstage);
         msfp_foot_direction(p->top, w->body[NB], stage, w->foot, dp->top, d->body[NB], dstage, d->foot);
     } else {
         memcpy(d->foot + MSFP_FOOT_Y * C, d->body[NB] + MSFP_BODY_CZ * C, C * sizeof(double));

@@ -7,6 +7,8 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+#include "msfp_gradient_kernels.h"
+
 enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, C = MSFP_COLUMNS };
 static const int unknown[ND] = MSFP_FREE;
 
@@ -56,23 +58,6 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
     msfp_add_scaled(dat->load, found[1], dt, 1.0, 6);
 }
 
-/* Height of the foot at rest: the top plate less the settlement under the supported mass (msfp_foot_at_rest). */
-static void foot_at_rest(const msfp_parameters *p, const msfp_group *group, msfp_columns foot[2])
-{
-    const double *plate = group->work.body[NB], *dtop = group->parameters.top;
-    const double stiffness = p->top[MSFP_TOP_PARAMETERS_KV], mass = msfp_sprung_mass(p);
-    for (int c = 0; c < C; ++c) {
-        const double dmass = dtop[MSFP_TOP_PARAMETERS_M * C + c] - dtop[MSFP_TOP_PARAMETERS_MZ * C + c];
-        const double dweight = dmass * p->gravity + mass * dtop[MSFP_TOP_PARAMETERS_G * C + c];
-        const double sunk = stiffness > 0.0 ? (dweight - mass * p->gravity / stiffness *
-                                                             dtop[MSFP_TOP_PARAMETERS_KV * C + c]) /
-                                                  stiffness
-                                            : 0.0;
-        foot[0][c] = plate[MSFP_BODY_CZ * C + c] - sunk;
-        foot[1][c] = mass > 0.0 ? plate[MSFP_BODY_VZ * C + c] : 0.0;
-    }
-}
-
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
 {
     const msfp_parameters *p = &run->parameters;
@@ -104,7 +89,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     msfp_inputs_columns(run, group, run->now.t, now->t, dat);
     if (first) {
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
-        foot_at_rest(p, group, now->foot);
+        msfp_resting_foot_direction(p->top, w->body[NB], dp->top, group->work.body[NB], now->foot[0]);
     }
     memcpy(dat->foot, now->foot, sizeof dat->foot);
     msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);

@@ -1062,6 +1062,53 @@ static inline void msfp_top_wrench_tangent(const double *restrict par, const dou
     }
 }
 
+/* constants of the stage formula of the foot.
+ * 11 operations; out: foot_stage. */
+MSFP_INLINED
+static inline void msfp_spring_stage(const double *restrict par /* top_parameters */, const double *restrict f /* foot_before */, double *restrict out)
+{
+    const double par_m = par[4];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double par_cv = par[11];
+    const double f_y = f[0];
+    const double f_y1 = f[1];
+    const double f_beta = f[2];
+    const double s_1 = par_m - par_mz;
+    const double s_2 = (s_1 > 0.0 ? f_beta : 0);
+    const double s_3 = par_cv + par_kv*s_2;
+    const double s_4 = s_1 + s_2*s_3;
+    const double s_5 = (s_1 > 0.0 ? s_4 : 1);
+    const double out_6 = (s_1 > 0.0 ? 1.0/s_5 : 0);
+    const double out_7 = (s_1 > 0.0 ? s_1/s_5 : 1);
+    out[0] = f_y; /* y */
+    out[1] = f_y1; /* y1 */
+    out[2] = s_2; /* beta */
+    out[3] = out_6; /* mobility */
+    out[4] = out_7; /* share */
+}
+
+/* height and velocity of the foot while its spring carries the mass at rest.
+ * 7 operations; out: resting_foot. */
+MSFP_INLINED
+static inline void msfp_resting_foot(const double *restrict par /* top_parameters */, const double *restrict b /* body */, double *restrict out)
+{
+    const double par_m = par[4];
+    const double par_g = par[8];
+    const double par_mz = par[9];
+    const double par_kv = par[10];
+    const double b_Cz = b[9];
+    const double b_Vz = b[11];
+    const double s_1 = par_m - par_mz;
+    const double s_2 = (par_kv > 0.0 ? par_kv : 1);
+    const double s_3 = par_g*s_1;
+    const double s_4 = (par_kv > 0.0 ? s_3/s_2 : 0);
+    const double out_5 = b_Cz - s_4;
+    const double out_6 = (s_1 > 0.0 ? b_Vz : 0);
+    out[0] = out_5; /* y */
+    out[1] = out_6; /* y1 */
+}
+
 /* height of the foot of the supported mass, from the stage formula and its balance.
  * 19 operations; out: foot. */
 MSFP_INLINED

@@ -1015,11 +1015,31 @@ static inline void msfp_top_wrench_M_put(double *block, const double vector[3])
     block[2] = vector[1];
 }
 
+/* foot_before */
+enum {
+    MSFP_FOOT_BEFORE_Y = 0, /* [m] y of the foot less beta^2 y'', what the earlier stages give; y outside of a step */
+    MSFP_FOOT_BEFORE_Y1 = 1, /* [m/s] its rate less beta y''; y' outside of a step */
+    MSFP_FOOT_BEFORE_BETA = 2, /* [s] diagonal entry of the stage formula; 0 outside of a step */
+    MSFP_FOOT_BEFORE_SIZE = 3
+};
+static inline double msfp_foot_before_y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_foot_before_y1(const double *block)
+{
+    return block[1];
+}
+static inline double msfp_foot_before_beta(const double *block)
+{
+    return block[2];
+}
+
 /* foot_stage */
 enum {
-    MSFP_FOOT_STAGE_Y = 0, /* [m] y of the foot less beta^2 y'', what the earlier stages give; y outside of a step */
-    MSFP_FOOT_STAGE_Y1 = 1, /* [m/s] its rate less beta y''; y' outside of a step */
-    MSFP_FOOT_STAGE_BETA = 2, /* [s] diagonal entry of the stage formula; 0 outside of a step */
+    MSFP_FOOT_STAGE_Y = 0, /* [m] as in foot_before */
+    MSFP_FOOT_STAGE_Y1 = 1, /* [m/s] as in foot_before */
+    MSFP_FOOT_STAGE_BETA = 2, /* [s] the same where a mass rests on the spring; else 0 */
     MSFP_FOOT_STAGE_MOBILITY = 3, /* [1/kg] 1/(m + c beta + k beta^2); 0 where no mass rests on the spring */
     MSFP_FOOT_STAGE_SHARE = 4, /* [-] m times mobility; 1 where no mass rests on the spring */
     MSFP_FOOT_STAGE_SIZE = 5
@@ -1043,6 +1063,21 @@ static inline double msfp_foot_stage_mobility(const double *block)
 static inline double msfp_foot_stage_share(const double *block)
 {
     return block[4];
+}
+
+/* resting_foot */
+enum {
+    MSFP_RESTING_FOOT_Y = 0, /* [m] height of the foot at rest, or of the fixed end of the spring */
+    MSFP_RESTING_FOOT_Y1 = 1, /* [m/s] its velocity */
+    MSFP_RESTING_FOOT_SIZE = 2
+};
+static inline double msfp_resting_foot_y(const double *block)
+{
+    return block[0];
+}
+static inline double msfp_resting_foot_y1(const double *block)
+{
+    return block[1];
 }
 
 /* foot */

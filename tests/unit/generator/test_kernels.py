@@ -231,3 +231,52 @@ def test_penetration_is_the_largest_over_the_footprint(contact: Kernels) -> None
             assert np.hypot(force["Fx"], force["Fz"]) == pytest.approx(par["ks"] * found["depth"], rel=1e-12)
             seen.add(kind)
     assert seen == {"inside", "edge"}
+
+
+@pytest.fixture(scope="module")
+def top(tmp_path_factory: pytest.TempPathFactory) -> Kernels:
+    return Kernels(tmp_path_factory.mktemp("top"), ("spring_stage", "resting_foot"), {"dimension": "planar"})
+
+
+def stage(mass: mp.mpf, kv: mp.mpf, cv: mp.mpf, beta: mp.mpf) -> dict[str, mp.mpf]:
+    """Solution of m y'' = kv (C - y) + cv (V - y') - m w with y = Q + beta y', y' = P + beta y''.
+
+    (m + beta cv + beta^2 kv) y'' = kv (C - Q - beta P) + cv (V - P) - m w.
+    """
+    held = mass + beta * cv + beta**2 * kv
+    return {"beta": beta, "mobility": 1 / held, "share": mass / held}
+
+
+@mp.workdps(30)
+def test_constants_of_the_stage_of_a_foot(top: Kernels) -> None:
+    at = [mp.mpf(x) for x in (3e3, 5e6, 1e4, 1e-2)]
+    before = {"y": 0.4, "y1": 0.1}
+    given = {"par": {"m": 8e3, "mz": 5e3, "kv": 5e6, "cv": 1e4}, "f": {**before, "beta": 1e-2}}
+    want = {name: float(value) for name, value in stage(*at).items()}
+    assert top("spring_stage", **given) == pytest.approx(before | want, rel=1e-15)
+    for i, (alias, name) in enumerate((("par", "m"), ("par", "kv"), ("par", "cv"), ("f", "beta"))):
+        step = mp.mpf(1e-9) * at[i]
+        low, high = (stage(*at[:i], at[i] + sign * step, *at[i + 1 :]) for sign in (-1, 1))
+        slopes = top.slopes("spring_stage", alias, name, **given)
+        for result in want:
+            assert slopes[result] == pytest.approx(float((high[result] - low[result]) / (2 * step)), rel=1e-12, abs=0)
+
+
+def test_the_spring_of_a_rig_has_a_fixed_end(top: Kernels) -> None:
+    given = {"par": {"m": 5e3, "mz": 5e3, "kv": 5e6, "cv": 1e4}, "f": {"y": 0.4, "beta": 1e-2}}
+    fixed = {"y": 0.4, "y1": 0.0, "beta": 0.0, "mobility": 0.0, "share": 1.0}
+    assert top("spring_stage", **given) == fixed
+    for alias, name in (("par", "kv"), ("par", "cv"), ("f", "beta")):
+        assert not any(top.slopes("spring_stage", alias, name, **given).values())
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 5e6])
+@pytest.mark.parametrize("mass", [0.0, 3e3])
+def test_the_foot_at_rest_carries_the_weight(top: Kernels, mass: float, stiffness: float) -> None:
+    given = {"par": {"m": mass, "kv": stiffness, "cv": 1e4, "g": 9.8}, "b": {"Cz": 0.7, "Vz": 0.02}}
+    sunk = mass * 9.8 / stiffness if stiffness else 0.0
+    assert top("resting_foot", **given) == pytest.approx({"y": 0.7 - sunk, "y1": 0.02 if mass else 0.0}, rel=1e-15)
+    want = {"kv": sunk / (stiffness or 1.0), "m": -9.8 / stiffness if stiffness else 0.0, "g": -sunk / 9.8}
+    for name, slope in want.items():
+        assert top.slopes("resting_foot", "par", name, **given)["y"] == pytest.approx(slope, rel=1e-14)
+    assert top.slopes("resting_foot", "b", "Cz", **given)["y"] == 1.0
