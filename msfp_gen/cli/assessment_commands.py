@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -82,8 +81,8 @@ def bound(
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
-    with ExitStack() as stack:
-        found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
+    with Progress("3 cases") as progress:
+        found = run_bounds(chosen, table, progress=progress)
     if as_json:
         say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
@@ -115,6 +114,6 @@ def _save(found: Bounds, folder: Path) -> list[Path]:
     from msfp_gen.studies.bounding.figure import plot_bounds
     from msfp_gen.studies.bounding.tables import write_quantities
 
-    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases if case.result is not None]
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases]
     plot_bounds(found, folder / "bounds.png")
     return [*written, write_quantities(found, folder / "bounds.csv"), folder / "bounds.png"]

@@ -13,6 +13,7 @@ import typer
 
 from msfp_gen.cli.console import note, number, parser_of, say, show
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
+from msfp_gen.common.tables import TABLE_SUFFIXES
 
 if TYPE_CHECKING:
     from msfp_gen.common.tables import Table
@@ -39,7 +40,6 @@ Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the numbers: .csv or .parquet.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
-FRAMES = (".csv", ".parquet")
 
 
 @app.command(epilog="Examples:\n\n\b\n  msfp-gen study ida out --demand peak_displacement --plot ida.png")
@@ -163,7 +163,7 @@ def _check(plot: Path | None, output: Path | None) -> None:
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     if output is not None:
-        check_output(output, FRAMES, "--output")
+        check_output(output, TABLE_SUFFIXES, "--output")
 
 
 def _finish(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import platform
@@ -15,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.output import make_folder, replacing
-from msfp_gen.common.tables import Table
+from msfp_gen.common.output import make_folder, write_bytes
+from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import CompileError
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, ERRORS, REFUSED, Errors
 from msfp_gen.version import __version__
@@ -224,8 +223,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     base = folder / study.kind
     written = [write_csv(study, base.with_suffix(".csv"))]
     for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
-        with replacing(base.with_suffix(suffix)) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_bytes(base.with_suffix(suffix), [text.encode()])
         written.append(base.with_suffix(suffix))
     for suffix in (".svg", ".png"):
         draw(study, base.with_suffix(suffix))
@@ -235,11 +233,8 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 def write_csv(study: Study, path: Path) -> Path:
     """Write one row per run, columns as in `COLUMNS`; the file appears only when complete."""
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows(study))
-    return path
+    values = rows(study)
+    return write_columns(path, {(name, ""): [row[name] for row in values] for name in COLUMNS})
 
 
 AFTER_IMPACTS = ", and after impacts,"

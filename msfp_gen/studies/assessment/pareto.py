@@ -14,8 +14,8 @@ from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import complete, numbers, read_study, unknown_column, write_frame
 from msfp_gen.studies.assessment.samples import STATISTICS
+from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.study.definition import Study
-from msfp_gen.studies.study.engines import Engine, engine_from, require
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.run import run_on
 from msfp_gen.studies.study.sampling import Sampling
@@ -111,15 +111,15 @@ def pareto(
     study = _search_study(source)
     _check(study, goals, population, generations)
     folder = Path(output)
-    with engine_from(**engine) as started:
+    with pool_from(**engine) as pool:
         search = _search(study, goals, population, generations, seed)
         number, shares = next(search)
-        found = [_evaluated(study, number, shares, goals, started, folder)]
+        found = [_evaluated(study, number, shares, goals, pool, folder)]
         while number < generations:
             if progress is not None:
                 progress(number, generations)
             number, shares = search.send(_objectives(found[-1], goals))
-            found.append(_evaluated(study, number, shares, goals, started, folder))
+            found.append(_evaluated(study, number, shares, goals, pool, folder))
     return _front(found, goals, folder)
 
 
@@ -172,7 +172,7 @@ def _search(
         algorithm.tell(infills=asked)
 
 
-def _evaluated(study: Study, number: int, shares: Array, goals: Goals, engine: Engine, folder: Path) -> Any:
+def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Pool, folder: Path) -> Any:
     """The designs of a generation with their statistics, as a DataFrame."""
     import pandas as pd
 
@@ -182,7 +182,7 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, engine: E
     sampling = Sampling("listed", values=tuple(map(tuple, values.tolist())))
     table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
     place = folder / f"generation-{number:03d}"
-    run_on(engine, replace(study, sampling=sampling, table=table), place)
+    run_on(pool, replace(study, sampling=sampling, table=table), place)
     wanted = list(dict.fromkeys((*goals.names, *(goals.at_most or {}))))
     rows = read_study(place, wanted)
     axes = [axis.name for axis in study.axes if axis.random]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.output import check_output, replacing
+from msfp_gen.common.tables import write_columns
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
@@ -66,14 +66,9 @@ def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
 
 
 def write_frame(frame: Any, path: str | Path, name: str = "output") -> Path:
-    """Write a DataFrame as CSV or Parquet, by the suffix, completely or not at all. Raises InputError."""
-    target = check_output(path, (".csv", ".parquet"), name)
-    with replacing(target) as temporary:
-        if target.suffix.lower() == ".csv":
-            frame.to_csv(temporary, index=False)
-        else:
-            frame.to_parquet(temporary, index=False)
-    return target
+    """Write a DataFrame by `write_columns`, whose arguments and errors these are; without units."""
+    columns = frame.astype(object).where(frame.notna(), None).items()
+    return write_columns(path, {(column, ""): values.tolist() for column, values in columns}, name)
 
 
 def unknown_column(name: str, known: Sequence[str]) -> InputError:

@@ -35,7 +35,7 @@ def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
 
     A run that failed is drawn up to its last row. Raises InputError for a path that cannot be written.
     """
-    drawn = [case for name in LINE_STYLES for case in found.cases if case.name == name and case.result is not None]
+    drawn = [case for name in LINE_STYLES for case in found.cases if case.name == name]
     axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in found.cases if case.name == "nominal") or "unnamed scene"
@@ -69,12 +69,11 @@ def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
     axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
 
 
-def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
+def _loop(result: Result | BuildingResult) -> tuple[Array, Array]:
     """Displacement across the bearing and force on its top, or of a building their mean and sum, shapes (k, 3)."""
     if isinstance(result, BuildingResult):
         u = np.mean([each.displacement for each in result.bearings], axis=0)
         return u, np.sum([each.top_force for each in result.bearings], axis=0)
-    assert result is not None
     return result.history.displacement, result.history.top_force
 
 

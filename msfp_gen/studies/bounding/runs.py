@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.errors import InputError
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.either import simulate
 from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
+from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
 from msfp_gen.studies.bounding.measures import Measure, measures_of
 
@@ -33,7 +34,7 @@ WIDER: dict[str, tuple[str, Any]] = {
     "uplift": ("uplift", True),
     "pvt": ("friction", "pvt"),
 }
-Progress = Callable[[str], Callable[[float, float], None] | None]
+Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)
@@ -43,14 +44,14 @@ class Case:
     Attributes:
         name: "lower", "nominal" or "upper".
         scene: the scene with its properties multiplied.
-        result: the run; of a run that failed what was computed until then, if anything.
+        result: the run; of a run that failed its rows until then.
         found: characterisation; None if the run failed.
         failure: message of a failure, else empty.
     """
 
     name: str
     scene: AnyScene
-    result: Result | BuildingResult | None
+    result: Result | BuildingResult
     found: Characterisation | BuildingCharacterisation | None
     failure: str = ""
 
@@ -137,11 +138,11 @@ def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = No
     Args:
         scene: the nominal case.
         table: factors of the properties.
-        progress: called with the name of each case; returns the progress callback for `simulate`.
+        progress: called with the share of the runs that is done, and 1.
 
     Raises:
         InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
-        RunError: only if the user interrupts.
+        RunError: a run failed at its start, so that it has no rows.
     """
     cases = _cases(scene, table, progress)
     if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
@@ -153,8 +154,7 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     """`Auto` with every effect that the last model of any case has; None where all cases have the same model."""
     if not isinstance(scene.effects, Auto):
         return None
-    ran = [case.result.provenance["model"] for case in cases if case.result is not None]
-    models = [set(model.split(", then ")[-1].split("-")) for model in ran]
+    models = [set(case.result.provenance["model"].split(", then ")[-1].split("-")) for case in cases]
     if all(model == models[0] for model in models):
         return None
     used = set().union(*models)
@@ -162,20 +162,17 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
 
 
 def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> list[Case]:
-    """The runs of `bound`."""
-    cases = []
-    for name, bounded in bounded_scenes(scene, table).items():
-        callback = progress(name) if progress else None
-        try:
-            result = simulate(bounded, progress=callback)
-        except RunError as error:
-            if error.status == "interrupted":
-                raise
-            partial: Any = error.result
-            cases.append(Case(name, bounded, partial, None, str(error)))
-        else:
-            cases.append(Case(name, bounded, result, result.characterise()))
-    return cases
+    """The runs of `bound`, at the same time."""
+    scenes = bounded_scenes(scene, table)
+    with closing(completed_runs(list(scenes.values()), labels=list(scenes), progress=progress)) as runs:
+        results = dict(runs)
+    return [_case(name, results[index]) for index, name in enumerate(scenes)]
+
+
+def _case(name: str, result: Any) -> Case:
+    if result.status in ENDED:
+        return Case(name, result.scene, result, result.characterise())
+    return Case(name, result.scene, result, None, result.message)
 
 
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
+from typing import Any
 
-from msfp_gen.common.output import check_output, replacing
-from msfp_gen.common.tables import Table
+from msfp_gen.common.output import check_output
+from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.studies.bounding.factors import RULES, FactorTable
 from msfp_gen.studies.bounding.runs import CASES, Bounds
 
@@ -33,15 +33,13 @@ def write_quantities(found: Bounds, path: str | Path) -> Path:
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    path = check_output(path, (".csv",))
-    units, governing = found.measures, found.governing()
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["quantity", *CASES, "governs"])
-        for name, values in found.quantities().items():
-            cells = ["" if values[case] is None else values[case] for case in CASES]
-            writer.writerow([f"{name} [{units[name].unit}]", *cells, governing.get(name, "")])
-    return path
+    units, quantities, governing = found.measures, found.quantities(), found.governing()
+    columns: dict[tuple[str, str], list[Any]] = {
+        ("quantity", ""): [f"{name} [{units[name].unit}]" for name in quantities],
+        **{(case, ""): [values[case] for values in quantities.values()] for case in CASES},
+        ("governs", ""): [governing.get(name, "") for name in quantities],
+    }
+    return write_columns(check_output(path, (".csv",)), columns)
 
 
 def _factor_table(table: FactorTable) -> Table:

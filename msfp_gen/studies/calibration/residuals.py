@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +14,12 @@ from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
-from msfp_gen.simulation.batch import Workers, raise_if_stopped
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
 from msfp_gen.studies.calibration.unknowns import Unknown, changed_scene
+from msfp_gen.studies.pool import SharedProgress, local_pool
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -84,7 +83,6 @@ class Residuals:
     count: int = 0
     deviation: float = np.nan
     _last: tuple[bytes, Evaluation] | None = None
-    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def names(self) -> list[str]:
@@ -158,26 +156,22 @@ class Residuals:
         """Runs of all tests at these values, at the same time; the error of a run that fails."""
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
             build_model(spec.layout, spec.effects, gradients=slopes)
-        shares = np.zeros(len(self.tests))
+        shared = SharedProgress(len(self.tests), self._report)
 
         def run(index: int) -> Run:
-            def show(time: float, end: float) -> None:
-                raise_if_stopped(time, end)
-                if self.progress is not None:
-                    with self._lock:  # runs report from their own threads
-                        shares[index] = time / end
-                        self.progress(self.count, float(shares.mean()), self.deviation)
-
             try:
-                return self._run(index, values, slopes, show)
+                return self._run(index, values, slopes, shared.of(index))
             except (RunError, InputError) as error:
                 return error
 
+        self._report(0.0, 1.0)  # a short run does not report by itself
+        with local_pool(min(len(self.tests), usable_cores())) as pool:
+            runs = dict(pool.results(run, ((index, (index,)) for index in range(len(self.tests)))))
+        return [runs[index] for index in range(len(self.tests))]
+
+    def _report(self, share: float, _: float) -> None:
         if self.progress is not None:
-            self.progress(self.count, 0.0, self.deviation)  # a short run does not report by itself
-        with Workers(min(len(self.tests), usable_cores()), processes=False) as pool:
-            found = dict(pool.results(run, {index: (index,) for index in range(len(self.tests))}))
-        return [found[index] for index in range(len(self.tests))]
+            self.progress(self.count, share, self.deviation)
 
     def _run(
         self, index: int, values: Array, slopes: bool, show: Callable[[float, float], None]

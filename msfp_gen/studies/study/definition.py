@@ -20,7 +20,7 @@ from msfp_gen.common.inputs import Files, expecting, recording
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.changes import multiplied_table
-from msfp_gen.simulation.batch import check_method
+from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker

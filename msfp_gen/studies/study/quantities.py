@@ -19,7 +19,7 @@ from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
 from msfp_gen.studies.bounding.measures import Measure, building_measures, measures
-from msfp_gen.studies.sweep import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
+from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
 
 # Word in a formula -> what it takes of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.studies.batch import build_models
+from msfp_gen.studies.pool import Pool, pool_from
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
 from msfp_gen.studies.study.definition import Study, Task
-from msfp_gen.studies.study.engines import Engine, engine_from
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.status import failures
-from msfp_gen.studies.study.worker import Order, build_models, run_chunk
+from msfp_gen.studies.study.worker import Order, run_chunk
 
 Progress = Callable[[int, int], None]
 
@@ -82,18 +83,18 @@ def study(
     """
     _check_shard(shard)
     found = source if isinstance(source, Study) else load_study(source)
-    with engine_from(workers, threads, executor, dask, mpi) as engine:
-        return run_on(engine, found, Path(output), shard, progress)
+    with pool_from(workers, threads, executor, dask, mpi) as pool:
+        return run_on(pool, found, Path(output), shard, progress)
 
 
 def run_on(
-    engine: Engine, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+    pool: Pool, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
 ) -> Outcome:
-    """Compute what is missing of a study on an engine. Arguments and errors are those of `study`."""
+    """Compute what is missing of a study on a pool. Arguments and errors are those of `study`."""
     make_folder(folder, "output")
     chunks = chunks_in(study, folder)
     chunks.open()
-    return _run(chunks, engine, shard, progress)
+    return _run(chunks, pool, shard, progress)
 
 
 def parsed_shard(text: str) -> tuple[int, int]:
@@ -113,7 +114,7 @@ def _check_shard(shard: tuple[int, int]) -> None:
         raise InputError(f"shard = {'/'.join(map(str, numbers)) or shard!r}: give i/n with i from 1 to n")
 
 
-def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progress | None) -> Outcome:
+def _run(chunks: Chunks, pool: Pool, shard: tuple[int, int], progress: Progress | None) -> Outcome:
     study, present = chunks.study, set(parts_in(chunks.folder))
     numbers = range(shard[0] - 1, study.chunks, shard[1])
     total = sum(_length(study, number) for number in numbers)
@@ -131,7 +132,7 @@ def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progr
         progress(before, total)
     done = 0
     order = Order(chunks.identity, chunks.digest, study.recipe, study.files, study.keep, study.limits.run_seconds)
-    for task, (part, bad) in engine.results(run_chunk, _calls(study, missing, order)):
+    for task, (part, bad) in pool.results(run_chunk, _calls(study, missing, order)):
         write_bytes(chunks.path(task), [part], tidy=False)
         done, failed = done + len(task), failed + bad
         if progress is not None:

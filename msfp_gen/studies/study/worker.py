@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.common.inputs import Files, expecting
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.model.model import build_model
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.batch import check_method, raise_if_stopped, run_to_end, specs_of
 from msfp_gen.simulation.simulate import settle
+from msfp_gen.studies.batch import ENDED, check_method, run_to_end
+from msfp_gen.studies.pool import raise_if_stopped
 from msfp_gen.studies.study.definition import Task
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
@@ -21,7 +21,6 @@ from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
 if TYPE_CHECKING:
     from msfp_gen.buildings.opening import AnyScene
 
-ENDED = ("ok", "stopped")  # statuses of runs that did not fail
 BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run
 
 
@@ -99,13 +98,7 @@ def _result(scene: AnyScene, seconds: float | None) -> Any:
         if end is not None and time.monotonic() > end and reached < of:
             raise _OutOfTimeError
 
-    return run_to_end(scene, settle(scene) if isinstance(scene, Scene) else scene, False, proceed)
-
-
-def build_models(scenes: list[AnyScene]) -> None:
-    """Build the models with which these scenes start, unless the cache of this host has them."""
-    for spec in dict.fromkeys(spec for scene in scenes for spec in specs_of(scene)):
-        build_model(spec.layout, spec.effects)
+    return run_to_end(scene, settle(scene) if isinstance(scene, Scene) else scene, proceed=proceed)
 
 
 def _part(order: Order, rows: list[dict[str, Any]], failed: int) -> bytes:
