@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from msfp_gen.errors import InputError
 
 MOST = 10_000_000  # samples; each takes 8 bytes a random axis, in the process that starts the study
 
-# Distribution -> its parameters, in the order of `_QUANTILES` and `_SHARES`.
+# Distribution -> its parameters.
 DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
     "uniform": ("low", "high"),
     "triangular": ("low", "mode", "high"),
@@ -60,52 +61,30 @@ class Distribution:
         if self.between is not None:
             low, high = (self.share(bound) for bound in self.between)
             shares = low + shares * (high - low)
-        found = _QUANTILES[self.kind](shares, *self.parameters)
-        return found if self.between is None else np.clip(found, *self.between)
+        values = np.asarray(_frozen(self.kind, self.parameters).ppf(shares))
+        if self.kind == "lognormal":  # the exponential of NumPy depends on the processor
+            values = self.parameters[0] * exp(values)
+        return values if self.between is None else np.clip(values, *self.between)
 
     def share(self, value: float) -> float:
         """The share of the distribution, without its bounds, that lies below a value."""
-        return float(_SHARES[self.kind](value, *self.parameters))
+        if self.kind == "lognormal":
+            value = float(np.log(value / self.parameters[0])) if value > 0 else -np.inf
+        return float(_frozen(self.kind, self.parameters).cdf(value))
 
 
-def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
-    left = (mode - low) / (high - low)
-    rising = low + np.sqrt(u * (high - low) * (mode - low))
-    return np.where(u < left, rising, high - np.sqrt((1 - u) * (high - low) * (high - mode)))
+@lru_cache(maxsize=64)
+def _frozen(kind: str, parameters: tuple[float, ...]) -> Any:
+    """The distribution of `scipy.stats`, of a lognormal one that of the logarithm over the median."""
+    from scipy import stats
 
-
-def _triangular_share(x: float, low: float, mode: float, high: float) -> float:
-    x = min(max(x, low), high)
-    if x < mode:
-        return (x - low) ** 2 / ((high - low) * (mode - low))
-    return 1.0 - (high - x) ** 2 / ((high - low) * (high - mode)) if x < high else 1.0
-
-
-def _normal(u: Array, mean: float, deviation: float) -> Array:
-    from scipy.special import ndtri
-
-    found: Array = mean + deviation * ndtri(u)
-    return found
-
-
-def _normal_share(x: float, mean: float, deviation: float) -> float:
-    from scipy.special import ndtr
-
-    return float(ndtr((x - mean) / deviation))
-
-
-_QUANTILES: dict[str, Callable[..., Array]] = {
-    "uniform": lambda u, low, high: low + u * (high - low),
-    "triangular": _triangular,
-    "normal": _normal,
-    "lognormal": lambda u, median, dispersion: median * exp(_normal(u, 0.0, dispersion)),
-}
-_SHARES: dict[str, Callable[..., float]] = {
-    "uniform": lambda x, low, high: min(max((x - low) / (high - low), 0.0), 1.0),
-    "triangular": _triangular_share,
-    "normal": _normal_share,
-    "lognormal": lambda x, median, dispersion: _normal_share(np.log(x / median), 0.0, dispersion) if x > 0 else 0.0,
-}
+    if kind == "triangular":
+        low, mode, high = parameters
+        return stats.triang((mode - low) / (high - low), low, high - low)
+    first, second = parameters
+    if kind == "uniform":
+        return stats.uniform(first, second - first)
+    return stats.norm(first if kind == "normal" else 0.0, second)
 
 
 @dataclass(frozen=True)
