@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
 from msfp_gen.cli.inputs import build, load_source, of_building, one_bearing, result_of
 from msfp_gen.errors import RunError
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from msfp_gen.studies.bounding import Bounds
 
 app = typer.Typer()
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
 
 
 @app.command(
@@ -74,7 +73,7 @@ def bound(
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors
-    from msfp_gen.studies.bounding.tables import bounding_tables
+    from msfp_gen.studies.bounding.output import bounding_tables
 
     chosen, table = load_scene(scene), load_factors(factors)
     bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
@@ -111,8 +110,7 @@ def factors(
 
 def _save(found: Bounds, folder: Path) -> list[Path]:
     """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
-    from msfp_gen.studies.bounding.figure import plot_bounds
-    from msfp_gen.studies.bounding.tables import write_quantities
+    from msfp_gen.studies.bounding.output import plot_bounds, write_quantities
 
     written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases]
     plot_bounds(found, folder / "bounds.png")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, say, scenes, show, whole_number
+from msfp_gen.cli.console import Progress, Workers, note, say, scenes, show
 from msfp_gen.common.output import check_output, make_folder
 from msfp_gen.common.tables import TABLE_SUFFIXES
 from msfp_gen.errors import RunError
@@ -50,10 +50,7 @@ def batch(
         Path | None,
         typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
-    ] = None,
+    workers: Workers = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print summaries and varied fields as JSON, and nothing else.")
     ] = False,

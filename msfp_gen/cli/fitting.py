@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
 from msfp_gen.cli.inputs import build
 from msfp_gen.errors import InputError
 
@@ -57,7 +57,7 @@ def fit(
         Path | None,
         typer.Option(metavar="FILE.html", help="Write a page with values, limits, loops and residuals; no network."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Fit friction and other values of a scene to laboratory tests, with 95 % intervals.
 
@@ -67,8 +67,8 @@ def fit(
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
     from msfp_gen.studies.calibration import fit as run_fit
+    from msfp_gen.studies.calibration.fit_result import fit_tables
     from msfp_gen.studies.calibration.fitting import start_fit
-    from msfp_gen.studies.calibration.tables import fit_tables
 
     if report is not None:
         check_output(report, REPORT_SUFFIXES, "--report")

@@ -85,6 +85,12 @@ def write_columns(path: str | Path, columns: Mapping[tuple[str, str], Sequence[A
     return target
 
 
+def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]], name: str = "output") -> Path:
+    """Write rows of names and values as `write_columns` does, without units; a row may lack values."""
+    names = dict.fromkeys(key for row in rows for key in row)
+    return write_columns(path, {(key, ""): [row.get(key) for row in rows] for key in names}, name)
+
+
 def _csv(columns: Mapping[tuple[str, str], Sequence[Any]]) -> bytes:
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -11,8 +11,8 @@ from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.tables import Table
 from msfp_gen.report.content import KILO, MILLI
 from msfp_gen.report.template import picture, render
+from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
-from msfp_gen.studies.calibration.tables import correlation_table, estimate_table, residual_table
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from msfp_gen.errors import InputError
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.studies.accuracy.effects import with_all_effects
+from msfp_gen.studies.accuracy.error_target import with_all_effects
 from msfp_gen.studies.accuracy.methods import METHODS, Method, methods_named
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, REFUSED, Errors, Reference, Trial, best_reference, errors
 

@@ -12,8 +12,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
-from msfp_gen.studies.assessment.rows import complete, numbers, read_study, unknown_column, write_frame
-from msfp_gen.studies.assessment.samples import STATISTICS
+from msfp_gen.studies.assessment.rows import STATISTICS, complete, numbers, read_study, unknown_column, write_frame
 from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
@@ -125,15 +124,12 @@ def pareto(
 
 def _search_study(source: str | Path | Mapping[str, Any]) -> Study:
     """The study with one design, at the medians of the axes."""
-    if not isinstance(source, Mapping):
-        found = load_study(source, design=True)
-    else:
-        found = load_study(dict(source), design=True)
-    if not any(axis.random for axis in found.axes):
+    study = load_study(source, design=True)
+    if not any(axis.random for axis in study.axes):
         raise InputError(
             "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
         )
-    return found
+    return study
 
 
 def _check(study: Study, goals: Goals, population: int, generations: int) -> None:

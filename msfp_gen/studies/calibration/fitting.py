@@ -12,12 +12,10 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.studies.calibration.fit_result import Estimate, Fit
-from msfp_gen.studies.calibration.fitted_test import FittedTest
 from msfp_gen.studies.calibration.intervals import lag_one, weak
-from msfp_gen.studies.calibration.measurement import Measurement, read_measurement
-from msfp_gen.studies.calibration.residuals import Progress, Residuals, scenes_of
+from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
+from msfp_gen.studies.calibration.residuals import Progress, Residuals, changed_scene, scenes_of, unknowns_of
 from msfp_gen.studies.calibration.solution import SMALL, Solution, solve
-from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene

@@ -1,4 +1,4 @@
-"""`Measurement`: time, displacement and force of a laboratory test, from a table in a text file."""
+"""`Measurement`: time, displacement and force of a laboratory test, from a text file; `FittedTest`: beside its run."""
 
 from __future__ import annotations
 
@@ -177,3 +177,31 @@ def _split(text: str) -> tuple[str, str]:
     match = _CELL.fullmatch(text)
     assert match is not None  # the pattern matches every text of one line
     return match[1], (match[2] or match[3] or "").strip()
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTest:
+    """A test beside the run of the fitted bearing.
+
+    Attributes:
+        measured: the test at the times that were compared (at most 2000).
+        force: of the run, with the offset of the test, ndarray, shape (T,), [N].
+    """
+
+    measured: Measurement
+    force: Array
+
+    @property
+    def residual(self) -> Array:
+        """Force of the run less measured force, ndarray, shape (T,), [N]."""
+        return self.force - self.measured.force
+
+    @property
+    def deviation(self) -> float:
+        """Root mean square of the residual [N]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def share(self) -> float:
+        """The same over the largest measured force."""
+        return self.deviation / float(np.abs(self.measured.force).max())

@@ -18,7 +18,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
-from msfp_gen.studies.bounding.measures import Measure, building_measures, measures
+from msfp_gen.studies.bounding.runs import Measure, building_measures, measures
 from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
 
 # Word in a formula -> what it takes of a column of the history.
@@ -97,7 +97,7 @@ class Keep:
     @property
     def known(self) -> dict[str, Source]:
         """Column -> where it comes from, of everything that can be kept."""
-        return catalogue(self.surfaces) if self.building is None else building_catalogue(self.building)
+        return catalogue(self.surfaces, self.building)
 
     @property
     def history(self) -> Collection[str]:
@@ -178,37 +178,25 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
 
 
 @lru_cache(maxsize=16)
-def catalogue(surfaces: int) -> dict[str, Source]:
-    """Column -> where it comes from, for bearings of up to so many surfaces; those of the summary come first."""
-    found: dict[str, Source] = {}
-    for name, (unit, path) in {**COLUMNS, **_MORE}.items():
-        key, each, _ = path.partition(".*")
-        if name in _LEFT_OUT:
-            continue
-        if not each:
-            found[name] = Source(unit, key)
-        for index in range(surfaces) if each else ():
-            found[f"{name}_{index + 1}"] = Source(unit, key, index)
-    for index in range(surfaces):
-        found[f"{CAPACITY_USED}_{index + 1}"] = Source("", CAPACITY_USED, index)
-    for name, measure in measures(surfaces).items():
-        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
-    return found
+def catalogue(surfaces: int, building: tuple[int, int, int] | None) -> dict[str, Source]:
+    """Column -> where it comes from, of a bearing or a building; those of the summary come first.
 
-
-@lru_cache(maxsize=16)
-def building_catalogue(counts: tuple[int, int, int]) -> dict[str, Source]:
-    """The same for a building of so many floors, storeys and bearings."""
-    rows = dict(zip(("floors", "storeys", "bearings"), counts, strict=True))
-    found: dict[str, Source] = {}
-    for name, (unit, path) in BUILDING_COLUMNS.items():
-        if name not in _LEFT_OUT:
-            several = rows.get(path.partition(".*")[0], 0) if ".*" in path else 0
-            each = {f"{name}_{index + 1}": Source(unit, path, index) for index in range(several)}
-            found |= each if ".*" in path else {name: Source(unit, path)}
-    for name, measure in building_measures().items():
-        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
-    return found
+    surfaces: the most of any bearing. building: numbers of floors, storeys and bearings.
+    """
+    counts = dict(zip(("floors", "storeys", "bearings"), building or (), strict=False))
+    sources: dict[str, Source] = {}
+    for name, (unit, path) in ({**COLUMNS, **_MORE} if building is None else BUILDING_COLUMNS).items():
+        head, several, _ = path.partition(".*")
+        if several:
+            numbers = range(counts.get(head, surfaces))
+            sources |= {f"{name}_{index + 1}": Source(unit, path, index) for index in numbers}
+        elif name not in _LEFT_OUT:
+            sources[name] = Source(unit, path)
+    if building is None:
+        sources |= {f"{CAPACITY_USED}_{k + 1}": Source("", CAPACITY_USED, k) for k in range(surfaces)}
+    for name, measure in (measures(surfaces) if building is None else building_measures()).items():
+        sources.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
+    return sources
 
 
 @lru_cache(maxsize=16)

@@ -13,6 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import exp
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
+from msfp_gen.scene.file.catalogue import parsed
 
 MOST = 10_000_000  # samples; each takes 8 bytes a random axis, in the process that starts the study
 
@@ -196,10 +197,7 @@ def distribution_from(table: Mapping[str, Any]) -> tuple[Distribution, set[str]]
     numbers = {name: number_of(table, name) for name in names}
     between = table.get("between")
     if between is not None:
-        try:
-            between = Quantity("", shape=(2,)).parse(between)
-        except ValueError as error:
-            raise InputError(f"between = {between!r}: {error}") from None
+        between = parsed(Quantity("", shape=(2,)), between, "between")
     return Distribution(kind, tuple(numbers.values()), between), {"distribution", "between", *names}
 
 

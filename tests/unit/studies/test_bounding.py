@@ -32,7 +32,7 @@ from msfp_gen import (
 )
 from msfp_gen.cli import main
 from msfp_gen.studies.bounding import Bounds, bound, bounded_scenes, factor_tables, load_factors
-from msfp_gen.studies.bounding.figure import plot_bounds
+from msfp_gen.studies.bounding.output import plot_bounds
 from msfp_gen.studies.bounding.runs import _scaled
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)

@@ -16,7 +16,7 @@ from msfp_gen.studies.batch import ENDED, check_method, run_to_end
 from msfp_gen.studies.pool import raise_if_stopped
 from msfp_gen.studies.study.definition import Task
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
+from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.opening import AnyScene
@@ -43,7 +43,7 @@ class _OutOfTimeError(Exception):
     """Ends a run at the limit of its wall time."""
 
 
-_makers: dict[str, SceneMaker] = {}  # of the last study only
+_factories: dict[str, SceneFactory] = {}  # of the last study only
 
 
 def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
@@ -56,18 +56,18 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
 
 
 def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
-    maker = _makers.get(order.identity)
-    if maker is None:
-        maker = SceneMaker(order.recipe)
-        _makers.clear()
-        _makers[order.identity] = maker
+    factory = _factories.get(order.identity)
+    if factory is None:
+        factory = SceneFactory(order.recipe)
+        _factories.clear()
+        _factories[order.identity] = factory
     axes = order.recipe.axes
     rows = []
     for offset, (values, labels) in enumerate(task.rows(axes), start=1):
         at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
         intensity = order.recipe.intensity(at)
         numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
-        status, message, kept = _run(partial(maker.scene, values), order, numbers)
+        status, message, kept = _run(partial(factory.scene, values), order, numbers)
         rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
     failed = sum(row["status"] not in ENDED for row in rows)
     return _part(order, rows, failed), failed

@@ -1,6 +1,6 @@
 """What a worker needs to make the scene of a run: the base scene as a table, and what the axes change in it.
 
-Only this module knows what the base of a study is; parts, engines and evaluations know rows.
+Only this module knows what the base of a study is; parts, pools and evaluations know rows.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Recipe:
         return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
-class SceneMaker:
+class SceneFactory:
     """Makes the scenes of a study: each is what the reader of scene files makes of the table of the run.
 
     A motion that no axis changes is resolved once; what is made of other motions and of the frame of a building is kept
