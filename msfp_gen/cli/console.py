@@ -74,6 +74,7 @@ def _option(name: str, rule: Rule) -> Any:
 
 
 whole_number, number = parser_of(int, "whole number"), parser_of(float, "number")
+numbers = parser_of(lambda text: tuple(map(float, text.split(","))), "list of numbers")
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
 Workers = Annotated[
     int | None,

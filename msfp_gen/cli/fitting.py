@@ -66,9 +66,8 @@ def fit(
     from msfp_gen.buildings.opening import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
-    from msfp_gen.studies.calibration import fit as run_fit
     from msfp_gen.studies.calibration.fit_result import fit_tables
-    from msfp_gen.studies.calibration.fitting import start_fit
+    from msfp_gen.studies.calibration.fitting import end_fit, start_fit
 
     if report is not None:
         check_output(report, REPORT_SUFFIXES, "--report")
@@ -76,7 +75,7 @@ def fit(
     read = _measurements(tests, column or (), axial_load, weights)
     paths = [path for text in parameters for path in text.split(",")]
     limits = dict(_limits(text) for text in bounds or ())
-    prepared = start_fit(chosen, read, paths, limits)  # refuses bad input before anything is built or written
+    prepared = start_fit(chosen, read, paths, limits, offset)  # refuses bad input before anything is built or written
     if output is not None:
         make_folder(output, "--output")
     for each in prepared.scenes:
@@ -90,15 +89,14 @@ def fit(
             line.name = f"evaluation {count}" + (f", deviation {deviation:.4g} N" if deviation == deviation else "")
             update(share, 1.0)
 
-        found = run_fit(
-            chosen, read, paths, bounds=limits, offset=offset, progress=None if update is None else show_evaluation
-        )
+        prepared.progress = None if update is None else show_evaluation
+        result = end_fit(chosen, prepared)
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(result.as_dict(), indent=2, allow_nan=False))
     else:
-        show(fit_tables(found))
-    written = [] if output is None else found.save(output)
-    for path in [*written, *([] if report is None else [write_fit_report(found, report)])]:
+        show(fit_tables(result))
+    written = [] if output is None else result.save(output)
+    for path in [*written, *([] if report is None else [write_fit_report(result, report)])]:
         note(f"wrote {path}")
 
 

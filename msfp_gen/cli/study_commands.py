@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Progress, Workers, note, number, parser_of, say, show
+from msfp_gen.cli.console import AsJson, Progress, Workers, note, number, numbers, say, show
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
 from msfp_gen.errors import InputError
@@ -44,10 +44,6 @@ app.add_typer(
     "  msfp-gen study --example > study.toml\n  msfp-gen study study.toml -o out\n"
     "  msfp-gen study status out",
 )
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(each) for each in text.split(","))
 
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study.")]
@@ -146,7 +142,7 @@ def ida(
     demand: Demand,
     measure: Measure = "scale",
     fractiles: Annotated[
-        Any, typer.Option(parser=parser_of(_numbers, "list of shares"), metavar="SHARES", help="Shares of the runs.")
+        Any, typer.Option(parser=numbers, metavar="SHARES", help="Shares of the runs.")
     ] = "0.16,0.5,0.84",
     where: Where = None,
     plot: Plot = None,
@@ -176,9 +172,7 @@ def fragility(
     demand: Demand,
     thresholds: Annotated[
         Any,
-        typer.Option(
-            parser=parser_of(_numbers, "list of numbers"), metavar="VALUES", help="Damage states: values of the demand."
-        ),
+        typer.Option(parser=numbers, metavar="VALUES", help="Damage states: values of the demand."),
     ],
     measure: Measure = "scale",
     early: Annotated[

@@ -28,6 +28,18 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
 
+AFTER_IMPACTS = ", and after impacts,"
+CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
+REFERENCE_OFFSET = 2  # places from a candidate tolerance to that of its reference run: a factor of ten
+REFERENCE_METHODS = {"implicit": "esdirk4", "esdirk4": "implicit"}  # other stages, order and dense output
+STEPS_PER_PERIOD = 40  # of a ringing slider, in a reference run that resolves it
+MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
+SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
+DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
+STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
+BUDGET = 120.0  # [s] of wall time for the whole search
+METHOD: Final = "implicit"
+
 
 def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
     """Effects for a run with relative error `error` [-], and the reasons in words.
@@ -51,19 +63,6 @@ def with_all_effects(scene: Scene) -> Scene:
     if isinstance(scene.effects, Effects):
         return scene
     return replace(scene, effects=all_effects(scene))
-
-
-AFTER_IMPACTS = ", and after impacts,"
-CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
-REFERENCE_OFFSET = 2  # places from a candidate tolerance to that of its reference run: a factor of ten
-REFERENCE_METHODS = {"implicit": "esdirk4", "esdirk4": "implicit"}  # other stages, order and dense output
-STEPS_PER_PERIOD = 40  # of a ringing slider, in a reference run that resolves it
-MOST_STEPS = 200_000  # of a reference run that resolves ringing: some seconds; beyond, ringing is stated as left out
-SAFETY = 1.5  # factor on the difference from the reference run, which has an error of its own
-DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays and needs no words
-STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
-BUDGET = 120.0  # [s] of wall time for the whole search
-METHOD: Final = "implicit"
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,19 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.studies.accuracy.study import Point, Study
 
+NAMES = tuple(field.name for field in fields(Errors))
+HEADS = (
+    "",
+    "tolerance",
+    "outcome",
+    "seconds",
+    "Newton iterations",
+    "force max",
+    "force RMS",
+    "sliding max",
+    "sliding RMS",
+)
+
 
 def machine() -> dict[str, str]:
     """Name -> text: processor, cores, system, compiler, versions, commit of a checkout; without unknown ones."""
@@ -67,20 +80,6 @@ def _commit() -> str:
     except (OSError, subprocess.CalledProcessError):
         return ""
     return run.stdout.strip()
-
-
-NAMES = tuple(field.name for field in fields(Errors))
-HEADS = (
-    "",
-    "tolerance",
-    "outcome",
-    "seconds",
-    "Newton iterations",
-    "force max",
-    "force RMS",
-    "sliding max",
-    "sliding RMS",
-)
 
 
 def rows(study: Study) -> list[dict[str, Any]]:

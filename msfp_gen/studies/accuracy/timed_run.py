@@ -25,6 +25,9 @@ ERRORS = {
     "sliding_max": "sliding, maximum",
     "sliding_rms": "sliding, RMS",
 }
+ROWS = 2000  # intervals between the instants at which runs are compared
+QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
+CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
 @dataclass(frozen=True)
@@ -145,11 +148,6 @@ def _difference(first: Trial, second: Trial) -> Errors:
     if found is None:
         raise RunError("a finished run has no rows", status="rows")
     return found
-
-
-ROWS = 2000  # intervals between the instants at which runs are compared
-QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
-CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,14 @@ from msfp_gen.studies.assessment.rows import complete, demands, intensities, uni
 
 ITERATIONS = 100
 CONVERGED = 1e-10  # of the Newton decrement
+EARLY = {
+    "leave-out": "left out, and counted",
+    "exceed": "count as runs above the threshold",
+    "refuse": "an error",
+}
+LEAST_BOOTSTRAPS = 100
+POINTS = 200  # of a curve that is written
+Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -132,16 +140,6 @@ def _newton(rows: Array, runs: Array, over: Array, start: Array, where: str) -> 
         x = x + size * step
         value = likelihood(x)
     raise InputError(f"{where}: the likelihood has no maximum that could be found; give more runs near the threshold")
-
-
-EARLY = {
-    "leave-out": "left out, and counted",
-    "exceed": "count as runs above the threshold",
-    "refuse": "an error",
-}
-LEAST_BOOTSTRAPS = 100
-POINTS = 200  # of a curve that is written
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -369,28 +367,28 @@ def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, 
     return np.array(found)
 
 
-def fragility_frame(found: Fragility) -> Any:
+def fragility_frame(result: Fragility) -> Any:
     """Points of the curves with their bands, as a DataFrame: case, threshold, intensity, probability, low, high."""
     import pandas as pd
 
     frames = []
-    for state in found.states:
+    for state in result.states:
         x = np.geomspace(state.intensity.min(), state.intensity.max(), POINTS)
         low, high = state.band(x)
         columns = {
             "case": state.case,
             "threshold": state.threshold,
-            found.measure: x,
+            result.measure: x,
             "probability": state.probability(x),
         }
         frames.append(pd.DataFrame({**columns, "low": low, "high": high}))
     return pd.concat(frames, ignore_index=True)
 
 
-def fragility_table(found: Fragility) -> Table:
+def fragility_table(result: Fragility) -> Table:
     """The damage states for a terminal."""
-    unit = f" [{found.unit}]" if found.unit else ""
-    columns = (f"{found.demand}{unit}", "median", "interval", "dispersion", "interval", "runs", "exceeded", "left out")
+    unit = f" [{result.unit}]" if result.unit else ""
+    columns = (f"{result.demand}{unit}", "median", "interval", "dispersion", "interval", "runs", "exceeded", "left out")
     rows = [
         (
             f"{state.case} {state.threshold:g}".strip(),
@@ -402,8 +400,8 @@ def fragility_table(found: Fragility) -> Table:
             str(state.exceeded),
             str(state.left_out),
         )
-        for state in found.states
+        for state in result.states
     ]
-    level = f"{100 * found.states[0].level:g} %"
-    measure = f" [{found.measure_unit}]" if found.measure_unit else ""
-    return Table(f"fragility by {found.measure}{measure}, lognormal, intervals of {level}", columns, rows)
+    level = f"{100 * result.states[0].level:g} %"
+    measure = f" [{result.measure_unit}]" if result.measure_unit else ""
+    return Table(f"fragility by {result.measure}{measure}, lognormal, intervals of {level}", columns, rows)

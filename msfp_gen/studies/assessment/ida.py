@@ -136,14 +136,14 @@ def axes_of(rows: Any) -> list[str]:
     return names[names.index("run") + 1 : names.index("status")]
 
 
-def ida_table(found: Ida) -> Table:
+def ida_table(result: Ida) -> Table:
     """The fractiles for a terminal."""
-    shares = [name for name in found.fractiles.columns if name.startswith("p")]
+    shares = [name for name in result.fractiles.columns if name.startswith("p")]
     rows = [
-        [f"{row[found.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
+        [f"{row[result.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
         + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in shares]
-        for _, row in found.fractiles.iterrows()
+        for _, row in result.fractiles.iterrows()
     ]
-    unit = f" [{found.unit}]" if found.unit else ""
-    title = f"fractiles of {found.demand}{unit} by {found.measure}"
-    return Table(title, (found.measure, "curves", "ended early", *shares), rows)
+    unit = f" [{result.unit}]" if result.unit else ""
+    title = f"fractiles of {result.demand}{unit} by {result.measure}"
+    return Table(title, (result.measure, "curves", "ended early", *shares), rows)

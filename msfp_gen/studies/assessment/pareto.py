@@ -17,7 +17,7 @@ from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.run import run_on
-from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.sampling import Sampling, values_at
 
 LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
 DESIGNS = "designs.parquet"
@@ -172,9 +172,7 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Poo
     """The designs of a generation with their statistics, as a DataFrame."""
     import pandas as pd
 
-    drawn = [axis.distribution for axis in study.axes if axis.distribution is not None]
-    clipped = np.clip(shares, 2.0**-53, 1 - 2.0**-53)
-    values = np.column_stack([each.values(clipped[:, index]) for index, each in enumerate(drawn)])
+    values = values_at(shares, study.distributions)
     sampling = Sampling("listed", values=tuple(map(tuple, values.tolist())))
     table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
     place = folder / f"generation-{number:03d}"
@@ -225,11 +223,11 @@ def not_dominated(values: Array) -> Any:
     return ~better
 
 
-def front_table(found: Front) -> Table:
+def front_table(front: Front) -> Table:
     """The front for a terminal, sorted by its first objective."""
-    chosen = found.designs[found.designs.front].sort_values(found.goals.names[0])
+    chosen = front.designs[front.designs.front].sort_values(front.goals.names[0])
     columns = [name for name in chosen.columns if name not in ("generation", "feasible", "front")]
     rows = [[f"{value:.4g}" for value in row] for row in chosen[columns].to_numpy()]
-    count, feasible = len(found.designs), int(found.designs.feasible.sum())
+    count, feasible = len(front.designs), int(front.designs.feasible.sum())
     title = f"{len(chosen)} designs on the Pareto front, of {feasible} feasible ones among {count}"
     return Table(title, columns, rows)

@@ -16,6 +16,12 @@ from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.chunks import parts_in, readable_parts, study_table
 
 COMPLETE = "ok"  # the status of a run that reached its end
+STATISTICS: dict[str, Callable[..., Any]] = {
+    "median": np.median,
+    "mean": np.mean,
+    "max": np.max,
+    "min": np.min,
+}
 
 
 def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
@@ -121,14 +127,6 @@ def unit_of(rows: Any, name: str) -> str:
 def labelled(name: str, unit: str) -> str:
     """A label of an axis or a column: words, and the unit in brackets."""
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
-
-
-STATISTICS: dict[str, Callable[..., Any]] = {
-    "median": np.median,
-    "mean": np.mean,
-    "max": np.max,
-    "min": np.min,
-}
 
 
 @dataclass(frozen=True)

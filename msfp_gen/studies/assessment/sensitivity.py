@@ -114,29 +114,33 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
     )  # fmt: skip
 
 
-def tornado_table(found: Tornado) -> Table:
+def tornado_table(result: Tornado) -> Table:
     """The bars for a terminal."""
     rows = [
         (bar.axis, f"{bar.low:.4g}", f"{bar.high:.4g}", f"{bar.at_low:.4g}", f"{bar.at_high:.4g}", f"{bar.swing:.4g}")
-        for bar in found.bars
+        for bar in result.bars
     ]
-    unit = f" {found.unit}" if found.unit else ""
-    low, high = found.quantiles
-    title = f"{found.statistic} of {found.name}: {found.base:.4g}{unit} at medians; each axis at {low:g} and {high:g}"
+    unit = f" {result.unit}" if result.unit else ""
+    low, high = result.quantiles
+    title = (
+        f"{result.statistic} of {result.name}: {result.base:.4g}{unit} at medians; each axis at {low:g} and {high:g}"
+    )
     return Table(title, ("axis", "low", "high", "at low", "at high", "swing"), rows)
 
 
-def sobol_table(found: Sobol) -> Table:
+def sobol_table(result: Sobol) -> Table:
     """The indices for a terminal."""
     rows = [
         (
             axis,
-            f"{found.first[k]:.3f}",
-            f"± {found.first_interval[k]:.3f}",
-            f"{found.total[k]:.3f}",
-            f"± {found.total_interval[k]:.3f}",
+            f"{result.first[k]:.3f}",
+            f"± {result.first_interval[k]:.3f}",
+            f"{result.total[k]:.3f}",
+            f"± {result.total_interval[k]:.3f}",
         )
-        for k, axis in enumerate(found.axes)
+        for k, axis in enumerate(result.axes)
     ]
-    title = f"Sobol' indices of the {found.statistic} of {found.name}, {found.samples} samples, {100 * found.level:g} %"
+    title = (
+        f"Sobol' indices of the {result.statistic} of {result.name}, {result.samples} samples, {100 * result.level:g} %"
+    )
     return Table(title, ("axis", "first order", "", "total", ""), rows)

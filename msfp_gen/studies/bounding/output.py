@@ -34,21 +34,27 @@ SHOWN = {
     "W/m^2": ("kW/m2", 1e-3),
     "1": ("%", 100.0),
 }
+# In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
+LINE_STYLES: dict[str, dict[str, Any]] = {
+    "lower": {"color": COLOURS[0]},
+    "upper": {"color": COLOURS[1]},
+    "nominal": {"color": INK},
+}
 
 
-def bounding_tables(found: Bounds) -> list[Table]:
+def bounding_tables(bounds: Bounds) -> list[Table]:
     """Tables of the factors, of the factors by surface, of quantities by case, and of runs that failed."""
-    failed = [(case.name, case.failure) for case in found.cases if case.failure]
+    failed = [(case.name, case.failure) for case in bounds.cases if case.failure]
     extra = [Table("runs that failed", (), failed)] if failed else []
-    return [_factor_table(found.table), _lambda_table(found), _quantity_table(found), *extra]
+    return [_factor_table(bounds.table), _lambda_table(bounds), _quantity_table(bounds), *extra]
 
 
-def write_quantities(found: Bounds, path: str | Path) -> Path:
+def write_quantities(bounds: Bounds, path: str | Path) -> Path:
     """Write the quantities by case as CSV in SI units; the file appears only when complete.
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    units, quantities, governing = found.measures, found.quantities(), found.governing()
+    units, quantities, governing = bounds.measures, bounds.quantities(), bounds.governing()
     columns: dict[tuple[str, str], list[Any]] = {
         ("quantity", ""): [f"{name} [{units[name].unit}]" for name in quantities],
         **{(case, ""): [values[case] for values in quantities.values()] for case in CASES},
@@ -79,24 +85,24 @@ def _factor_table(table: FactorTable) -> Table:
     return Table("property-modification factors", (), [row for row in rows if row[1]])
 
 
-def _lambda_table(found: Bounds) -> Table:
-    nominal = found.bearing.surfaces
+def _lambda_table(bounds: Bounds) -> Table:
+    nominal = bounds.bearing.surfaces
     rows = [
         (
             f"{named} {surface + 1}",
             *(f"{factors[case][surface]:.4g}" for case in CASES),
             *(f"{factors[case][surface] * getattr(nominal[surface], named):.4g}" for case in CASES),
         )
-        for named, factors in found.lambdas.items()
-        for surface in range(found.surfaces)
+        for named, factors in bounds.lambdas.items()
+        for surface in range(bounds.surfaces)
     ]
     return Table("lambda of every surface, and property times lambda [SI]", ("", *CASES, *CASES), rows)
 
 
-def _quantity_table(found: Bounds) -> Table:
-    units, governing = found.measures, found.governing()
+def _quantity_table(bounds: Bounds) -> Table:
+    units, governing = bounds.measures, bounds.governing()
     rows = []
-    for name, values in found.quantities().items():
+    for name, values in bounds.quantities().items():
         if any(value is not None for value in values.values()):
             unit, scale = SHOWN.get(units[name].unit, (units[name].unit, 1.0))
             cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
@@ -104,30 +110,22 @@ def _quantity_table(found: Bounds) -> Table:
     return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)
 
 
-# In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
-LINE_STYLES: dict[str, dict[str, Any]] = {
-    "lower": {"color": COLOURS[0]},
-    "upper": {"color": COLOURS[1]},
-    "nominal": {"color": INK},
-}
-
-
-def plot_bounds(found: Bounds, path: str | Path | None = None) -> Figure:
+def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     """Top force [kN] over displacement across the bearing [mm] of all cases, along each axis that moves.
 
     A run that failed is drawn up to its last row. Raises InputError for a path that cannot be written.
     """
-    drawn = [case for name in LINE_STYLES for case in found.cases if case.name == name]
+    drawn = [case for name in LINE_STYLES for case in bounds.cases if case.name == name]
     axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
-        name = next(case.scene.name for case in found.cases if case.name == "nominal") or "unnamed scene"
-        headline(figure, f"{name}: bounds by {found.table.name}")
+        name = next(case.scene.name for case in bounds.cases if case.name == "nominal") or "unnamed scene"
+        headline(figure, f"{name}: bounds by {bounds.table.name}")
         for axis, place in zip(axes, figure.subplots(1, len(axes), squeeze=False)[0], strict=True):
-            _draw(place, found, drawn, axis)
+            _draw(place, bounds, drawn, axis)
     return figure
 
 
-def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
+def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     loops = [_loop(case.result) for case in cases]
     forces = [force[:, axis] for _, force in loops]
     scale = engineering(np.concatenate(forces), "N") if forces else engineering(0.0, "N")
@@ -135,7 +133,7 @@ def _draw(axes: Axes, found: Bounds, cases: list[Case], axis: int) -> None:
         axes.plot(
             displacement(u[:, axis]),
             force(values, scale),
-            label=_label(found, case),
+            label=_label(bounds, case),
             linewidth=THIN,
             **LINE_STYLES[case.name],
         )
@@ -159,10 +157,10 @@ def _loop(result: Result | BuildingResult) -> tuple[Array, Array]:
     return result.history.displacement, result.history.top_force
 
 
-def _label(found: Bounds, case: Case) -> str:
+def _label(bounds: Bounds, case: Case) -> str:
     """Name of the case and its factors; one number if all surfaces have the same."""
     parts = []
-    for named, factors in found.lambdas.items():
+    for named, factors in bounds.lambdas.items():
         values = list(dict.fromkeys(f"{value:.3g}" for value in factors[case.name]))
         parts.append(f"{named.replace('_', ' ')} × {' / '.join(values)}")
     return f"{case.name}: {', '.join(parts)}" + (", run failed" if case.failure else "")

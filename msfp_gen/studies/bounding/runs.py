@@ -25,6 +25,17 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing
 
+CASES = ("lower", "nominal", "upper")
+# Word in the name of a model -> the effect that is then prescribed for all cases.
+WIDER: dict[str, tuple[str, Any]] = {
+    "spatial": ("dimension", "spatial"),
+    "inertial": ("sliders", "inertial"),
+    "rims": ("rims", True),
+    "uplift": ("uplift", True),
+    "pvt": ("friction", "pvt"),
+}
+Progress = Callable[[float, float], None]
+
 
 class Measure(NamedTuple):
     """A quantity that is compared.
@@ -99,18 +110,6 @@ def _mean(name: str) -> Callable[[Characterisation], float | None]:
 
 def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
     return lambda found: getattr(found.surfaces[surface - 1], name)
-
-
-CASES = ("lower", "nominal", "upper")
-# Word in the name of a model -> the effect that is then prescribed for all cases.
-WIDER: dict[str, tuple[str, Any]] = {
-    "spatial": ("dimension", "spatial"),
-    "inertial": ("sliders", "inertial"),
-    "rims": ("rims", True),
-    "uplift": ("uplift", True),
-    "pvt": ("friction", "pvt"),
-}
-Progress = Callable[[float, float], None]
 
 
 @dataclass(frozen=True)

@@ -157,42 +157,42 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def fit_tables(found: Fit) -> list[Table]:
+def fit_tables(fit: Fit) -> list[Table]:
     """Estimates, correlations, tests, and what limits the fit."""
-    tables = [estimate_table(found)]
-    if len(found.estimates) > 1:
-        tables.append(correlation_table(found))
-    tables.append(residual_table(found))
-    remarks = [(text,) for text in (*found.unidentified, *found.notes)]
+    tables = [estimate_table(fit)]
+    if len(fit.estimates) > 1:
+        tables.append(correlation_table(fit))
+    tables.append(residual_table(fit))
+    remarks = [(text,) for text in (*fit.unidentified, *fit.notes)]
     return [*tables, Table("what limits this fit", (), remarks)] if remarks else tables
 
 
-def estimate_table(found: Fit) -> Table:
+def estimate_table(fit: Fit) -> Table:
     """Values, intervals and starts."""
     columns = ("parameter", "value", "95 % interval", "start", "unit")
-    title = f"fitted in {found.evaluations} evaluations, the last with rtol {found.rtol:g}"
-    return Table(title, columns, [_row(e) for e in found.estimates])
+    title = f"fitted in {fit.evaluations} evaluations, the last with rtol {fit.rtol:g}"
+    return Table(title, columns, [_row(e) for e in fit.estimates])
 
 
-def correlation_table(found: Fit) -> Table:
+def correlation_table(fit: Fit) -> Table:
     """Correlations of the estimates, in their order."""
-    numbers = [str(i) for i in range(1, len(found.estimates) + 1)]
+    numbers = [str(i) for i in range(1, len(fit.estimates) + 1)]
     rows = [
         (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
-        for estimate, line in zip(found.estimates, found.correlation, strict=True)
+        for estimate, line in zip(fit.estimates, fit.correlation, strict=True)
     ]
     return Table(
-        f"correlation, in the same order; condition {found.condition:.3g}",
+        f"correlation, in the same order; condition {fit.condition:.3g}",
         ("parameter", *numbers),
         rows,
     )
 
 
-def residual_table(found: Fit) -> Table:
+def residual_table(fit: Fit) -> Table:
     """Deviation of every test."""
     shares = [
         (test.measured.name, f"{test.deviation:.4g}", f"{100 * test.share:.2f}", str(len(test.force)))
-        for test in found.tests
+        for test in fit.tests
     ]
     return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares)
 

@@ -19,6 +19,12 @@ from msfp_gen.common.arrays import Array
 
 CORRECTIONS = 3  # of the sums over lags for what the fit took out of the residuals; the third changes them by percents
 LEAST_SHARE = 1e-3  # of a measured sum of squares, below which no correction lowers it
+CONFIDENCE = 0.95
+UNSEEN = 1e-6  # of the largest column: a parameter that changes the forces less is not seen
+SINGULAR = 1e4  # condition of the Jacobian from which a combination is not identified; runs err by about 1e-4
+PART = 0.3  # of a singular vector: a smaller component takes no part in the combination
+ALIKE = 0.98  # correlation from which two parameters are named
+UNCERTAIN = 0.5  # half width of an interval over the value from which the value is named
 
 
 class Noise(NamedTuple):
@@ -115,14 +121,6 @@ def _lag_sums(first: Array, second: Array) -> Array:
     product = np.conj(np.fft.rfft(first, 2 * rows, axis=0)) * np.fft.rfft(second, 2 * rows, axis=0)
     sums: Array = np.fft.irfft(product.sum(axis=1), 2 * rows)[:rows]
     return sums
-
-
-CONFIDENCE = 0.95
-UNSEEN = 1e-6  # of the largest column: a parameter that changes the forces less is not seen
-SINGULAR = 1e4  # condition of the Jacobian from which a combination is not identified; runs err by about 1e-4
-PART = 0.3  # of a singular vector: a smaller component takes no part in the combination
-ALIKE = 0.98  # correlation from which two parameters are named
-UNCERTAIN = 0.5  # half width of an interval over the value from which the value is named
 
 
 class Identified(NamedTuple):

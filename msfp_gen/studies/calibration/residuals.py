@@ -30,6 +30,11 @@ _OF_THE_TEST = {
     "load": "the tests have no load history",
     "initial_state": "a test starts at the centre of the bearing",
 }
+Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
+Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
+TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
+RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
+FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
 
 
 @dataclass(frozen=True)
@@ -119,13 +124,6 @@ def _check_members(members: Sequence[Parameter]) -> None:
             raise InputError(f"parameters = {member.path!r}: given twice; give each parameter once")
         if member.part in _OF_THE_TEST:
             raise InputError(f"parameters = {member.path!r}: {_OF_THE_TEST[member.part]}; leave it out")
-
-
-Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
-Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
-TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
-RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
-FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
 
 
 @dataclass(frozen=True, eq=False)

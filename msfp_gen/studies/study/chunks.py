@@ -33,6 +33,8 @@ FORMAT = 1  # of the rows of a part
 STUDY_FILE = "study.toml"
 PARTS = "part-*.parquet"
 _NAME = re.compile(r"part-(\d{7})-[0-9a-f]{16}\.parquet")
+IDLE = 3  # times the longest interval between parts, after which a study counts as not running
+LEAST_IDLE = 10.0  # that time at least [s]
 
 
 class Chunks:
@@ -203,10 +205,6 @@ def study_table(folder: Path) -> dict[str, Any]:
     return {**table, "about": {**table["about"], **counts}}
 
 
-IDLE = 3  # times the longest interval between parts, after which a study counts as not running
-LEAST_IDLE = 10.0  # that time at least [s]
-
-
 @dataclass(frozen=True)
 class Status:
     """How far a study has come.
@@ -282,21 +280,21 @@ def failures(part: Path) -> int:
         return int((pq.read_schema(part).metadata or {})[b"failed"])
 
 
-def status_table(found: Status) -> Table:
+def status_table(status: Status) -> Table:
     """The status for a terminal."""
     rows = [
-        ("runs", f"{found.done} of {found.runs} done ({100 * found.done / found.runs:.1f} %)"),
-        ("failed", f"{found.failed}; see the columns status and message" if found.failed else "0"),
-        ("parts", f"{found.parts} of {found.chunks}"),
+        ("runs", f"{status.done} of {status.runs} done ({100 * status.done / status.runs:.1f} %)"),
+        ("failed", f"{status.failed}; see the columns status and message" if status.failed else "0"),
+        ("parts", f"{status.parts} of {status.chunks}"),
     ]
-    if found.rate is not None:
-        rows.append(("rate", f"{found.rate:.3g} runs per second"))
-    if found.done == found.runs:
+    if status.rate is not None:
+        rows.append(("rate", f"{status.rate:.3g} runs per second"))
+    if status.done == status.runs:
         rows.append(("state", "complete"))
-    elif found.running and found.seconds_left is not None:
-        rows.append(("state", f"running, {found.seconds_left:.0f} s left"))
-    elif found.rate is None and found.parts < found.chunks:
+    elif status.running and status.seconds_left is not None:
+        rows.append(("state", f"running, {status.seconds_left:.0f} s left"))
+    elif status.rate is None and status.parts < status.chunks:
         rows.append(("state", "no part since it was started; the same command continues it if it stopped"))
     else:
         rows.append(("state", "not running; the same command continues it"))
-    return Table(found.name or "study", (), rows)
+    return Table(status.name or "study", (), rows)

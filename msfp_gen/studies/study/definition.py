@@ -23,7 +23,7 @@ from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.sampling import Distribution, Sampling
 from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 MOST_RUNS = 100_000_000
@@ -119,13 +119,15 @@ class Study:
         """The axes, in the order of the columns of the table."""
         return self.recipe.axes
 
+    @property
+    def distributions(self) -> list[Distribution]:
+        """Those of the random axes."""
+        return [axis.distribution for axis in self.axes if axis.distribution is not None]
+
     @cached_property
     def samples(self) -> Array:
         """Values of the random axes, ndarray, shape (samples, random axes); one row without random axes."""
-        drawn = [axis.distribution for axis in self.axes if axis.distribution is not None]
-        if self.sampling is None:
-            return np.zeros((1, 0))
-        return self.sampling.drawn(drawn)
+        return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:

@@ -26,6 +26,29 @@ from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
 
+Table = dict[str, Any]
+Progress = Callable[[float, float], None]
+RECORD_KEYS = ("suite", "motions", "scales", "intensity")
+NOUN = "a table with motions or the file of a suite, and scales"
+COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
+KEYS = {
+    "name": "a text",
+    "scene": "a scene file, the name of a preset, or a table",
+    "records": NOUN,
+    "axes": "a table with one table for each axis",
+    "sampling": "a table: how random axes are drawn",
+    "keep": "a list of quantities",
+    "quantities": "a table of names and formulas",
+    "limits": "a table",
+    "chunk": "a number of runs",
+    "about": "written by msfp-gen",
+}
+DEFAULT_KEEP = ("peak_displacement", "peak_top_force", "peak_sliding", "rims_met")
+BUILDING_KEEP = (
+    "peak_displacement", "peak_base_shear", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
+)  # fmt: skip
+_CHUNK = Quantity("", least=1, whole=True)
+
 
 def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -> dict[str, Any]:
     """The table at `key`, whose keys are fields of `kind`; empty if it is not there. Raises InputError."""
@@ -34,13 +57,6 @@ def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -
         raise InputError(f"{where}{key} = {given!r}: give a table")
     known_keys(given, [name for name, _, _ in ruled_fields(kind)], f"{where}{key}.")
     return dict(given)
-
-
-Table = dict[str, Any]
-Progress = Callable[[float, float], None]
-RECORD_KEYS = ("suite", "motions", "scales", "intensity")
-NOUN = "a table with motions or the file of a suite, and scales"
-COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
 
 
 @dataclass(frozen=True)
@@ -127,25 +143,6 @@ def _scales(values: Any) -> Axis:
     if not axis.numeric or min(axis.labels) <= 0:
         raise InputError(f"records.scales = {values!r}: give numbers above 0")
     return axis
-
-
-KEYS = {
-    "name": "a text",
-    "scene": "a scene file, the name of a preset, or a table",
-    "records": NOUN,
-    "axes": "a table with one table for each axis",
-    "sampling": "a table: how random axes are drawn",
-    "keep": "a list of quantities",
-    "quantities": "a table of names and formulas",
-    "limits": "a table",
-    "chunk": "a number of runs",
-    "about": "written by msfp-gen",
-}
-DEFAULT_KEEP = ("peak_displacement", "peak_top_force", "peak_sliding", "rims_met")
-BUILDING_KEEP = (
-    "peak_displacement", "peak_base_shear", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
-)  # fmt: skip
-_CHUNK = Quantity("", least=1, whole=True)
 
 
 def example_text() -> str:

@@ -15,6 +15,7 @@ from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import parsed
 
+WITHIN = (2.0**-53, 1 - 2.0**-53)  # shares that have a finite value
 MOST = 10_000_000  # samples; each takes 8 bytes a random axis, in the process that starts the study
 
 # Distribution -> its parameters.
@@ -124,15 +125,19 @@ class Sampling:
                     f"sampling.values: give {count} values in each row, one for each axis with a distribution"
                 )
             return np.array(self.values)
-        shares = self.shares(count)
-        return np.column_stack([each.values(shares[:, index]) for index, each in enumerate(distributions)])
+        return values_at(self.shares(count), distributions)
 
     def shares(self, axes: int) -> Array:
         """Shares of the distributions, ndarray, shape (samples, axes), in (0, 1); equal for equal seeds."""
         if not axes:
             return np.zeros((1, 0))
-        drawn = _DRAWS[self.method](self, axes)
-        return np.clip(drawn, 2.0**-53, 1 - 2.0**-53)
+        return np.clip(_DRAWS[self.method](self, axes), *WITHIN)
+
+
+def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
+    """The values below which these shares of the distributions lie, ndarrays, shape (samples, axes)."""
+    inside = np.clip(shares, *WITHIN)
+    return np.column_stack([one.values(inside[:, index]) for index, one in enumerate(distributions)])
 
 
 def _latin_hypercube(plan: Sampling, axes: int) -> Array:
