@@ -6,15 +6,18 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.opening import AnyScene, changed_scene
+from msfp_gen.buildings.opening import AnyScene, with_absolute_paths
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.changes import keys_of
-from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, of_building, plain_cell, summary_value
+from msfp_gen.studies.study.axes import Axis, located
+from msfp_gen.studies.study.scene_factory import Recipe, SceneFactory, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -69,25 +72,38 @@ def variations(
         raise InputError(f"--vary {motion[0]}: --suite gives the motion; change its records there")
     if repeated := [path for path in paths if paths.count(path) > 1]:
         raise InputError(f"--vary {repeated[0]}: given twice; give all its values at once")
-    combinations = list(product(*(values for _, values in fields)))
-    if len(combinations) * max(len(records), 1) > MAX_SCENES:
-        each = " for each record" if records else ""
-        raise InputError(f"--vary: {len(combinations)} combinations{each}; give at most {MAX_SCENES} in all")
-    return [
-        _variation(source, dict(zip(paths, values, strict=True)), record)
-        for record in records or (None,)
-        for values in combinations
-    ]
+    lists = [*([[record.name for record in records]] if records else []), *(values for _, values in fields)]
+    if prod(map(len, lists)) > MAX_SCENES:
+        raise InputError(f"--vary: {prod(map(len, lists))} scenes; give at most {MAX_SCENES} in all")
+    names = [*(["record"] if records else []), *paths]
+    table, path = scene_table(source)
+    try:
+        factory, axes = _factory(table, None if path is None else path.parent, fields, records)
+        return [
+            _variation(source, dict(zip(names, shown, strict=True)), factory.scene(values))
+            for shown, values in zip(product(*lists), product(*axes), strict=True)
+        ]
+    except InputError as error:
+        if path is None:
+            raise
+        raise InputError(f"{path}: {error}") from None
 
 
-def _variation(source: str | Path, varied: dict[str, Any], record: SuiteRecord | None) -> Variation:
-    scene = changed_scene(source, varied)
-    if record is not None:
-        scene = record.of(scene) if isinstance(scene, Scene) else replace(scene, motion=record.motion)
-        varied = {"record": record.name, **varied}
-    values_text = ", ".join(f"{path} = {value}" for path, value in varied.items())
+def _factory(
+    table: dict[str, Any], folder: Path | None, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord]
+) -> tuple[SceneFactory, list[tuple[Any, ...]]]:
+    """What makes the scenes, and the values of its axes."""
+    tables = {record.name: record.table for record in records}
+    axes = [Axis("record", "record", values=tuple(tables))] if records else []
+    axes += [located(Axis(path, "sets", (path,), values=tuple(values)), folder) for path, values in fields]
+    scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
+    return SceneFactory(Recipe(scene, tuple(axes), tables, {}, {})), [axis.values or () for axis in axes]
+
+
+def _variation(source: str | Path, varied: dict[str, Any], scene: AnyScene) -> Variation:
+    values = ", ".join(f"{path} = {value}" for path, value in varied.items())
     name = scene.name or Path(source).stem
-    return Variation(str(source), varied, replace(scene, name=f"{name}, {values_text}" if values_text else name))
+    return Variation(str(source), varied, replace(scene, name=f"{name}, {values}" if values else name))
 
 
 class Row(NamedTuple):

@@ -6,10 +6,12 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from msfp_gen.buildings.opening import located_value
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.sampling import Distribution, distribution_from, number_of
@@ -129,6 +131,16 @@ def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
             str(value) if isinstance(value, str | int | float) else json.dumps(value) for value in labels or values
         ]
     return replace(axis, values=tuple(values), labels=tuple(shown))
+
+
+def located(axis: Axis, folder: Path | None) -> Axis:
+    """The axis with absolute paths of the files that its values name, relative to a folder. Raises InputError."""
+    if axis.change != "sets" or axis.values is None:
+        return axis
+    values = axis.values
+    for path in axis.paths:
+        values = tuple(located_value(path, value, folder) for value in values)
+    return replace(axis, values=values)
 
 
 def _range(table: Mapping[str, Any]) -> list[float]:

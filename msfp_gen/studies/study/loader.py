@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from msfp_gen.buildings.opening import located_value, with_absolute_paths
+from msfp_gen.buildings.opening import with_absolute_paths
 from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.inputs import is_input, recording
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import known_keys, parsed
 from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.study.axes import Axis, axis_from, grid
+from msfp_gen.studies.study.axes import Axis, axis_from, grid, located
 from msfp_gen.studies.study.definition import Limits, Study, check_study
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.sampling import Sampling
-from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe
+from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
@@ -190,7 +189,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
 def _checked(table: Table, folder: Path | None, progress: Progress | None) -> Study:
     scene = _scene(table["scene"], folder)
     records = records_from(table.get("records"), folder, progress)
-    own = [_located(axis_from(name, each), folder) for name, each in _table(table, "axes").items()]
+    own = [_axis(name, each, folder) for name, each in _table(table, "axes").items()]
     axes = (*records.axes, *own)
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")
@@ -203,7 +202,7 @@ def _checked(table: Table, folder: Path | None, progress: Progress | None) -> St
     )
     tables = records.tables
     if tables and "motion" not in scene:
-        scene = {**scene, "motion": {"kind": RecordMotion.kind, **next(iter(tables.values()))}}
+        scene = {**scene, "motion": motion_of(next(iter(tables.values())))}
     factors = {
         path: load_factors(_beside(path, folder)) for axis in axes if axis.change == "factors" for path in axis.paths
     }
@@ -226,17 +225,12 @@ def _checked(table: Table, folder: Path | None, progress: Progress | None) -> St
     )
 
 
-def _located(axis: Axis, folder: Path | None) -> Axis:
-    """The axis with absolute paths of the files that its values name, relative to the folder of the study file."""
-    if axis.change != "sets" or axis.values is None:
-        return axis
-    values = axis.values
+def _axis(name: str, table: Any, folder: Path | None) -> Axis:
+    axis = axis_from(name, table)
     try:
-        for path in axis.paths:
-            values = tuple(located_value(path, value, folder) for value in values)
+        return located(axis, folder)
     except InputError as error:
-        raise InputError(f"axes.{axis.name}: {error}") from None
-    return replace(axis, values=values)
+        raise InputError(f"axes.{name}: {error}") from None
 
 
 def _complete(axis: Axis, table: Table) -> Table:

@@ -47,6 +47,11 @@ class Recipe:
         return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
+def motion_of(record: Table) -> Table:
+    """The `[motion]` table of a scene, of a record."""
+    return {"kind": RecordMotion.kind, **record}
+
+
 class SceneFactory:
     """Makes the scenes of a study: each is what the reader of scene files makes of the table of the run.
 
@@ -80,7 +85,7 @@ class SceneFactory:
         for axis, value in given:
             if axis.change == "record":
                 scale = next((each for axis, each in given if axis.change == "scale"), 1.0)
-                table = {**table, "motion": {"kind": RecordMotion.kind, **self._scaled(value, scale)}}
+                table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
         scene = scene_of(table, **self._given)
