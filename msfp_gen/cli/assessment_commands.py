@@ -44,13 +44,13 @@ def characterise(
     result, failure = result_of(loaded)
     if failure is not None:
         raise failure
-    found = result.characterise()
+    characterisation = result.characterise()
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(characterisation.as_dict(), indent=2, allow_nan=False))
     else:
-        show(building_tables(found) if of_building(result) else characterisation_tables(found))
+        show(building_tables(characterisation) if of_building(result) else characterisation_tables(characterisation))
     if output is not None:
-        note(f"wrote {write_csv(found, output)}")
+        note(f"wrote {write_csv(characterisation, output)}")
 
 
 @app.command(
@@ -81,16 +81,16 @@ def bound(
         make_folder(output, "--output")
     build(chosen)
     with Progress("3 cases") as progress:
-        found = run_bounds(chosen, table, progress=progress)
+        bounds = run_bounds(chosen, table, progress=progress)
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(bounds.as_dict(), indent=2, allow_nan=False))
     else:
-        show(bounding_tables(found))
-    written = _save(found, output) if output is not None else []
+        show(bounding_tables(bounds))
+    written = _save(bounds, output) if output is not None else []
     for path in written:
         note(f"wrote {path}")
-    if not found.succeeded:
-        failed = "; ".join(f"{case.name}: {case.failure}" for case in found.cases if case.failure)
+    if not bounds.succeeded:
+        failed = "; ".join(f"{case.name}: {case.failure}" for case in bounds.cases if case.failure)
         raise RunError(f"not all cases could be run; {failed}", status="bound")
 
 
@@ -108,10 +108,10 @@ def factors(
         say(factor_text(name).rstrip("\n"))
 
 
-def _save(found: Bounds, folder: Path) -> list[Path]:
+def _save(bounds: Bounds, folder: Path) -> list[Path]:
     """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
     from msfp_gen.studies.bounding.output import plot_bounds, write_quantities
 
-    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases]
-    plot_bounds(found, folder / "bounds.png")
-    return [*written, write_quantities(found, folder / "bounds.csv"), folder / "bounds.png"]
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases]
+    plot_bounds(bounds, folder / "bounds.png")
+    return [*written, write_quantities(bounds, folder / "bounds.csv"), folder / "bounds.png"]

@@ -114,11 +114,11 @@ def _report(
         scene = replace(scene, duration=duration)
     if folder is not None:
         make_folder(folder, "--output")
-    found = study(scene)
+    result = study(scene)
     if as_json:
-        say(json.dumps(as_dict(found), indent=2, allow_nan=False))
+        say(json.dumps(as_dict(result), indent=2, allow_nan=False))
     else:
-        show(tables(found))
-    written: Sequence[Path] = write(found, folder) if folder is not None else ()
+        show(tables(result))
+    written: Sequence[Path] = write(result, folder) if folder is not None else ()
     for path in written:
         note(f"wrote {path}")

@@ -102,11 +102,11 @@ def run(
         raise InputError("--output is missing: give the folder of the study, such as -o out")
     part = (1, 1) if shard is None else parsed_shard(shard)
     with Progress("records") as progress:
-        found = load_study(source, progress)
+        definition = load_study(source, progress)
     try:
-        with Progress(f"{found.runs} runs") as progress:
+        with Progress(f"{definition.runs} runs") as progress:
             done = run_study(
-                found, output, workers=workers, threads=threads, dask=dask, mpi=mpi, shard=part, progress=progress
+                definition, output, workers=workers, threads=threads, dask=dask, mpi=mpi, shard=part, progress=progress
             )
     except KeyboardInterrupt:
         note(f"what is done is kept in {output}; the same command continues")
@@ -129,11 +129,11 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     """How far a study has come, how fast it is, and how long it will still take."""
     from msfp_gen.studies.study.chunks import status_table, study_status
 
-    found = study_status(folder)
+    progress = study_status(folder)
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2))
+        say(json.dumps(progress.as_dict(), indent=2))
     else:
-        show([status_table(found)])
+        show([status_table(progress)])
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study ida out --demand peak_displacement --plot ida.png")
@@ -156,10 +156,10 @@ def ida(
     from msfp_gen.studies.assessment.rows import chosen_rows, read_study
 
     _check(plot, output)
-    found = analyse(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
-    plain = found.fractiles.replace(float("inf"), None).to_dict("records")
-    content = {"measure": measure, "demand": demand, "unit": found.unit, "fractiles": plain}
-    _finish(content, ida_table(found), found.fractiles, partial(plot_ida, found), (plot, output, as_json))
+    result = analyse(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
+    plain = result.fractiles.replace(float("inf"), None).to_dict("records")
+    content = {"measure": measure, "demand": demand, "unit": result.unit, "fractiles": plain}
+    _finish(content, ida_table(result), result.fractiles, partial(plot_ida, result), (plot, output, as_json))
 
 
 @group.command(
@@ -201,11 +201,11 @@ def fragility(
 
     _check(plot, output)
     rows = chosen_rows(read_study(folder), where or ())
-    found = analyse(
+    result = analyse(
         rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster, by=by
     )  # fmt: skip
-    table, frame = fragility_table(found), fragility_frame(found)
-    _finish(found.as_dict(), table, frame, partial(plot_fragility, found), (plot, output, as_json))
+    table, frame = fragility_table(result), fragility_frame(result)
+    _finish(result.as_dict(), table, frame, partial(plot_fragility, result), (plot, output, as_json))
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
@@ -223,9 +223,9 @@ def tornado(
     from msfp_gen.studies.assessment.sensitivity import tornado_table
 
     _check(plot, output)
-    found = analyse(folder, quantity, statistic)
-    rows = [vars(bar) for bar in found.bars]
-    _finish(asdict(found), tornado_table(found), rows, partial(plot_tornado, found), (plot, output, as_json))
+    result = analyse(folder, quantity, statistic)
+    rows = [vars(bar) for bar in result.bars]
+    _finish(asdict(result), tornado_table(result), rows, partial(plot_tornado, result), (plot, output, as_json))
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study sobol out --quantity peak_displacement --plot sobol.png")
@@ -244,10 +244,10 @@ def sobol(
     from msfp_gen.studies.assessment.sensitivity import sobol_table
 
     _check(plot, output)
-    found = analyse(folder, quantity, statistic, level)
+    result = analyse(folder, quantity, statistic, level)
     columns = ("axes", "first", "first_interval", "total", "total_interval")
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(found, c) for c in columns), strict=True)]
-    _finish(asdict(found), sobol_table(found), rows, partial(plot_sobol, found), (plot, output, as_json))
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(result, c) for c in columns), strict=True)]
+    _finish(asdict(result), sobol_table(result), rows, partial(plot_sobol, result), (plot, output, as_json))
 
 
 def _check(plot: Path | None, output: Path | None) -> None:
@@ -317,17 +317,17 @@ def pareto(
         check_output(plot, FIGURE_SUFFIXES, "--plot")
     goals = Goals(tuple(minimise or ()), tuple(maximise or ()), dict(map(_limit, at_most or ())), statistic)
     with Progress(f"{generations} generations") as progress:
-        found = search(
+        front = search(
             source, output, goals, population=population, generations=generations, seed=seed, progress=progress,
             workers=workers, threads=threads, dask=dask,
         )  # fmt: skip
     if as_json:
-        say(json.dumps(found.designs[found.designs.front].to_dict("records"), indent=2, allow_nan=False))
+        say(json.dumps(front.designs[front.designs.front].to_dict("records"), indent=2, allow_nan=False))
     else:
-        show([front_table(found)])
+        show([front_table(front)])
     note(f"wrote {output / DESIGNS}")
     if plot is not None:
-        plot_pareto(found, plot)
+        plot_pareto(front, plot)
         note(f"wrote {plot}")
 
 

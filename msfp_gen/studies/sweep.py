@@ -48,14 +48,14 @@ def varied_field(text: str) -> tuple[str, list[Any]]:
     if not keys:
         raise InputError(f"--vary = {text!r}: give a field of the scene and its values: motion.scale=0.5,1,2")
     try:
-        found = tomllib.loads(f"values = [{values}]")["values"]
+        listed = tomllib.loads(f"values = [{values}]")["values"]
     except (ValueError, RecursionError):
         raise InputError(
             f"--vary = {text!r}: the values are no TOML; texts need quotes, numbers do not: top.kind='rig','mass'"
         ) from None
-    if not found:
+    if not listed:
         raise InputError(f"--vary = {text!r}: there are no values; give some: motion.scale=0.5,1,2")
-    return path, found
+    return path, listed
 
 
 def variations(

@@ -226,10 +226,10 @@ class _Search:
 
     def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
         left = self.deadline - time.perf_counter()
-        found = run_native(method, scene, tolerance, max(left, 0.05), repeats=0)
-        if found.status == CUT_OFF:
+        trial = run_native(method, scene, tolerance, max(left, 0.05), repeats=0)
+        if trial.status == CUT_OFF:
             raise RunError(self._target_missed(), status="accuracy")
-        return found
+        return trial
 
     def loosest(self) -> int:
         """Index of the loosest tolerance that meets the target.
@@ -278,15 +278,15 @@ class _Search:
 
     def attempt(self, index: int) -> Attempt:
         """Cost and estimated error at a candidate tolerance, by its reference run or that of the looser neighbour."""
-        trial, found, estimate = self.trials[index], None, None
+        trial, differences, estimate = self.trials[index], None, None
         reference = next((self.references[k] for k in (index, index - 1) if k in self.references), None)
         if trial.finished and reference is not None and reference.finished:
-            found = errors(trial, reference)
-        if found is not None:
+            differences = errors(trial, reference)
+        if differences is not None:
             # The reference run of the looser neighbour has a third of the tolerance: more of its own error counts.
             factor = SAFETY if index in self.references else 2 * SAFETY
-            estimate = factor * largest_error(found)
-        return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, found, trial.status)
+            estimate = factor * largest_error(differences)
+        return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
     def next_step(self, index: int) -> Attempt | None:
         """The next tighter tolerance, run if it has not been; None if there is no time for it."""
@@ -396,10 +396,10 @@ def share(value: float | None) -> str:
 def _parts(attempt: Attempt) -> str:
     if attempt.errors is None:
         return "not estimated"
-    found = attempt.errors
+    differences = attempt.errors
     return (
-        f"force {share(found.force_rms)} RMS, {share(found.force_peak)} at its peak; sliding "
-        f"{share(found.sliding_rms)} RMS, {share(found.sliding_peak)} at its peak"
+        f"force {share(differences.force_rms)} RMS, {share(differences.force_peak)} at its peak; sliding "
+        f"{share(differences.sliding_rms)} RMS, {share(differences.sliding_peak)} at its peak"
     )
 
 

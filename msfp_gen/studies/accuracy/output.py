@@ -38,7 +38,7 @@ HEADS = (
 
 def machine() -> dict[str, str]:
     """Name -> text: processor, cores, system, compiler, versions, commit of a checkout; without unknown ones."""
-    found = {
+    about = {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
         "system": f"{platform.system()} {platform.machine()}",
@@ -48,7 +48,7 @@ def machine() -> dict[str, str]:
         "msfp_gen": __version__,
         "commit": _commit(),
     }
-    return {name: value for name, value in found.items() if value}
+    return {name: value for name, value in about.items() if value}
 
 
 def _compiler() -> str:
@@ -136,9 +136,9 @@ def _cells(point: Point) -> tuple[str, ...]:
     trial = point.trial
     expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
     known = {} if point.errors is None else point.errors.as_dict()
-    found = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
+    shown = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
     outcome = "WRONG SUCCESS" if point.wrong else trial.status
-    return point.series, trial.setting, outcome, expected, str(trial.newton), *found
+    return point.series, trial.setting, outcome, expected, str(trial.newton), *shown
 
 
 def reference_text(study: Study) -> str:

@@ -131,14 +131,14 @@ def plot_sobol(result: Sobol, path: str | Path | None = None, title: str = "") -
     return figure
 
 
-def plot_pareto(found: Front, path: str | Path | None = None, title: str = "") -> Figure:
+def plot_pareto(result: Front, path: str | Path | None = None, title: str = "") -> Figure:
     """The first two objectives: all designs, and those on the front joined by a line.
 
     Raises InputError for a path that cannot be written.
     """
-    first, second = found.goals.names[:2]
-    designs, front = found.designs, found.designs[found.designs.front].sort_values(first)
-    scales = [_scale(designs[name], found.units.get(name, "")) for name in (first, second)]
+    first, second = result.goals.names[:2]
+    designs, front = result.designs, result.designs[result.designs.front].sort_values(first)
+    scales = [_scale(designs[name], result.units.get(name, "")) for name in (first, second)]
     with page(WIDTH, HEIGHT, path) as figure:
         headline(figure, title or "Pareto front")
         axes = figure.subplots()
@@ -149,7 +149,7 @@ def plot_pareto(found: Front, path: str | Path | None = None, title: str = "") -
             x, y = (scale.factor * chosen[name] for scale, name in zip(scales, (first, second), strict=True))
             axes.plot(x, y, marker, color=colour, label=label)
         x, y = (scale.factor * front[name] for scale, name in zip(scales, (first, second), strict=True))
-        line = "-" if len(found.goals.names) == 2 else "none"
+        line = "-" if len(result.goals.names) == 2 else "none"
         axes.plot(x, y, "o", linestyle=line, color=COLOURS[0], label=f"front, {len(front)} designs")
         axes.set(xlabel=labelled(first, scales[0].unit), ylabel=labelled(second, scales[1].unit))
         axes.legend()

@@ -54,8 +54,8 @@ class Fit:
         """Standard errors of the logarithms of median and dispersion, to first order."""
         a, b = self.coefficients
         of_median, of_dispersion = np.array([-1 / b, a / b**2]), np.array([0.0, -1 / b])
-        found = [float(np.sqrt(slope @ self.covariance @ slope)) for slope in (of_median, of_dispersion)]
-        return found[0], found[1]
+        values = [float(np.sqrt(slope @ self.covariance @ slope)) for slope in (of_median, of_dispersion)]
+        return values[0], values[1]
 
     def probability(self, log_x: Array) -> Array:
         """Phi(a + b ln x)."""
@@ -86,9 +86,9 @@ def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None
     scaled = (log_x - middle) / width  # between -1 and 1, for the conditioning of the normal equations
     given = np.array([0.0, 1.0]) if start is None else _scaled(start.coefficients, middle, width)
     rows = np.stack([np.ones_like(scaled), scaled], axis=-1)
-    found, information = _newton(rows, runs, over, given, where)
+    solution, information = _newton(rows, runs, over, given, where)
     back = np.array([[1.0, -middle / width], [0.0, 1 / width]])
-    coefficients = back @ found
+    coefficients = back @ solution
     if not coefficients[1] > 0:
         raise InputError(f"{where}: exceedances do not grow with the intensity; there is no fragility curve")
     return Fit(coefficients, back @ np.linalg.inv(information) @ back.T)
@@ -355,16 +355,16 @@ def _bootstrap(levels: Array, place: Any, exceeded: Any, fit: Fit, groups: Any, 
     np.add.at(runs, (group, place), 1)
     np.add.at(over, (group, place), exceeded)
     rng, failed = np.random.default_rng(seed), 0
-    found: list[Array] = []
-    while len(found) < count:
+    fits: list[Array] = []
+    while len(fits) < count:
         times = np.bincount(rng.integers(len(clusters), size=len(clusters)), minlength=len(clusters))
         try:
-            found.append(fitted(levels, times @ runs, times @ over, "bootstrap", fit).coefficients)
+            fits.append(fitted(levels, times @ runs, times @ over, "bootstrap", fit).coefficients)
         except InputError:
             failed += 1
             if failed > 10 * count:
                 raise InputError("bootstrap: most draws of clusters determine no curve; give more records") from None
-    return np.array(found)
+    return np.array(fits)
 
 
 def fragility_frame(result: Fragility) -> Any:

@@ -111,9 +111,9 @@ def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
     """The demand of a curve at each level, linear between its runs; infinite beyond the last before one ended early."""
     beyond = x[~ended].min(initial=np.inf)
     known = ended & (x < beyond)
-    found = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
+    values = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
     last = x[known].max(initial=0.0)
-    return np.where((levels > last) & np.isfinite(beyond), np.inf, found)
+    return np.where((levels > last) & np.isfinite(beyond), np.inf, values)
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:

@@ -113,13 +113,13 @@ def pareto(
     with pool_from(**engine) as pool:
         search = _search(study, goals, population, generations, seed)
         number, shares = next(search)
-        found = [_evaluated(study, number, shares, goals, pool, folder)]
+        generation_designs = [_evaluated(study, number, shares, goals, pool, folder)]
         while number < generations:
             if progress is not None:
                 progress(number, generations)
-            number, shares = search.send(_objectives(found[-1], goals))
-            found.append(_evaluated(study, number, shares, goals, pool, folder))
-    return _front(found, goals, folder)
+            number, shares = search.send(_objectives(generation_designs[-1], goals))
+            generation_designs.append(_evaluated(study, number, shares, goals, pool, folder))
+    return _front(generation_designs, goals, folder)
 
 
 def _search_study(source: str | Path | Mapping[str, Any]) -> Study:
@@ -186,11 +186,11 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Poo
     feasible = complete(rows).reshape(shape).all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
     for name, bound in (goals.at_most or {}).items():
         feasible &= statistics[name] <= bound
-    found = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
-    found["ended"] = complete(rows).reshape(shape).mean(axis=0)
-    found["feasible"] = feasible
-    found.attrs["units"] = rows.attrs["units"]
-    return found
+    designs = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
+    designs["ended"] = complete(rows).reshape(shape).mean(axis=0)
+    designs["feasible"] = feasible
+    designs.attrs["units"] = rows.attrs["units"]
+    return designs
 
 
 def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
@@ -204,15 +204,15 @@ def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
     return np.where(unknown[:, None], LARGEST, values), np.column_stack(violated)
 
 
-def _front(found: Sequence[Any], goals: Goals, folder: Path) -> Front:
+def _front(parts: Sequence[Any], goals: Goals, folder: Path) -> Front:
     import pandas as pd
 
-    designs = pd.concat([each.drop(columns="ended") for each in found], ignore_index=True)
+    designs = pd.concat([each.drop(columns="ended") for each in parts], ignore_index=True)
     designs["front"] = designs.feasible.to_numpy() & not_dominated(
         np.where(designs.feasible.to_numpy()[:, None], designs[list(goals.names)].to_numpy() * goals.signs, np.inf)
     )
     write_frame(designs, folder / DESIGNS)
-    return Front(goals, dict(found[0].attrs["units"]), designs)
+    return Front(goals, dict(parts[0].attrs["units"]), designs)
 
 
 def not_dominated(values: Array) -> Any:

@@ -39,14 +39,14 @@ def read_study(folder: str | Path, columns: Sequence[str] | None = None) -> Any:
         raise InputError(f"{str(folder)!r}: the study has no rows yet; run it")
     checked = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
     with readable_parts(folder):
-        found = ds.dataset(parts, format=ds.ParquetFileFormat(default_fragment_scan_options=checked))
+        dataset = ds.dataset(parts, format=ds.ParquetFileFormat(default_fragment_scan_options=checked))
     for name in columns or ():
-        if name not in found.schema.names:
-            raise unknown_column(name, found.schema.names)
+        if name not in dataset.schema.names:
+            raise unknown_column(name, dataset.schema.names)
     wanted = None if columns is None else list(dict.fromkeys(["run", "status", *columns]))
     with readable_parts(folder):
-        rows = found.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
-    rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in found.schema}
+        rows = dataset.to_table(columns=wanted).to_pandas().sort_values("run", ignore_index=True)
+    rows.attrs["units"] = {field.name: (field.metadata or {}).get(b"units", b"").decode() for field in dataset.schema}
     return rows
 
 
@@ -61,14 +61,14 @@ def chosen_rows(rows: Any, conditions: Sequence[str]) -> Any:
         column = rows[name]
         if column.dtype.kind == "f":
             try:
-                found = np.isclose(column, float(value), rtol=1e-9, atol=0.0)
+                chosen = np.isclose(column, float(value), rtol=1e-9, atol=0.0)
             except ValueError:
                 raise InputError(f"{text!r}: {name} holds numbers; give one") from None
         else:
-            found = np.asarray(column.astype(str) == value)
-        if not found.any():
+            chosen = np.asarray(column.astype(str) == value)
+        if not chosen.any():
             raise InputError(f"{text!r}: no run has this value")
-        rows = rows[found]
+        rows = rows[chosen]
     return rows.reset_index(drop=True)
 
 
@@ -96,10 +96,10 @@ def numbers(rows: Any, name: str) -> Array:
 
 def intensities(rows: Any, name: str) -> Array:
     """A column of positive numbers: an intensity measure. Raises InputError."""
-    found = numbers(rows, name)
-    if not (found > 0).all():
+    values = numbers(rows, name)
+    if not (values > 0).all():
         raise InputError(f"{name}: an intensity measure is above 0 in every run; give another column")
-    return found
+    return values
 
 
 def demands(rows: Any, name: str) -> Array:
@@ -107,11 +107,11 @@ def demands(rows: Any, name: str) -> Array:
 
     Raises InputError where a run that reached its end has no value.
     """
-    found, ended = numbers(rows, name), complete(rows)
-    if np.isnan(found[ended]).any():
-        count = int(np.isnan(found[ended]).sum())
+    values, ended = numbers(rows, name), complete(rows)
+    if np.isnan(values[ended]).any():
+        count = int(np.isnan(values[ended]).sum())
         raise InputError(f"{name}: {count} runs reached their end without a value; give another quantity")
-    return np.where(np.isnan(found), 0.0, found)
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def complete(rows: Any) -> Any:
@@ -138,7 +138,7 @@ class Samples:
         statistic: over the runs of a sample.
         axes: names of the random axes.
         values: of the axes, ndarray, shape (samples, axes).
-        found: the statistic of each sample, ndarray, shape (samples,).
+        reduced: the statistic of each sample, ndarray, shape (samples,).
         sampling: the table `[sampling]` of the study.
     """
 
@@ -147,7 +147,7 @@ class Samples:
     statistic: str
     axes: tuple[str, ...]
     values: Array
-    found: Array
+    reduced: Array
     sampling: dict[str, Any]
 
 
@@ -172,7 +172,7 @@ def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Sam
     if np.isnan(y).any():
         raise InputError(f"{name}: {int(np.isnan(y).sum())} runs have no value; give another quantity")
     count = table["about"]["samples"]
-    found = STATISTICS[statistic](y.reshape(-1, count), axis=0)
+    reduced = STATISTICS[statistic](y.reshape(-1, count), axis=0)
     return Samples(
-        name, unit_of(rows, name), statistic, axes, rows[list(axes)].to_numpy(dtype=float)[:count], found, sampling
+        name, unit_of(rows, name), statistic, axes, rows[list(axes)].to_numpy(dtype=float)[:count], reduced, sampling
     )

@@ -73,18 +73,18 @@ def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado
     folder: of a study with `sampling.method = "one-at-a-time"`. statistic: over all runs of a sample, such as those of
     several records: "median", "mean", "max" or "min". Raises InputError.
     """
-    found = by_sample(folder, name, statistic, "one-at-a-time")
-    low, high = found.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
+    samples = by_sample(folder, name, statistic, "one-at-a-time")
+    low, high = samples.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
     bars = [
         Bar(
             axis,
-            *(float(v) for v in found.values[1 + 2 * k : 3 + 2 * k, k]),
-            *(float(v) for v in found.found[1 + 2 * k : 3 + 2 * k]),
+            *(float(v) for v in samples.values[1 + 2 * k : 3 + 2 * k, k]),
+            *(float(v) for v in samples.reduced[1 + 2 * k : 3 + 2 * k]),
         )
-        for k, axis in enumerate(found.axes)
+        for k, axis in enumerate(samples.axes)
     ]
     bars.sort(key=lambda bar: -bar.swing)
-    return Tornado(name, found.unit, statistic, (low, high), float(found.found[0]), tuple(bars))
+    return Tornado(name, samples.unit, statistic, (low, high), float(samples.reduced[0]), tuple(bars))
 
 
 def sobol(folder: str | Path, name: str, statistic: str = "median", level: float = 0.95, seed: int = 0) -> Sobol:
@@ -98,19 +98,20 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
 
     if not 0 < level < 1:
         raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
-    found = by_sample(folder, name, statistic, "sobol-indices")
-    if not np.ptp(found.found):
+    samples = by_sample(folder, name, statistic, "sobol-indices")
+    if not np.ptp(samples.reduced):
         raise InputError(f"{name}: it has the same value in all samples; give another quantity")
-    count = len(found.axes)
-    problem = {"num_vars": count, "names": list(found.axes), "bounds": [[0.0, 1.0]] * count}
+    count = len(samples.axes)
+    problem = {"num_vars": count, "names": list(samples.axes), "bounds": [[0.0, 1.0]] * count}
     indices = analysis.analyze(
-        problem, found.found, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
+        problem, samples.reduced, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
     )
     order = np.argsort(-np.asarray(indices["ST"]), kind="stable")
     columns = {key: tuple(float(indices[key][k]) for k in order) for key in ("S1", "ST", "S1_conf", "ST_conf")}
     return Sobol(
-        name, found.unit, statistic, tuple(found.axes[k] for k in order),
-        columns["S1"], columns["ST"], columns["S1_conf"], columns["ST_conf"], level, len(found.found) // (count + 2),
+        name, samples.unit, statistic, tuple(samples.axes[k] for k in order),
+        columns["S1"], columns["ST"], columns["S1_conf"], columns["ST_conf"], level,
+        len(samples.reduced) // (count + 2),
     )  # fmt: skip
 
 

@@ -147,8 +147,8 @@ def load_factors(source: str | Path) -> FactorTable:
 def _bundled() -> dict[str, str]:
     """Name -> text of the tables that come with the package."""
     folder = files(__package__) / "codes"
-    found = {path.name.removesuffix(".toml"): path for path in folder.iterdir() if path.name.endswith(".toml")}
-    return {name: found[name].read_text(encoding="utf-8") for name in sorted(found)}
+    paths = {path.name.removesuffix(".toml"): path for path in folder.iterdir() if path.name.endswith(".toml")}
+    return {name: paths[name].read_text(encoding="utf-8") for name in sorted(paths)}
 
 
 def _read(name: str, text: str) -> FactorTable:

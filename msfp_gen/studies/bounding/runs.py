@@ -59,37 +59,33 @@ def measures_of(scene: AnyScene) -> dict[str, Measure]:
 def building_measures() -> dict[str, Measure]:
     """Name -> quantity that is compared for a building on bearings."""
     return {
-        "peak_displacement": Measure("m", "most", lambda found: max(each.peak_displacement for each in found.bearings)),
-        "peak_base_shear": Measure("N", "most", lambda found: found.peak_force),
-        "peak_floor_acceleration": Measure("m/s^2", "most", lambda found: found.peak_floor_acceleration),
-        "peak_drift_ratio": Measure("1", "most", lambda found: found.peak_drift_ratio),
-        "minimum_load_ratio": Measure("1", "least", lambda found: min(e.minimum_load_ratio for e in found.bearings)),
-        "maximum_load_ratio": Measure("1", "most", lambda found: max(e.maximum_load_ratio for e in found.bearings)),
-        "capacity_left": Measure("m", "least", lambda found: min(each.capacity_left for each in found.bearings)),
-        "secant_stiffness": Measure("N/m", "", lambda found: found.secant_stiffness),
-        "secant_period": Measure("s", "", lambda found: found.secant_period),
-        "residual_displacement": Measure(
-            "m", "most", lambda found: found.residual_displacement if found.at_rest else None
-        ),
-        "energy_dissipated": Measure("J", "", lambda found: found.energy_dissipated),
+        "peak_displacement": Measure("m", "most", lambda run: max(each.peak_displacement for each in run.bearings)),
+        "peak_base_shear": Measure("N", "most", lambda run: run.peak_force),
+        "peak_floor_acceleration": Measure("m/s^2", "most", lambda run: run.peak_floor_acceleration),
+        "peak_drift_ratio": Measure("1", "most", lambda run: run.peak_drift_ratio),
+        "minimum_load_ratio": Measure("1", "least", lambda run: min(e.minimum_load_ratio for e in run.bearings)),
+        "maximum_load_ratio": Measure("1", "most", lambda run: max(e.maximum_load_ratio for e in run.bearings)),
+        "capacity_left": Measure("m", "least", lambda run: min(each.capacity_left for each in run.bearings)),
+        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
+        "secant_period": Measure("s", "", lambda run: run.secant_period),
+        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
+        "energy_dissipated": Measure("J", "", lambda run: run.energy_dissipated),
     }
 
 
 def measures(surfaces: int) -> dict[str, Measure]:
     """Name -> quantity that is compared, for a stack with this number of surfaces; loop properties are cycle means."""
     whole = {
-        "peak_displacement": Measure("m", "most", lambda found: found.peak_displacement),
-        "peak_force": Measure("N", "most", lambda found: found.peak_force),
-        "secant_stiffness": Measure("N/m", "", lambda found: found.secant_stiffness),
+        "peak_displacement": Measure("m", "most", lambda run: run.peak_displacement),
+        "peak_force": Measure("N", "most", lambda run: run.peak_force),
+        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
         "effective_stiffness": Measure("N/m", "", _mean("effective_stiffness")),
         "effective_period": Measure("s", "", _mean("effective_period")),
         "energy_dissipated": Measure("J", "", _mean("energy_dissipated")),
         "effective_damping": Measure("1", "", _mean("effective_damping")),
         "zero_displacement_force": Measure("N", "", _mean("zero_displacement_force")),
-        "residual_displacement": Measure(
-            "m", "most", lambda found: found.residual_displacement if found.at_rest else None
-        ),
-        "maximum_uplift": Measure("m", "most", lambda found: found.maximum_uplift),
+        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
+        "maximum_uplift": Measure("m", "most", lambda run: run.maximum_uplift),
     }
     kinds: dict[str, tuple[str, Literal["most", "least"]]] = {
         "capacity_left": ("m", "least"),
@@ -105,11 +101,11 @@ def measures(surfaces: int) -> dict[str, Measure]:
 
 
 def _mean(name: str) -> Callable[[Characterisation], float | None]:
-    return lambda found: found.envelope[name].mean if name in found.envelope else None
+    return lambda run: run.envelope[name].mean if name in run.envelope else None
 
 
 def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
-    return lambda found: getattr(found.surfaces[surface - 1], name)
+    return lambda run: getattr(run.surfaces[surface - 1], name)
 
 
 @dataclass(frozen=True)
@@ -120,14 +116,14 @@ class Case:
         name: "lower", "nominal" or "upper".
         scene: the scene with its properties multiplied.
         result: the run; of a run that failed its rows until then.
-        found: characterisation; None if the run failed.
+        characterisation: None if the run failed.
         failure: message of a failure, else empty.
     """
 
     name: str
     scene: AnyScene
     result: Result | BuildingResult
-    found: Characterisation | BuildingCharacterisation | None
+    characterisation: Characterisation | BuildingCharacterisation | None
     failure: str = ""
 
 
@@ -168,7 +164,10 @@ class Bounds:
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
         return {
-            name: {case.name: None if case.found is None else measure.read(case.found) for case in self.cases}
+            name: {
+                case.name: None if case.characterisation is None else measure.read(case.characterisation)
+                for case in self.cases
+            }
             for name, measure in self.measures.items()
         }
 
@@ -197,7 +196,10 @@ class Bounds:
             "quantities": self.quantities(),
             "governing": self.governing(),
             "cases": {
-                case.name: {"failure": case.failure, "characterisation": case.found and case.found.as_dict()}
+                case.name: {
+                    "failure": case.failure,
+                    "characterisation": case.characterisation and case.characterisation.as_dict(),
+                }
                 for case in self.cases
             },
         }
@@ -261,7 +263,8 @@ def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
     if not buildings:
         return scenes
     common = [
-        max(found, key=lambda effects: effects.uplift) for found in zip(*(b.modelled for b in buildings), strict=True)
+        max(effects_of_cases, key=lambda effects: effects.uplift)
+        for effects_of_cases in zip(*(b.modelled for b in buildings), strict=True)
     ]
     return {
         case: replace(
@@ -330,20 +333,21 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
         for surface in factor.surfaces or range(1, count + 1):
             if surface > count:
                 raise InputError(f"factor[{index}].surfaces has {surface}: this bearing has surfaces 1 to {count}")
-            found = pairs.setdefault(factor.property, {})
-            if surface in found:
+            of_surfaces = pairs.setdefault(factor.property, {})
+            if surface in of_surfaces:
                 raise InputError(
                     f"factor[{index}]: {factor.property} of surface {surface} has a factor already; "
                     "give one factor for each property of a surface"
                 )
-            found[surface] = table.combined(factor)
+            of_surfaces[surface] = table.combined(factor)
     ends = {"lower": 0, "upper": 1}
     return {
         named: {
             case: tuple(
-                found.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0 for surface in range(1, count + 1)
+                of_surfaces.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0
+                for surface in range(1, count + 1)
             )
             for case in CASES
         }
-        for named, found in pairs.items()
+        for named, of_surfaces in pairs.items()
     }

@@ -103,9 +103,8 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers in SI as plain values; None where a value is not determined."""
-        names = ("name", "unit", "value", "start", "deviation", "low", "high", "run_error", "bounds", "at_bound")
         return {
-            "estimates": [{n: _plain(getattr(e, n)) for n in names} for e in self.estimates],
+            "estimates": [{name: _plain(value) for name, value in vars(e).items()} for e in self.estimates],
             "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
             "condition": _plain(self.condition),
             "tests": [

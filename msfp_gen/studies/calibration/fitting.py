@@ -80,8 +80,8 @@ def fit(
 def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
     """The fit of the residuals of `start_fit`; arguments and RunError as of `fit`."""
     start, low, high = search_range(residuals)
-    found = solve(residuals, start, low, high, max_evaluations)
-    return _outcome(scene, residuals, found, (low, high))
+    solution = solve(residuals, start, low, high, max_evaluations)
+    return _outcome(scene, residuals, solution, (low, high))
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:

@@ -103,11 +103,11 @@ def _by_akaike(lags: Array, rows: int) -> Array:
         if criterion < least:
             least, chosen = criterion, weights
     order = len(chosen)
-    found = np.zeros(rows)
-    found[: order + 1] = lags[: order + 1]
+    correlation = np.zeros(rows)
+    correlation[: order + 1] = lags[: order + 1]
     for lag in range(order + 1, rows if order else 0):
-        found[lag] = chosen @ found[lag - order : lag][::-1]
-    return found
+        correlation[lag] = chosen @ correlation[lag - order : lag][::-1]
+    return correlation
 
 
 def _taken(basis: Array, spread: Array, inner: Array) -> Array:
@@ -205,8 +205,8 @@ def _correlation(covariance: Array) -> Array:
     deviation = np.sqrt(np.diag(covariance))
     deviation = np.where(np.isfinite(deviation) & (deviation > 0), deviation, np.nan)
     with np.errstate(invalid="ignore"):
-        found: Array = covariance / np.outer(deviation, deviation)
-    return found
+        correlation: Array = covariance / np.outer(deviation, deviation)
+    return correlation
 
 
 def weak(names: Sequence[str], values: Array, half: Array, correlation: Array) -> list[str]:

@@ -155,21 +155,21 @@ def _number(lines: Lines, index: int, column: str, text: str) -> float:
 def _place(lines: Lines, head: int, header: list[str], name: str, given: str) -> tuple[int, float]:
     """Index of a column and the factor of its unit to SI."""
     wanted, unit = _split(given)
-    found = [i for i, text in enumerate(header) if text.lower() == given.strip().lower()]
-    found = found or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
-    if len(found) != 1:
-        what = "no column" if not found else f"{len(found)} columns"
+    places = [i for i, text in enumerate(header) if text.lower() == given.strip().lower()]
+    places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
+    if len(places) != 1:
+        what = "no column" if not places else f"{len(places)} columns"
         names = ", ".join(repr(text[:24]) for text in header[:12])
         lines.fail(head, f"{what} {given!r} among {names}; name the one with columns {name}=NAME")
-    unit = unit or _split(header[found[0]])[1]
+    unit = unit or _split(header[places[0]])[1]
     if not unit:
         lines.fail(
-            head, f"column {header[found[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
+            head, f"column {header[places[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
         )
     try:
-        return found[0], to_si(f"1 {unit}", UNITS[name])
+        return places[0], to_si(f"1 {unit}", UNITS[name])
     except ValueError as error:
-        lines.fail(head, f"column {header[found[0]]!r}: {error}")
+        lines.fail(head, f"column {header[places[0]]!r}: {error}")
 
 
 def _split(text: str) -> tuple[str, str]:

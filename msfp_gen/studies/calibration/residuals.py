@@ -71,7 +71,7 @@ def unknowns_of(
     """
     if isinstance(paths, str) or not paths:
         raise InputError(f"parameters = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
-    rest, found = {_whole(path): limits for path, limits in (bounds or {}).items()}, []
+    rest, unknowns = {_whole(path): limits for path, limits in (bounds or {}).items()}, []
     for path in map(_whole, paths):
         parts = path.split("=")
         members = [parameters_of(scene, [part], "parameters") for part in parts]
@@ -79,11 +79,11 @@ def unknowns_of(
         limits = rest.pop(path, None)
         for group in groups:
             name = "=".join(parameter.path for parameter in group)
-            found.append(_unknown(name, group, rest.pop(name, limits)))
+            unknowns.append(_unknown(name, group, rest.pop(name, limits)))
     if rest:
         raise InputError(f"bounds: {next(iter(rest))!r} is no parameter of this fit; give one of its paths")
-    _check_members([member for unknown in found for member in unknown.members])
-    return tuple(found)
+    _check_members([member for unknown in unknowns for member in unknown.members])
+    return tuple(unknowns)
 
 
 def changed_scene(scene: Scene, unknowns: Sequence[Unknown], values: Array) -> Scene:
@@ -220,10 +220,10 @@ class Residuals:
     def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
         """The evaluation at x; with a Jacobian, shape (N, k), it has this one and its runs no derivatives."""
         self.count += 1
-        found = self._evaluate(x * self.scale, jacobian)
-        if found.failure is None:
-            self.deviation = float(np.sqrt(np.mean(found.residuals**2))) * self.largest
-        return found
+        evaluation = self._evaluate(x * self.scale, jacobian)
+        if evaluation.failure is None:
+            self.deviation = float(np.sqrt(np.mean(evaluation.residuals**2))) * self.largest
+        return evaluation
 
     def split(self, rows: Array) -> list[Array]:
         """Rows of all tests as those of each."""

@@ -57,21 +57,21 @@ def solve(residuals: Residuals, start: Array, low: Array, high: Array, most: int
     of the runs before.
     """
     x, end = least_squares(residuals, start, low, high, most)
-    found, factor = _solution(residuals, x, end, low, high), FIRST
+    solution, factor = _solution(residuals, x, end, low, high), FIRST
     while True:
         residuals.tighten(factor)
-        first = residuals.evaluate(found.x, found.end.jacobian)
+        first = residuals.evaluate(solution.x, solution.end.jacobian)
         if first.failure is not None:
-            return replace(found, failure=first.failure)
-        free, factor = ~found.at_bound, NEXT
-        remainder = REST * np.abs(first.step(free) - found.end.step(free))
-        x, end = _steps(residuals, found.x, first, free, low, high)
-        found = _solution(residuals, x, end, low, high)
+            return replace(solution, failure=first.failure)
+        free, factor = ~solution.at_bound, NEXT
+        remainder = REST * np.abs(first.step(free) - solution.end.step(free))
+        x, end = _steps(residuals, solution.x, first, free, low, high)
+        solution = _solution(residuals, x, end, low, high)
         # A step that is left is an error too, which smaller tolerances do not mend: derivatives contain ringing.
-        found = replace(found, run_error=remainder + np.abs(end.step(~found.at_bound)))
-        small = (remainder <= SMALL * found.spread.half) | found.at_bound
-        if small.all() or found.rtol / NEXT < LEAST * (1 - 1e-9):
-            return found
+        solution = replace(solution, run_error=remainder + np.abs(end.step(~solution.at_bound)))
+        small = (remainder <= SMALL * solution.spread.half) | solution.at_bound
+        if small.all() or solution.rtol / NEXT < LEAST * (1 - 1e-9):
+            return solution
 
 
 def _steps(
@@ -101,8 +101,8 @@ def _at_bound(x: Array, end: Evaluation, low: Array, high: Array) -> NDArray[np.
     """Which unknowns are at a bound, or have their minimum beyond it."""
     near = np.isfinite(low) & (np.minimum(x - low, high - x) < AT_BOUND * (high - low))
     beyond = x + end.step(~near)
-    found: NDArray[np.bool_] = near | (beyond < low) | (beyond > high)
-    return found
+    at_bound: NDArray[np.bool_] = near | (beyond < low) | (beyond > high)
+    return at_bound
 
 
 class _WithinError(Exception):
@@ -120,42 +120,42 @@ def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, m
     """
     from scipy.optimize import least_squares as search
 
-    best, found, begun = start, residuals.at(start), False
+    best, at_best, begun = start, residuals.at(start), False
     failure: RunError | InputError | None = None  # of the last trial
-    if found.failure is not None:
-        raise found.failure
+    if at_best.failure is not None:
+        raise at_best.failure
 
     def values(x: Array) -> Array:
-        nonlocal best, found, failure
+        nonlocal best, at_best, failure
         # After a failed run the next step is short because the search was thrown back, not because it ends.
-        if begun and failure is None and not np.array_equal(x, best) and found.step_in_errors(x - best) < WITHIN:
+        if begun and failure is None and not np.array_equal(x, best) and at_best.step_in_errors(x - best) < WITHIN:
             raise _WithinError
         at = residuals.at(x)
         failure = at.failure
-        if failure is None and at.square < found.square:
-            best, found = x.copy(), at
+        if failure is None and at.square < at_best.square:
+            best, at_best = x.copy(), at
         return at.residuals
 
     def jacobian(x: Array) -> Array:
         nonlocal begun
         begun = True  # before, x differs from the start where that is nearly at a bound
-        return (found if np.array_equal(x, best) else residuals.at(x)).jacobian
+        return (at_best if np.array_equal(x, best) else residuals.at(x)).jacobian
 
     limits = {"ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": None, "max_nfev": most}
     try:
         ended = search(values, start, jacobian, bounds=(low, high), **limits)
     except _WithinError:
-        return best, found
+        return best, at_best
     if ended.status == 0:
         raise RunError(
             f"fit: not converged after {most} evaluations; give tighter bounds, fewer parameters, or more evaluations",
             status="fit",
         )
     free = (best > low) & (best < high)
-    if failure is not None and found.step_in_errors(found.step(free)) > 1.0:
+    if failure is not None and at_best.step_in_errors(at_best.step(free)) > 1.0:
         raise RunError(
             f"fit: the search ended beside values whose runs fail ({failure}); give bounds without them, or "
             "other values to start from",
             status="fit",
         )
-    return best, found
+    return best, at_best

@@ -79,7 +79,7 @@ class Chunks:
     @cached_property
     def _digests(self) -> list[Any]:
         """Of each grid axis the digests of its values and labels, as an array of 16 bytes each."""
-        study, found = self.study, []
+        study, digests_of_axes = self.study, []
         for index, axis in enumerate(study.axes):
             if axis.values is None:
                 continue
@@ -88,8 +88,8 @@ class Chunks:
                 for k, (value, label) in enumerate(zip(axis.values, axis.labels, strict=True))
             ]
             digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in each]
-            found.append(np.array(digests, dtype="V16"))
-        return found
+            digests_of_axes.append(np.array(digests, dtype="V16"))
+        return digests_of_axes
 
     @cached_property
     def identity(self) -> str:
@@ -166,7 +166,7 @@ def _text(value: Any) -> str:
 
 def parts_in(folder: Path) -> dict[str, int]:
     """Name -> number of the chunk, of every part in a folder."""
-    return {path.name: int(found[1]) for path in folder.glob(PARTS) if (found := _NAME.fullmatch(path.name))}
+    return {path.name: int(match[1]) for path in folder.glob(PARTS) if (match := _NAME.fullmatch(path.name))}
 
 
 @contextmanager

@@ -250,13 +250,13 @@ def _table(table: Mapping[str, Any], key: str) -> Table:
 def _scene(value: Any, folder: Path | None) -> Table:
     """The table of the base scene, with absolute paths."""
     if isinstance(value, str):
-        found, path = scene_table(_beside(value, folder))
+        table, path = scene_table(_beside(value, folder))
         folder = path.parent if path is not None else None
     elif isinstance(value, Mapping):
-        found = dict(value)
+        table = dict(value)
     else:
         raise InputError(f"scene = {value!r}: give {KEYS['scene']}")
-    return with_absolute_paths(found, folder)
+    return with_absolute_paths(table, folder)
 
 
 def _beside(source: str, folder: Path | None) -> str:

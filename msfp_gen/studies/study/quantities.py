@@ -115,13 +115,13 @@ class Keep:
         """
         reader = _Reader(result, self)
         formulas = dict(self.formulas)
-        found = {
+        kept = {
             column.name: self._evaluated(column.name, formulas[column.name], reader, at)
             if column.name in formulas
             else reader.value(column.name)
             for column in self.columns()
         }
-        return found, reader.problem
+        return kept, reader.problem
 
     def _evaluated(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
         tree, extremes = _tree(self, name, text)
@@ -140,18 +140,18 @@ class Keep:
 
 @lru_cache(maxsize=16)
 def _columns(keep: Keep) -> tuple[Column, ...]:
-    known, found = keep.known, []
+    known, columns = keep.known, []
     for name in keep.names:
         each = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
         if not each:
             words = sorted({re.sub(r"_\d+$", "", key) for key in known})
             hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
             raise InputError(f"keep: {name!r} is no quantity{hint}")
-        found += [Column(key, known[key].unit, key in TEXTS) for key in each]
+        columns += [Column(key, known[key].unit, key in TEXTS) for key in each]
     for name, text in keep.formulas:
         _tree(keep, name, text)
-        found.append(Column(name, ""))
-    return tuple(dict.fromkeys(found))
+        columns.append(Column(name, ""))
+    return tuple(dict.fromkeys(columns))
 
 
 @lru_cache(maxsize=64)
@@ -164,8 +164,8 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
         if column not in columns:
             hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
             raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
-        extremes[found := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
-        return found
+        extremes[replaced := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
+        return replaced
 
     plain = _EXTREME.sub(symbol, text)
     numbers = [key for key in keep.known if key not in TEXTS]
@@ -204,14 +204,14 @@ def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Column of a history, named as in an exported file -> field of `History`, and index after time."""
     numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
     labels: dict[str, Any] = {**LABELS, **numbers}
-    found = {}
+    columns = {}
     for field, rows in quantities().items():
         several = len(rows.names) > 1
         for index in np.ndindex(*(len(labels[dim]) for dim in rows.dims)):
             name = rows.names[index[-1] if several else 0] if rows.names else field
             shown = list(zip(rows.dims, index, strict=True))[: -1 if several else None]
-            found["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
-    return found
+            columns["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
+    return columns
 
 
 def _finite(value: Any) -> float | None:
@@ -268,8 +268,8 @@ class _Reader:
         values = self.result.history.arrays().get(field)
         if values is None or any(place >= length for place, length in zip(index, values.shape[1:], strict=True)):
             return None
-        found: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
-        return found
+        column_values: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
+        return column_values
 
     def _capacity_used(self, surface: int) -> float | None:
         surfaces = self.result.scene.bearing.surfaces

@@ -232,8 +232,8 @@ def test_bounds_of_a_single_pendulum_in_closed_form() -> None:
 
 def test_the_nominal_case_is_the_scene_itself() -> None:
     nominal = single().cases[1]
-    assert nominal.name == "nominal" and nominal.result is not None and nominal.found is not None
-    assert nominal.found.as_dict() == nominal.result.characterise().as_dict()
+    assert nominal.name == "nominal" and nominal.result is not None and nominal.characterisation is not None
+    assert nominal.characterisation.as_dict() == nominal.result.characterise().as_dict()
     assert nominal.scene.bearing.surfaces[0].friction == 0.05
 
 
