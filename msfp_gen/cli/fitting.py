@@ -113,11 +113,11 @@ def _measurements(
             raise InputError(f"--column = {text!r}: give the column and its header: force=Load cell [kN]")
         names[name.strip()] = header.strip()
     read = [read_measurement(path, names) for path in paths]
-    given = {
+    options = {
         "axial_load": _numbers("--axial-load", loads, len(read)),
         "weight": _numbers("--weights", weights, len(read)),
     }
-    for name, values in given.items():
+    for name, values in options.items():
         if values is not None:
             read = [replace(test, **{name: value}) for test, value in zip(read, values, strict=True)]  # type: ignore[arg-type]
     return read

@@ -93,11 +93,11 @@ def plot_tornado(result: Tornado, path: str | Path | None = None, title: str = "
         axes = figure.subplots()
         for place, bar in enumerate(reversed(result.bars)):
             ends = ((bar.at_low, COLOURS[0], bar.low), (bar.at_high, COLOURS[1], bar.high))
-            for value, colour, given in ends:
+            for value, colour, at in ends:
                 end = scale.factor * value
                 axes.barh(place, end - base, left=base, height=0.6, color=colour)
                 side = "left" if end >= base else "right"
-                axes.annotate(f"{given:.3g}", (end, place), (3 if end >= base else -3, 0), textcoords="offset points",
+                axes.annotate(f"{at:.3g}", (end, place), (3 if end >= base else -3, 0), textcoords="offset points",
                               va="center", ha=side, fontsize=8)  # fmt: skip
         axes.axvline(base, color=INK, linewidth=THIN)
         axes.set_yticks(range(len(result.bars)), [labelled(bar.axis, "") for bar in reversed(result.bars)])

@@ -84,9 +84,9 @@ def fitted(log_x: Array, runs: Array, over: Array, where: str, start: Fit | None
     _check(log_x, runs, over, where)
     middle, width = float(np.average(log_x, weights=runs)), float(np.ptp(log_x))
     scaled = (log_x - middle) / width  # between -1 and 1, for the conditioning of the normal equations
-    given = np.array([0.0, 1.0]) if start is None else _scaled(start.coefficients, middle, width)
+    guess = np.array([0.0, 1.0]) if start is None else _scaled(start.coefficients, middle, width)
     rows = np.stack([np.ones_like(scaled), scaled], axis=-1)
-    solution, information = _newton(rows, runs, over, given, where)
+    solution, information = _newton(rows, runs, over, guess, where)
     back = np.array([[1.0, -middle / width], [0.0, 1 / width]])
     coefficients = back @ solution
     if not coefficients[1] > 0:

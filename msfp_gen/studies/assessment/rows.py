@@ -162,7 +162,7 @@ def by_sample(folder: str | Path, name: str, statistic: str, method: str) -> Sam
     sampling = dict(table.get("sampling", {}))
     if sampling.get("method", "latin-hypercube") != method:
         raise InputError(f"{str(folder)!r}: this needs a study with sampling.method = {method!r}")
-    axes = tuple(axis for axis, given in table["axes"].items() if "distribution" in given)
+    axes = tuple(axis for axis, keys in table["axes"].items() if "distribution" in keys)
     rows = read_study(folder, [*axes, name])
     if len(rows) < table["about"]["runs"]:
         raise InputError(f"{str(folder)!r}: {len(rows)} of {table['about']['runs']} runs are done; complete the study")

@@ -152,15 +152,15 @@ def _number(lines: Lines, index: int, column: str, text: str) -> float:
         lines.fail(index, f"column {column!r}: {text.strip()[:24]!r} is not a finite number; repair or cut the data")
 
 
-def _place(lines: Lines, head: int, header: list[str], name: str, given: str) -> tuple[int, float]:
+def _place(lines: Lines, head: int, header: list[str], name: str, column: str) -> tuple[int, float]:
     """Index of a column and the factor of its unit to SI."""
-    wanted, unit = _split(given)
-    places = [i for i, text in enumerate(header) if text.lower() == given.strip().lower()]
+    wanted, unit = _split(column)
+    places = [i for i, text in enumerate(header) if text.lower() == column.strip().lower()]
     places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
     if len(places) != 1:
         what = "no column" if not places else f"{len(places)} columns"
         names = ", ".join(repr(text[:24]) for text in header[:12])
-        lines.fail(head, f"{what} {given!r} among {names}; name the one with columns {name}=NAME")
+        lines.fail(head, f"{what} {column!r} among {names}; name the one with columns {name}=NAME")
     unit = unit or _split(header[places[0]])[1]
     if not unit:
         lines.fail(

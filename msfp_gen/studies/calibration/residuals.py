@@ -313,7 +313,7 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
     zeros = np.zeros(len(test.time))
     path = np.column_stack([test.displacement - test.displacement[0], zeros, zeros])
     motion = Motion.from_arrays(test.time - test.time[0], path, name=test.name)
-    made = replace(
+    test_scene = replace(
         scene,
         name=test.name,
         motion=motion,
@@ -323,8 +323,8 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
         output_step=motion.duration / (len(test.time) - 1),
         top=scene.top if test.axial_load is None else replace(scene.top, axial_load=test.axial_load),  # type: ignore[call-arg]
     )
-    _check_size(made, test)
-    made = replace(made, effects=made.modelled)  # so that no evaluation selects others
-    for surface in undamped_surfaces(made, made.modelled)[:1]:
+    _check_size(test_scene, test)
+    test_scene = replace(test_scene, effects=test_scene.modelled)  # so that no evaluation selects others
+    for surface in undamped_surfaces(test_scene, test_scene.modelled)[:1]:
         raise InputError(UNDAMPED.format(surface=surface))
-    return made
+    return test_scene

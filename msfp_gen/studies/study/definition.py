@@ -165,8 +165,8 @@ class Study:
         number, row = divmod(run - 1, self.chunk)
         values, _ = self.task(number).rows(self.axes)[row]
         with expecting(self.files):
-            made = SceneFactory(self.recipe).scene(values)
-        return replace(made, name=f"{self.name or 'study'}, run {run}")
+            scene = SceneFactory(self.recipe).scene(values)
+        return replace(scene, name=f"{self.name or 'study'}, run {run}")
 
 
 def check_study(study: Study) -> Study:

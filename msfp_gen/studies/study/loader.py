@@ -51,11 +51,11 @@ _CHUNK = Quantity("", least=1, whole=True)
 
 def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -> dict[str, Any]:
     """The table at `key`, whose keys are fields of `kind`; empty if it is not there. Raises InputError."""
-    given = table.get(key, {})
-    if not isinstance(given, Mapping):
-        raise InputError(f"{where}{key} = {given!r}: give a table")
-    known_keys(given, [name for name, _, _ in ruled_fields(kind)], f"{where}{key}.")
-    return dict(given)
+    inner = table.get(key, {})
+    if not isinstance(inner, Mapping):
+        raise InputError(f"{where}{key} = {inner!r}: give a table")
+    known_keys(inner, [name for name, _, _ in ruled_fields(kind)], f"{where}{key}.")
+    return dict(inner)
 
 
 @dataclass(frozen=True)

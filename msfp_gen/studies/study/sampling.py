@@ -48,11 +48,11 @@ class Distribution:
     between: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        given = dict(zip(DISTRIBUTIONS[self.kind], self.parameters, strict=True))
+        parameters = dict(zip(DISTRIBUTIONS[self.kind], self.parameters, strict=True))
         for name in ("deviation", "dispersion", "median"):
-            if name in given and given[name] <= 0:
-                raise InputError(f"{name} = {given[name]:g}: give a number above 0")
-        values = [given[name] for name in ("low", "mode", "high") if name in given]
+            if name in parameters and parameters[name] <= 0:
+                raise InputError(f"{name} = {parameters[name]:g}: give a number above 0")
+        values = [parameters[name] for name in ("low", "mode", "high") if name in parameters]
         if values and (sorted(values) != values or values[0] == values[-1]):
             raise InputError(f"{', '.join(map(str, values))}: give {' < '.join(DISTRIBUTIONS[self.kind])}")
         if self.between is not None and not self.share(self.between[0]) < self.share(self.between[1]):

@@ -81,15 +81,15 @@ class SceneFactory:
         axes, table = self.recipe.axes, self._table
         for _, index, path in self._setting:
             table = changed_table(table, {path: values[index]}, axes[index].surfaces)
-        given = list(zip(axes, values, strict=True))
-        for axis, value in given:
+        chosen = list(zip(axes, values, strict=True))
+        for axis, value in chosen:
             if axis.change == "record":
-                scale = next((each for axis, each in given if axis.change == "scale"), 1.0)
+                scale = next((each for axis, each in chosen if axis.change == "scale"), 1.0)
                 table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
         scene = scene_of(table, **self._given)
-        for axis, value in given:
+        for axis, value in chosen:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
         return scene
