@@ -80,7 +80,7 @@ def write_columns(path: str | Path, columns: Mapping[tuple[str, str], Sequence[A
     Parquet units are metadata of the columns. name: of the option in messages. Raises InputError for an invalid path.
     """
     target = check_output(path, TABLE_SUFFIXES, name)
-    content = _csv(columns) if target.suffix.lower() == ".csv" else _parquet(columns)
+    content = _csv(columns) if target.suffix.lower() == ".csv" else parquet_bytes(columns)
     write_bytes(target, [content])
     return target
 
@@ -99,17 +99,30 @@ def _csv(columns: Mapping[tuple[str, str], Sequence[Any]]) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(table: Mapping[tuple[str, str], Sequence[Any]]) -> memoryview:
+def parquet_bytes(
+    columns: Mapping[tuple[str, str], Sequence[Any]],
+    types: Mapping[str, str] | None = None,
+    about: Mapping[str, str] | None = None,
+) -> bytes:
+    """The content of a Parquet file, with checksums of its pages.
+
+    columns: as of `write_columns`. types: name -> type in the words of Arrow; None: from the values. about: metadata of
+    the file.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    arrays = [pa.array(_one_type(values)) for values in table.values()]
+    arrays = [
+        pa.array(_one_type(values)) if types is None else pa.array(values, types[name])
+        for (name, _), values in columns.items()
+    ]
     fields = [
-        pa.field(name, array.type, metadata={"units": unit}) for (name, unit), array in zip(table, arrays, strict=True)
+        pa.field(name, array.type, metadata={"units": unit})
+        for (name, unit), array in zip(columns, arrays, strict=True)
     ]
     content = BytesIO()
-    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), content)
-    return content.getbuffer()
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=about)), content, write_page_checksum=True)
+    return content.getvalue()
 
 
 def _one_type(values: Sequence[Any]) -> list[Any]:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import lru_cache, partial
-from io import BytesIO
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.common.inputs import Files, expecting
+from msfp_gen.common.tables import parquet_bytes
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.batch import ENDED, check_method, run_to_end
 from msfp_gen.studies.pool import raise_if_stopped
 from msfp_gen.studies.study.definition import Task
-from msfp_gen.studies.study.quantities import Keep
+from msfp_gen.studies.study.quantities import Column, Keep
 from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 if TYPE_CHECKING:
@@ -102,29 +102,11 @@ def _result(scene: AnyScene, seconds: float | None) -> Any:
 
 
 def _part(order: Order, rows: list[dict[str, Any]], failed: int) -> bytes:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    schema = _schema(order.recipe, order.keep)
-    about = {"digest": order.digest, "failed": str(failed)}
-    columns = [pa.array([row.get(field.name) for row in rows], field.type) for field in schema]
-    content = BytesIO()
-    pq.write_table(pa.table(columns, schema=schema.with_metadata(about)), content, write_page_checksum=True)
-    return content.getvalue()
-
-
-@lru_cache(maxsize=4)
-def _schema_of(names: tuple[tuple[str, str, bool], ...]) -> Any:
-    import pyarrow as pa
-
-    kinds = {True: pa.string(), False: pa.float64()}
-    fields = [pa.field(name, kinds[text], metadata={"units": unit}) for name, unit, text in names]
-    return pa.schema([pa.field("run", pa.int64()), *fields])
-
-
-def _schema(recipe: Recipe, keep: Keep) -> Any:
-    """Columns of every part: run, axes, status, message, quantities."""
-    axes = [(axis.name, "", not axis.numeric) for axis in recipe.axes]
-    texts = [("status", "", True), ("message", "", True)]
-    intensity = [(INTENSITY, "m/s^2", False)] if recipe.intensities else []
-    return _schema_of((*axes, *texts, *intensity, *(tuple(column) for column in keep.columns())))
+    """The columns of every part: run, axes, status, message, intensity, quantities."""
+    axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
+    intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
+    texts = [Column("status", "", text=True), Column("message", "", text=True)]
+    columns = [*axes, *texts, *intensity, *order.keep.columns()]
+    types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
+    values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
+    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed)})
