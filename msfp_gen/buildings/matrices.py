@@ -22,7 +22,9 @@ Matrix = ArrayLike | str | PathLike[str]
 
 
 def matrix_of(source: Matrix, name: str) -> Array:
-    """A square symmetric matrix: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
+    """A square symmetric matrix, ndarray, shape (n, n).
+
+    source: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
 
     Raises InputError that names `building.name`.
     """

@@ -44,8 +44,8 @@ from msfp_gen.motions.prescribed import Rotation
 from msfp_gen.result import Result
 from msfp_gen.scene.effect_selection import EffectSelection
 from msfp_gen.scene.scene import InitialState
-from msfp_gen.simulation import batch
-from msfp_gen.studies.sweep.variations import variations, varied_field
+from msfp_gen.studies import batch, pool
+from msfp_gen.studies.sweep import variations, varied_field
 
 STILL = Motion(np.array([0.0, 4.0]), np.zeros((1, 6, ORDER)))
 
@@ -222,7 +222,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("processes", [False, True])
+@pytest.mark.parametrize("processes", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_ctrl_c_ends_a_batch(processes: bool, tmp_path: Any) -> None:
     script = tmp_path / "script.py"
     script.write_text(PROGRAM.format(tests=ROOT / "tests", processes=processes), encoding="utf-8")
@@ -260,20 +260,20 @@ def test_ctrl_c_ends_a_batch(processes: bool, tmp_path: Any) -> None:
     ],
 )
 def test_bad_input_is_refused_before_anything_runs(call: Any, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("msfp_gen.simulation.batch.build_model", None)
+    monkeypatch.setattr("msfp_gen.studies.batch.build_model", None)
     with pytest.raises(InputError) as caught:
         call(load_scene("fenz-test1"))
     assert words in str(caught.value)
 
 
 def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    surface = Surface(radius=0.1, friction=0.5, yield_displacement=1e-4, capacity=0.14)
-    body = Body(mass=1.0, height=0.09, centroid=0.08, inertia=(1e-4, 1e-4))
+    surface = Surface(radius=0.1, friction=0.5, yield_displacement=1e-4, capacity=0.14, rim_stiffness=1e8)
+    body = Body(mass=1.0, height=0.09, centroid=0.08, inertia=(1e-4, 1e-4), rim_radius=0.01)
     bearing = Bearing(
         layout=Layout(2, 1, 0), base_height=0.02, base_rim_radius=0.01, gravity=9.8, surfaces=[surface], bodies=[body]
     )
     start = InitialState([[0.0, -0.3, 0.0]], [[0.0] * 3], [[1.0, 0.0]])
-    effects = Effects(dimension="planar", rims=False)
+    effects = Effects(dimension="planar")
     stuck = Scene(bearing, STILL, Top.prescribed((0.0, 0.0, 0.0)), effects, initial_state=start)
     with pytest.raises(RunError) as caught:
         simulate(stuck)
@@ -290,10 +290,10 @@ def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.M
 
 def test_the_number_of_workers_is_that_of_the_cores_or_as_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    assert usable_cores() == batch.worker_count(None) == 3 and batch.worker_count(2) == 2
+    assert usable_cores() == pool.worker_count(None) == 3 and pool.worker_count(2) == 2
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
-    assert batch.worker_count(None) == 7
+    assert pool.worker_count(None) == 7
 
 
 def test_fields_take_several_values() -> None:
