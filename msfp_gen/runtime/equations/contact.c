@@ -203,6 +203,20 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, const msfp_work *w, 
     return finite < INFINITY && finite > -INFINITY ? MSFP_OK : MSFP_E_FINITE;
 }
 
+double msfp_friction_after_turn(const double *par, double Y, double turn)
+{
+    static const double rates[INPUTS];
+    const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = Y, [MSFP_SLIP_TURN] = turn };
+    double slid[MSFP_SLID_SIZE];
+    msfp_slid_friction(par, slip, rates, slid);
+    return slid[MSFP_SLID_Y];
+}
+
+void msfp_work_of_slip(const double *par, const double *slip, const double *end, double *work)
+{
+    msfp_slip_work(par, slip, end, work);
+}
+
 /* As `condense`, with Y a function of the slip of the step. */
 MSFP_INLINE void condense_closed_form(const double *par, lanes *all, const double *slope, double *condensed)
 {

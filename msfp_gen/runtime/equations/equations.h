@@ -112,6 +112,12 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
 int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);
+#if MSFP_CLOSED_FORM
+/* Y after the body above has turned by `turn` [rad]. par: of the surface. */
+double msfp_friction_after_turn(const double *par, double Y, double turn);
+/* Work that friction stores and dissipates over a slip: blocks `slip`, `slip_end` and `slip_work`. */
+void msfp_work_of_slip(const double *par, const double *slip, const double *end, double *work);
+#endif
 #if MSFP_LAW
 /* Temperatures of the surfaces for the friction law, and a finite first guess of mu. */
 void msfp_friction_conditions(const msfp_point *at, msfp_work *w);

@@ -99,8 +99,8 @@ static void friction_work(const msfp_run *run, const msfp_group *group, const ms
             dend[MSFP_SLIP_END_N * C + c] = 0.5 * (group->history.normal[k][c] + to->normal[k][c]);
         }
         msfp_slip_work_direction(run->parameters.surface[k], slip, end, group->parameters.surface[k], dslip, dend, done);
-        msfp_add_columns(&work[MSFP_WORK_FRICTION_STORED], (msfp_columns *)done + MSFP_SLIP_WORK_STORED, 1.0, 1);
-        msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0, 1);
+        msfp_add_columns(&work[MSFP_WORK_FRICTION_STORED], (const msfp_columns *)done + MSFP_SLIP_WORK_STORED, 1.0, 1);
+        msfp_add_columns(&work[MSFP_WORK_FRICTION_DISSIPATED], (const msfp_columns *)done + MSFP_SLIP_WORK_LOST, 1.0, 1);
     }
 }
 

@@ -15,8 +15,6 @@ int msfp_is_quasistatic(const msfp_run *run)
 }
 
 #if MSFP_CLOSED_FORM
-#include "msfp_kernels.h"
-
 enum { NB = MSFP_NB, ANGLE = 1 }; /* theta, the unknown of a planar body */
 static const double largest_change = 0.4; /* of Y in a step, as extrapolated */
 
@@ -115,15 +113,11 @@ static double reversal_error(const msfp_run *run, double h)
 /* Change of Y of surface k when the body turns by `turn` [rad], which is at most the slip over d_y. */
 static double friction_change(const msfp_run *run, int k, double turn)
 {
-    static const double rates[MSFP_LOCAL_SIZE];
     const double *par = run->parameters.surface[k];
     const double bound = fabs(turn) * par[MSFP_SURFACE_PARAMETERS_R] / par[MSFP_SURFACE_PARAMETERS_DY];
     if (bound <= largest_change)
         return bound;
-    const double slip[MSFP_SLIP_SIZE] = { [MSFP_SLIP_Y] = run->now.f[k][0], [MSFP_SLIP_TURN] = turn };
-    double slid[MSFP_SLID_SIZE];
-    msfp_slid_friction(par, slip, rates, slid);
-    return fabs(slid[MSFP_SLID_Y] - slip[MSFP_SLIP_Y]);
+    return fabs(msfp_friction_after_turn(par, run->now.f[k][0], turn) - run->now.f[k][0]);
 }
 
 double msfp_limit_step(const msfp_run *run, double h)
@@ -170,7 +164,7 @@ static void friction_work(const msfp_run *run, double work[MSFP_WORKS])
             run->next.f[k][0], 0.5 * (run->step_history.normal[k] + run->next_step_history.normal[k])
         };
         double done[MSFP_SLIP_WORK_SIZE];
-        msfp_slip_work(run->parameters.surface[k], slip, end, done);
+        msfp_work_of_slip(run->parameters.surface[k], slip, end, done);
         work[MSFP_WORK_FRICTION_STORED] += done[MSFP_SLIP_WORK_STORED];
         work[MSFP_WORK_FRICTION_DISSIPATED] += done[MSFP_SLIP_WORK_LOST];
     }
