@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.results.history import Counters, Event, History
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.analysis.characterise import Characterisation
+    from msfp_gen.results.stored_group import Attribute, StoredGroup
 
 __all__ = ["Counters", "Event", "History", "Result"]
 
@@ -82,53 +82,25 @@ class Result(RunData):
 
         return characterise(self)
 
-    def to_netcdf(self, path: str | Path) -> Path:
-        """Write the dataset as netCDF-4 file, completely or not at all; a failed run is written with its status.
+    def groups(self) -> dict[str, xr.Dataset]:
+        """The polynomials of the motion, where its table cannot make it again, and the derivatives of the run."""
+        from msfp_gen.results import stored_gradient
+        from msfp_gen.results.gradient_dataset import gradient_group
+        from msfp_gen.scene.file.stored_motion import GROUP, needs_pieces, to_pieces
 
-        Derivatives with respect to parameters are in its group `gradient`.
-
-        Raises InputError where the suffix is not .nc or the folder does not exist.
-        """
-        from msfp_gen.results.netcdf import write_netcdf
-
-        return write_netcdf(self, path)
-
-    def to_csv(self, path: str | Path) -> Path:
-        """Write a CSV file: `name [unit]` as header, one line per row; then scene, events and provenance as comments.
-
-        Raises InputError where the suffix is not .csv or the folder does not exist.
-        """
-        from msfp_gen.results.export import write_csv
-
-        return write_csv(self, path)
-
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write a Parquet file with units in its metadata.
-
-        Raises InputError as `to_csv` does.
-        """
-        from msfp_gen.results.export import write_parquet
-
-        return write_parquet(self, path)
-
-    def to_mat(self, path: str | Path) -> Path:
-        """Write a MATLAB file of all variables, with structs `units`, `meaning` and `attributes`.
-
-        Raises InputError as `to_csv` does.
-        """
-        from msfp_gen.results.export import write_mat
-
-        return write_mat(self, path)
-
-    def save(self, path: str | Path) -> Path:
-        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
-        from msfp_gen.results.export import save
-
-        return save(self, path)
+        motion = {GROUP: to_pieces(self.scene.motion)} if needs_pieces(self.scene) else {}
+        return motion | ({} if self.gradients is None else {stored_gradient.GROUP: gradient_group(self)})
 
     @classmethod
-    def from_netcdf(cls, path: str | Path) -> Result:
-        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
-        from msfp_gen.results.reading import read_result
+    def fields_in(cls, root: StoredGroup, about: dict[str, Attribute], arrays: dict[str, Any]) -> dict[str, Any]:
+        """The fields from a file, as `ResultFiles.fields_in`."""
+        from msfp_gen.results.reading import fields_in
 
-        return read_result(path, cls)
+        return fields_in(root, about, arrays)
+
+    @classmethod
+    def edition(cls) -> str:
+        """A digest of the names that a file of this version has."""
+        from msfp_gen.results.reading import edition
+
+        return edition()

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
 
-BearingNotes = tuple[tuple[int, Note], ...]
-"""Notes of monitors, each with the bearing that it is about, from 0."""
-
 
 @dataclass(frozen=True, eq=False)
 class Change:

@@ -8,25 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.analysis.characterise.loops import (
-    REVERSAL,
-    Loop,
-    closed_cycles,
-    effective_properties,
-    turning_points,
-)
+from msfp_gen.analysis.characterise.loops import Loop, Path
 from msfp_gen.analysis.characterise.report import Characterisation
 from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
-from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
-from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.data import BearingResult, BuildingData
 from msfp_gen.buildings.summary import floor_rows, storey_rows
-from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
 from msfp_gen.results.run_data import RunData
 
-STRAIGHT = 1e-3  # transverse displacement over the largest, up to which a motion is in one direction
-REST_SHARE, REST_MOVEMENT = 0.02, 0.01  # last part of a run, and movement in it over the peak, of a building at rest
 NO_CYCLES = "no cycle closes in one direction: no effective stiffness and damping; the secant ones are at the peak"
 
 
@@ -94,61 +84,46 @@ class BuildingCharacterisation:
         return asdict(self)
 
 
-def characterise(result: RunData | BuildingData) -> Characterisation | BuildingCharacterisation:
+def characterise(result: RunData | BuildingData | BearingResult) -> Characterisation | BuildingCharacterisation:
     """Characterise a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
 
     Raises InputError where nothing moved.
     """
-    if not isinstance(result, RunData | BuildingData):
-        raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
-    return characterise_building(result) if isinstance(result, BuildingData) else characterise_bearing(result)
+    if isinstance(result, BearingResult):
+        return result.characterise()
+    if isinstance(result, BuildingData):
+        return characterise_building(result)
+    if isinstance(result, RunData):
+        return characterise_bearing(result)
+    raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
 
 
 def characterise_building(result: BuildingData) -> BuildingCharacterisation:
     """Characterise the run of a building. Raises InputError if its bearings did not move."""
-    u = np.mean([each.displacement for each in bearings_of(result)], axis=0)[:, :2]
-    size = np.hypot(*u.T)
-    if not (peak := float(size.max())):
-        raise InputError("characterise: the bearings did not move in this run; give a motion, or a longer duration")
-    row = int(size.argmax())
-    direction, force = u[row] / peak, result.base_reaction[:, :2]
-    stiffness = float(force[row] @ direction) / peak
-    cycles = cycles_of(u, force, direction)
-    rest = bool(np.hypot(*np.ptp(u[result.time >= (1 - REST_SHARE) * result.time[-1]], axis=0)) <= REST_MOVEMENT * peak)
+    mean = np.mean([one.displacement for one in result.bearings], axis=0)
+    path = Path.of(result.time, mean, result.base_reaction, "the bearings")
+    cycles, stiffness = tuple(loop for *_, loop in path.cycles()), path.secant_stiffness
     gravity, weight = result.scene.gravity, result.scene.weight
     notes = [] if cycles else [NO_CYCLES]
-    if not rest:
+    if not path.at_rest:
         notes.append("the building still moves when the run ends, so that its last displacement is no residual one")
     return BuildingCharacterisation(
         name=result.scene.name,
         status=result.status,
-        direction=(float(direction[0]), float(direction[1])),
+        direction=(float(path.direction[0]), float(path.direction[1])),
         weight=weight,
         peak_displacement=float(result.peaks.mean_displacement[3]),
         peak_force=float(result.peaks.base_reaction[3]),
         secant_stiffness=stiffness,
         secant_period=2 * pi * sqrt(weight / (gravity * stiffness)) if stiffness > 0 and gravity else None,
         cycles=cycles,
-        residual_displacement=float(size[-1]),
-        at_rest=rest,
+        residual_displacement=path.residual,
+        at_rest=path.at_rest,
         energy_dissipated=float(result.dissipated[-1].sum()),
-        peak_floor_acceleration=max(each["peak_acceleration"]["radial"] for each in floor_rows(result)),
-        peak_drift_ratio=max((each["peak_drift_ratio"] for each in storey_rows(result)), default=None),
-        bearings=tuple(map(_demand, bearings_of(result))),
+        peak_floor_acceleration=max(floor["peak_acceleration"]["radial"] for floor in floor_rows(result)),
+        peak_drift_ratio=max((storey["peak_drift_ratio"] for storey in storey_rows(result)), default=None),
+        bearings=tuple(map(_demand, result.bearings)),
         notes=tuple(notes),
-    )
-
-
-def cycles_of(u: Array, force: Array, direction: Array) -> tuple[Loop, ...]:
-    """Closed cycles of a motion in one direction, none of any other."""
-    along, across = u @ direction, u @ np.array([-direction[1], direction[0]])
-    if np.abs(across).max() > STRAIGHT * np.abs(along).max():
-        return ()
-    shear = force @ direction
-    found = closed_cycles(along, turning_points(along, REVERSAL * float(np.ptp(along))))
-    return tuple(
-        effective_properties(along[start : end + 1], shear[start : end + 1], middle - start)
-        for start, middle, end in found
     )
 
 
@@ -158,7 +133,7 @@ def _demand(one: BearingResult) -> BearingDemand:
         s["number"],
         s["name"],
         s["peak_displacement"]["radial"],
-        min(s["capacity_left"]),
+        min(s["minimum_gap"]),
         s["minimum_load_ratio"],
         s["maximum_load_ratio"],
         float(np.hypot(*one.displacement[-1, :2])),

@@ -1,11 +1,12 @@
-"""The compiled run of a building: what it is given, and where its rows hold what."""
+"""The compiled run of a building: its input, changes of the models of its bearings, and what its rows hold."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import reduce
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,6 +21,8 @@ from msfp_gen.jit.driver import load_driver
 from msfp_gen.model.compiled import Port
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.results.note import Note, joined_notes, monitor_notes
+from msfp_gen.scene.effect_switching import next_effects
 
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 ENERGIES = ("damped", "received", "input")
@@ -111,6 +114,43 @@ class BuildingRun:
         self.members[change.bearing] = member
         self.changes.append(change)
         self.run.replace(change.bearing, member.port, member.entries)
+
+    def switch(self) -> bool:
+        """Continue with other models of bearings, where the run has ended and their effects permit it.
+
+        False: it has not (docs/effects.md).
+        """
+        status, failed, surface, value = self.run.status
+        if status == "ok" or not self.run.row_count:
+            return False
+        own = range(len(self.members)) if status == "guard" else [failed - 1] if failed else []
+        changed = False
+        for index in own:
+            member = self.members[index]
+            ending = member.ending(status, surface, value)
+            after = next_effects(member.asked, ending)
+            if after is None or after == member.effects:
+                continue
+            values = {f.name: (getattr(member.effects, f.name), getattr(after, f.name)) for f in fields(after)}
+            effects = {name: now for name, (before, now) in values.items() if now != before}
+            rows, work = self.run.row_count, member.work
+            work = work + earlier_work(self.changes, index, (rows + 1, len(work)))[-1]
+            new = Member.of(self.scene, index, after)
+            new.continue_from(member, self.run.ends(index))
+            notes = tuple(monitor_notes(ending, after))
+            self.replace(new, Change(index, effects, rows, work.tolist(), new.model.info.key, notes))
+            changed = True
+        return changed
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """The notes of the monitors of all bearings until now, each with the number of its bearing."""
+        notes: list[Note] = []
+        for index, member in enumerate(self.members):
+            parts = [change.notes for change in self.changes if change.bearing == index]
+            own = reduce(joined_notes, [*parts, monitor_notes(member.ending("ok"), None)], list[Note]())
+            notes += [replace(note, bearing=index + 1) for note in own]
+        return tuple(notes)
 
     def _repeat(self, change: Change) -> None:
         """Make a change of an earlier process again, before its state is restored. Raises ValueError."""

@@ -1,16 +1,15 @@
-"""Selection of the effects of each bearing of a building, with the quantity that decides it (docs/effects.md)."""
+"""Effects of each bearing of a building: their selection (docs/effects.md), and vibrations on its interfaces."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from msfp_gen.buildings.vibration import VerticalModes
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
-from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
+from msfp_gen.scene.effect_selection import GIVEN, LEAST_DAMPING, USUAL_DAMPING, EffectSelection, Reason, ringing
 from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.specification.layout import Auto, Effects
 
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 LEAST_SHARE = 0.1  # of the load at rest that an estimate must leave for uplift to be left out
 STEP = 5e-3  # of the linear response [s]
 SMALL = 1e-12  # of a mode that vertical motion does not excite
+SHARE = 0.2  # of the strain energy of a mode, in the interfaces, above which these can damp it
 
 
 class _Supported(Protocol):
@@ -57,6 +57,57 @@ class _OnBearings(Protocol):
     def axial_loads(self) -> Array: ...
     @property
     def vertical_modes(self) -> VerticalModes: ...
+
+
+class VerticalModes(NamedTuple):
+    """Modes of a building whose bearings resist vertical motion alone, with n modes and coordinates.
+
+    squares: of circular frequencies, shape (n,) [1/s^2]. shapes: columns, of unit modal mass. rates: twice the damping
+    ratio times the circular frequency, shape (n,) [1/s]. shares: of the strain energy that the springs of the
+    interfaces have, shape (n,).
+    """
+
+    squares: Array
+    shapes: Array
+    rates: Array
+    shares: Array
+
+
+def vertical_modes(scene: _OnBearings) -> VerticalModes:
+    """The modes of a building on the vertical springs and dampers of its interfaces."""
+    from scipy.linalg import eigh
+
+    building, rows = scene.building, scene.attachments[:, 2]
+    springs, dampers = (
+        rows.T * [getattr(each.interface, name) for each in scene.bearings] @ rows
+        for name in ("vertical_stiffness", "vertical_damping")
+    )
+    squares, shapes = eigh(building.stiffness + springs, building.mass)
+    rates, stored = (
+        np.einsum("im,ij,jm->m", shapes, matrix, shapes) for matrix in (building.damping + dampers, springs)
+    )
+    squares = np.maximum(squares, 0.0)
+    return VerticalModes(squares, shapes, rates, stored / np.maximum(squares, 1e-9 * squares.max()))
+
+
+def undamped(scene: _OnBearings, modes: VerticalModes) -> Iterator[tuple[int, float, str]]:
+    """A doubt where a mode that the interfaces could damp has less than `LEAST_DAMPING` of critical damping.
+
+    Yields 0 (no surface), the least damping ratio and the text with the damping that cures it.
+    """
+    on_springs = modes.shares > SHARE
+    if not on_springs.any():
+        return
+    turns = np.sqrt(modes.squares[on_springs])
+    ratios = modes.rates[on_springs] / (2 * turns)
+    least, interface = int(ratios.argmin()), scene.bearings[0].interface
+    if ratios[least] < LEAST_DAMPING:
+        missing = 2 * (USUAL_DAMPING - ratios) / (turns * modes.shares[on_springs])  # damping over stiffness [s]
+        given = interface.vertical_damping
+        cure = given + float(missing.max()) * interface.vertical_stiffness
+        what = "the building vibrates on the vertical springs of its interfaces"
+        name = "building.interface.vertical_damping"
+        yield 0, float(ratios[least]), ringing(name, given, what, turns[least], ratios[least], cure)
 
 
 def select_effects(scene: _OnBearings) -> tuple[EffectSelection, ...]:

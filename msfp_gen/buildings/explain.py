@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.buildings.effects import remaining_loads
+from msfp_gen.buildings.effects import remaining_loads, undamped
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
-from msfp_gen.buildings.vibration import undamped
 from msfp_gen.common.fields import ruled_fields
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.scene import explain as one
@@ -17,7 +16,7 @@ from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
 
 LISTED = 12  # frequencies of the frame that are listed
 

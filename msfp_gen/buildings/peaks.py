@@ -152,9 +152,13 @@ def along_time(values: Array) -> Array:
     return found
 
 
-def padded(columns: Sequence[Array]) -> Array:
-    """Values of the surfaces of all bearings, shape (bearings, most surfaces); zero where a bearing has none."""
-    found = np.zeros((len(columns), max(len(each) for each in columns)))
-    for row, each in zip(found, columns, strict=True):
-        row[: len(each)] = each
-    return found
+def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:
+    """Values of the surfaces of all bearings, each of shape (..., surfaces): shape (..., bearings, most surfaces).
+
+    fill: where a bearing has no such surface.
+    """
+    most = max(values.shape[-1] for values in columns)
+    table = np.full((*columns[0].shape[:-1], len(columns), most), fill)
+    for index, values in enumerate(columns):
+        table[..., index, : values.shape[-1]] = values
+    return table

@@ -10,8 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.effects import select_effects
-from msfp_gen.buildings.vibration import VerticalModes, vertical_modes
+from msfp_gen.buildings.effects import VerticalModes, select_effects, vertical_modes
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.errors import InputError

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msfp_gen.analysis.brief import MAX_NOTES, html_of, text_of
-from msfp_gen.buildings.bearing_result import bearings_of
-from msfp_gen.buildings.notes import energy_error, notes_of
+from msfp_gen.buildings.data import BuildingData, energy_error
 from msfp_gen.buildings.peaks import named
 from msfp_gen.common.tables import Table, yes
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.data import BuildingData
 
 
 def summarise(result: BuildingData) -> dict[str, Any]:
@@ -36,7 +32,7 @@ def summarise(result: BuildingData) -> dict[str, Any]:
         counters: trials and tangents. wall_time [s]. real_time_factor: simulated time over wall time; None if unknown.
     """
     scene, duration = result.scene, float(result.time[-1] - result.time[0])
-    bearings = [each.summary for each in bearings_of(result)]
+    bearings = [each.summary for each in result.bearings]
     floors, storeys = floor_rows(result), storey_rows(result)
     peaks = result.peaks
     shear = named(peaks.base_reaction)
@@ -44,7 +40,7 @@ def summarise(result: BuildingData) -> dict[str, Any]:
         "name": scene.name,
         "status": result.status,
         "message": result.message,
-        "notes": [note.line for note in notes_of(result)],
+        "notes": [note.line for note in result.notes],
         "duration": duration,
         "peak_displacement": _largest([each["peak_displacement"] for each in bearings]),
         "weight": scene.weight,
@@ -120,13 +116,13 @@ def brief_rows(result: BuildingData, s: Mapping[str, Any]) -> list[tuple[str, st
     rows = [
         ("status", result.status + (f": {result.message}" if result.message else "")),
         ("time", f"{result.time[-1]:.6g} s in {result.counts['steps']} steps, {result.wall_time:.3g} s"),
-        ("bearings", f"{len(bearings_of(result))}, peak displacement {1e3 * moved['radial']:.4g} mm"),
+        ("bearings", f"{len(result.bearings)}, peak displacement {1e3 * moved['radial']:.4g} mm"),
         ("base shear", f"{1e-6 * shear['radial']:.4g} MN ({s['base_shear_ratio']:.3f} of the weight)"),
         ("floors", f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}"),
         ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
         ("rims met", ", ".join(result.scene.label(number - 1) for number in s["rims_met"]) or "none"),
     ]
-    lines = [note.line for note in notes_of(result)]
+    lines = [note.line for note in result.notes]
     more = f"; {len(lines) - MAX_NOTES} more in .notes" if len(lines) > MAX_NOTES else ""
     return [*rows, *([("notes", "; ".join(lines[:MAX_NOTES]) + more)] if lines else [])]
 
@@ -138,7 +134,7 @@ def brief_text(result: BuildingData) -> str:
 
 def brief_html(result: BuildingData) -> str:
     """The main results as a table, beside the orbit of the bearing that moves most."""
-    most = max(bearings_of(result), key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
+    most = max(result.bearings, key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
     x, y = most.displacement[:, :2].T
     return html_of(result.scene.name, brief_rows(result, summarise(result)), x, y, f"orbit of {most.label}")
 
@@ -202,7 +198,7 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
             f"{1e-3 * each['peak_top_force']['radial']:.1f}",
             f"{1e-3 * each['axial_load']:.1f}",
             f"{each['minimum_load_ratio']:.2f} ... {each['maximum_load_ratio']:.2f}",
-            f"{1e3 * min(each['capacity_left']):.1f}",
+            f"{1e3 * min(each['minimum_gap']):.1f}",
             yes(each["rims_met"]),
         )
         for each in bearings

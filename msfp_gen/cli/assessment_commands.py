@@ -71,7 +71,7 @@ def bound(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors

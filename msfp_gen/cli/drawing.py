@@ -18,7 +18,7 @@ from msfp_gen.results.sign import DEFAULT, sign_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.cli.inputs import AnyResult
     from msfp_gen.scene.scene import Scene
 

@@ -20,7 +20,7 @@ from msfp_gen.scene.solver import Solver
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.cli.inputs import AnyResult
     from msfp_gen.common.tables import Table
 
@@ -74,14 +74,14 @@ def run(
     others["--stream"] = stream or None
     target = ErrorTarget.of(error, explain, budget, others)
     if output is not None:
-        from msfp_gen.results.export import check_result_path
+        from msfp_gen.results.files import check_result_path
 
         check_result_path(output, "--output")
     if stream and (output is None or output.suffix.lower() not in DATASET_SUFFIXES):
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
@@ -95,7 +95,7 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
     from msfp_gen.common.output import make_folder
 
     scenes = [load_scene(name) for name in DEMO]

@@ -134,7 +134,7 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
     """What the page of a building shows."""
     from markupsafe import Markup
 
-    from msfp_gen.buildings.text import scene_text
+    from msfp_gen.buildings.dataset import scene_text
     from msfp_gen.figures import BUILDING_FIGURES
     from msfp_gen.report import building
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msfp_gen.common.arrays import Array
+from msfp_gen.results.files import attributes_of
 from msfp_gen.results.history import ENERGY, LABELS, History, quantities
-from msfp_gen.results.reading import COUNTER, EDITION, PROVENANCE, edition
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
@@ -26,15 +27,15 @@ def to_dataset(result: RunData) -> xr.Dataset:
 
     history = result.history
     variables = dict([*row_variables(history), *energy_variables(history), *_events(result)])
-    return xr.Dataset(variables, coordinates_of(history), attrs=_attributes(result))
+    return xr.Dataset(variables, coordinates_of(history.time, history.surfaces), attrs=_attributes(result))
 
 
-def coordinates_of(history: History) -> dict[str, Any]:
-    """The coordinates of the dataset: time, bodies, surfaces, and the labels of dimensions of fixed length."""
+def coordinates_of(time: Array, surfaces: int) -> dict[str, Any]:
+    """The coordinates of the dataset: time [s], bodies, surfaces, and the labels of dimensions of fixed length."""
     return {
-        "time": ("time", history.time, {"units": "s", "long_name": "time t"}),
-        "body": ("body", np.arange(2, history.surfaces + 2), {"long_name": "moving body k, base is 1"}),
-        "surface": ("surface", np.arange(1, history.surfaces + 1), {"long_name": "sliding surface, bottom first"}),
+        "time": ("time", time, {"units": "s", "long_name": "time t"}),
+        "body": ("body", np.arange(2, surfaces + 2), {"long_name": "moving body k, base is 1"}),
+        "surface": ("surface", np.arange(1, surfaces + 1), {"long_name": "sliding surface, bottom first"}),
         **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
     }
 
@@ -85,20 +86,8 @@ def _events(result: RunData) -> Variables:
 def _attributes(result: RunData) -> dict[str, str | int | float]:
     from msfp_gen.scene.file.stored_motion import PIECES, RECIPE, needs_pieces, scene_attribute
 
-    return {
-        "title": result.scene.name or "unnamed",
-        "source": "msfp-gen",
-        EDITION: edition(),
-        "status": result.status,
-        "message": result.message,
-        "notes": json.dumps([asdict(note) for note in result.notes]),
+    scene, counters = scene_attribute(result.scene), asdict(result.counters)
+    return attributes_of(result, scene, result.notes, counters) | {
         "extremes": json.dumps(result.extremes.table),
-        "scene": scene_attribute(result.scene),
         "motion": PIECES if needs_pieces(result.scene) else RECIPE,
-        **_prefixed(COUNTER, asdict(result.counters)),
-        **_prefixed(PROVENANCE, result.provenance),
     }
-
-
-def _prefixed(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    return {prefix + name: value for name, value in values.items()}

@@ -20,18 +20,18 @@ class Extremes:
     """Extremes of a run.
 
     displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
-    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; slip_speed, the largest, while the surface
-    is closed [m/s]; least_normal, most_normal [N]; least_friction, most_friction, where a friction law acts;
-    temperature, the highest, where it heats [degC].
+    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
+    the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
+    where a friction law acts; temperature, the highest, where it heats [degC].
     """
 
     displacement: Array
     top_force: Array
     sliding: Array
     gap: Array
-    slip_speed: Array
     least_normal: Array
     most_normal: Array
+    slip_speed: Array | None = None
     least_friction: Array | None = None
     most_friction: Array | None = None
     temperature: Array | None = None

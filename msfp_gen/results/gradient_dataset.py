@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,7 +52,7 @@ def to_gradient_dataset(result: RunData) -> xr.Dataset:
                 values,
                 meaning | {"long_name": f"error of the {meaning['long_name']}"},
             )
-    return xr.Dataset(variables, coordinates_of(result.history) | coordinates)
+    return xr.Dataset(variables, coordinates_of(result.history.time, result.history.surfaces) | coordinates)
 
 
 def _variables(gradients: Gradients) -> Variables:
@@ -82,3 +84,13 @@ def _events(gradients: Gradients) -> Variables:
     }
     for name, (dims, values, unit, meaning) in columns.items():
         yield name, ((PARAMETER, "event", *dims), values, _derivative(unit, meaning))
+
+
+def gradient_group(result: RunData) -> xr.Dataset:
+    """The derivatives of a run, with its parameters and the derivatives of the extremes as attributes."""
+    gradients, dataset = gradients_of(result), to_gradient_dataset(result)
+    dataset.attrs["parameters"] = json.dumps([asdict(parameter) for parameter in gradients.parameters])
+    dataset.attrs["extremes"] = json.dumps([extremes.table for extremes in gradients.extremes])
+    if gradients.error is not None:
+        dataset.attrs["extremes_error"] = json.dumps([extremes.table for extremes in gradients.error.extremes])
+    return dataset

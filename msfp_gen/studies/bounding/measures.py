@@ -9,7 +9,7 @@ from msfp_gen.scene.scene import Scene
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import Characterisation
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
 
 
 class Measure(NamedTuple):

@@ -12,14 +12,14 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.either import simulate
+from msfp_gen.simulation.run_any import simulate
 from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
 from msfp_gen.studies.bounding.measures import Measure, measures_of
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from msfp_gen.buildings.opening import located_value, with_absolute_paths
+from msfp_gen.buildings.load import located_value, with_absolute_paths
 from msfp_gen.common.fields import Quantity
 from msfp_gen.common.inputs import is_input, recording
 from msfp_gen.errors import InputError

@@ -19,7 +19,7 @@ from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
 
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
 BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run

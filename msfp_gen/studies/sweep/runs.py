@@ -13,10 +13,10 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.simulation.batch import check_method, specs_of
-from msfp_gen.simulation.either import simulate
+from msfp_gen.simulation.run_any import simulate
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
 
 
 def completed_runs(

@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.opening import AnyScene, changed_scene
+from msfp_gen.buildings.load import AnyScene, changed_scene
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.scene import Scene
