@@ -12,6 +12,7 @@ from msfp_gen.common.output import write_bytes
 from msfp_gen.embedding.rendering import render
 from msfp_gen.errors import InputError
 from msfp_gen.generator.interface import effects_text, surface_values
+from msfp_gen.jit.build import ENTRY
 from msfp_gen.specification import contract, rows
 from msfp_gen.version import __version__
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 README = "README.md"
 STAMP = "written by msfp-gen"  # in the first line: a file without it belongs to the user
-WRAPPER = "msfp_module.c"
 
 
 def check_guide(folder: Path) -> None:
@@ -48,7 +48,7 @@ def _content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]:
         "spec": spec,
         "effects": effects_text(spec),
         "module": module,
-        "sources": sorted(path.name for path in folder.glob("*.c") if path.name != WRAPPER),
+        "sources": sorted(path.name for path in folder.glob("*.c") if path.name != ENTRY),
         "private": sorted({path.name for path in folder.glob("*.h")} - {"msfp.h", f"{module}.h"}),
         "body": contract.BODY,
         "surface": surface_values(spec),

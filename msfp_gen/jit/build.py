@@ -3,8 +3,7 @@
 | stage | module | input -> output |
 |---|---|---|
 | derive, lower, emit | `msfp_gen.generator` | ModelSpec -> sources |
-| translate | `msfp_gen.jit.translation` | wrapper -> its C, kept for all models |
-| compile | `msfp_gen.jit.compiler` | sources and the runtime's C -> extension |
+| compile | `msfp_gen.jit.compiler` | sources, runtime's C -> extension; object of the wrapper, kept for all |
 | store | `msfp_gen.jit.cache` | folder -> entry with a manifest |
 | load | `msfp_gen.jit.build` | extension -> imported module |
 """
@@ -12,22 +11,24 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
+from typing import Any
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import cache
 from msfp_gen.jit.compiler import LOG_NAME, compile_extension
 from msfp_gen.jit.prebuilt import find_prebuilt, prebuilt_key
-from msfp_gen.jit.translation import find_translation, keep_translation
 from msfp_gen.specification.layout import ModelSpec
 
 Progress = Callable[[str, float], None]
+ENTRY = "msfp_entry.c"
 GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
 
 
@@ -143,6 +144,42 @@ def runtime_sources(gradients: bool = False) -> dict[str, str]:
     return {path.name: path.read_text(encoding="utf-8") for path in files}
 
 
+def entry_source(module: str) -> str:
+    """C code between the wrapper, which is the same for every model, and the model of an extension.
+
+    It gives the initialisation of the wrapper the name under which Python imports the extension.
+    """
+    return f"""\
+/* {ENTRY}: the model of the extension {module}, and the name under which Python imports it. */
+#include "msfp_symbols.h"
+
+#if defined(_WIN32)
+#define VISIBLE __declspec(dllexport)
+#else
+#define VISIBLE __attribute__((visibility("default")))
+#endif
+
+const struct msfp_api *MSFP_MODEL(void);
+const struct msfp_api *msfp_model_of_extension(void);
+const struct msfp_api *msfp_model_of_extension(void) {{ return MSFP_MODEL(); }}
+
+void *PyInit_msfp_module(void);
+VISIBLE void *PyInit_{module}(void);
+void *PyInit_{module}(void) {{ return PyInit_msfp_module(); }}
+"""
+
+
+def kept_wrapper(files: Mapping[str, str], inputs: Mapping[str, Any]) -> Path:
+    """Where the cache keeps the object of a wrapper, `wrapper-<key>.o`.
+
+    files: of the generator; inputs: of the entry that is built. The key covers all that the object is made from.
+    """
+    texts = {name: text for name, text in files.items() if name.endswith(".pyx") or name == "msfp.h"}
+    tools = {name: inputs[name] for name in ("compiler", "abi")} | {"cython": inputs["tools"]["cython"]}
+    key = cache.digest_files({**texts, "": json.dumps([tools, inputs["flags"]["wrapper"]])})
+    return cache.cache_root() / f"wrapper-{key[:20]}.o"
+
+
 def _info(spec: ModelSpec, manifest: cache.Manifest, folder: Path, key: str, cached: bool, seconds: float) -> BuildInfo:
     return BuildInfo(
         path=folder / manifest.extension,
@@ -164,14 +201,7 @@ def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) 
 
     notify(f"deriving and emitting {spec.key}", 0.0)
     generated = generate(spec)
-    wrapper = next(name for name in generated.files if name.endswith(".pyx"))
-    translated = f"{Path(wrapper).stem}.c"
-    known = find_translation(generated.files[wrapper])
-    sources = {
-        **runtime_sources(spec.gradients),
-        **generated.files,
-        **({translated: known} if known is not None else {}),
-    }
+    sources = {**runtime_sources(spec.gradients), **generated.files, ENTRY: entry_source(entry.module)}
     begin = perf_counter()
     extension = compile_extension(
         sources,
@@ -182,9 +212,8 @@ def _build(spec: ModelSpec, entry: cache.Entry, folder: Path, notify: Progress) 
             GENERATION_SHARE + (1 - GENERATION_SHARE) * done / count,
         ),
         entry.inputs["processor"],
+        kept=kept_wrapper(generated.files, entry.inputs),
     )
-    if known is None:
-        keep_translation(generated.files[wrapper], folder / translated)
     manifest = cache.Manifest(
         module=entry.module,
         spec=spec.key,

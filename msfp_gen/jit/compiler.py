@@ -7,6 +7,7 @@ output are written to `build.log` beside the sources.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import re
@@ -17,13 +18,14 @@ import sys
 import sysconfig
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import NamedTuple
 
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.common.output import write_text
+from msfp_gen.common.output import write_bytes, write_text
 from msfp_gen.errors import CompileError
 from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
 
@@ -139,14 +141,14 @@ def compile_extension(
     progress: Callable[[int, int], None] | None = None,
     processor: Sequence[str] = (),
     libraries: Sequence[str] = (),
+    kept: Path | None = None,
 ) -> Path:
     """Write `sources` into `folder` and build the extension `module` there.
 
     Parameters
     ----------
     sources
-        File name -> text: any number of `.c` and `.h` files and one `.pyx`, the wrapper. Where its translation, the
-        `.c` of the same name, is among them, Cython is not run.
+        File name -> text: any number of `.c` and `.h` files and one `.pyx`, the wrapper.
     module
         Name under which the extension is imported.
     folder
@@ -157,6 +159,9 @@ def compile_extension(
         Flags of the C files that select a processor; see `msfp_gen.jit.processor`.
     libraries
         Options of the linker beside those of every extension.
+    kept
+        Where the object of the wrapper is kept for other extensions with the same one. It is used where the file is as
+        it was written, and written otherwise.
 
     Returns
     -------
@@ -176,25 +181,47 @@ def compile_extension(
     log = Log(folder)
     wrapper = next(Path(name).stem for name in sources if name.endswith(".pyx"))
     # The longest first, so that no processor waits for another in the end: the wrapper, then the files with kernels.
-    units = [name for name in sorted(sources) if name.endswith(".c") and name != f"{wrapper}.c"]
+    units = [name for name in sorted(sources) if name.endswith(".c")]
     units.sort(key=lambda name: "msfp_kernels.h" not in sources[name])
     c_flags = (*FLAGS["c"], *processor, *FLAGS["user"])
-    chains = [
-        _wrapper_steps(wrapper, module, compiler, include, translated=f"{wrapper}.c" in sources),
-        *([compile_step(name, compiler, c_flags)] for name in units),
-    ]
+    chains = [[compile_step(name, compiler, c_flags)] for name in units]
+    known = read_kept(kept) if kept is not None else None
+    if known is not None:
+        write_bytes(folder / object_file(wrapper), [known])
+    else:
+        chains.insert(0, _wrapper_steps(wrapper, compiler, include))
     for done in run_parallel(chains, log.run):
         if progress is not None:
             progress(done, len(chains))
-    objects = [object_file(name) for name in [*units, f"{wrapper}.c"]]
+    objects = [object_file(name) for name in [*units, wrapper]]
     target = folder / f"{module}{EXTENSION_SUFFIX}"
     log.run(Step(target.name, (*_link_command(compiler), *objects, "-o", target.name, *FLAGS["libraries"], *libraries)))
     if not target.is_file():
         message = f"{shlex.join(compiler.command)} wrote no {target.name}: this is no C compiler; name one with CC=..."
         raise CompileError(message, log=log.path)
+    if kept is not None and known is None:
+        _keep(kept, (folder / object_file(wrapper)).read_bytes())
     for name in objects:
         (folder / name).unlink()
+    (folder / f"{wrapper}.c").unlink(missing_ok=True)
     return target
+
+
+def read_kept(path: Path) -> bytes | None:
+    """The object in a file that `compile_extension` kept; None if it is missing or damaged.
+
+    The first line of the file is the sha256 of the rest.
+    """
+    with suppress(OSError):
+        digest, _, content = path.read_bytes().partition(b"\n")
+        if hashlib.sha256(content).hexdigest().encode() == digest:
+            os.utime(path)  # records the time of last use for `msfp-gen cache --prune`
+            return content
+    return None
+
+
+def _keep(path: Path, content: bytes) -> None:
+    write_bytes(path, [hashlib.sha256(content).hexdigest().encode(), b"\n", content])
 
 
 class Log:
@@ -260,16 +287,12 @@ def compile_step(name: str, compiler: Compiler, flags: Sequence[str]) -> Step:
     return Step(name, (*compiler.command, *flags, "-c", name, "-o", object_file(name)))
 
 
-def _wrapper_steps(wrapper: str, module: str, compiler: Compiler, include: Path, translated: bool) -> list[Step]:
-    """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation.
-
-    The wrapper has one name for all models; a macro gives its initialisation the name under which Python imports it.
-    """
+def _wrapper_steps(wrapper: str, compiler: Compiler, include: Path) -> list[Step]:
+    """Translation of the wrapper by Cython in a separate Python (`-P`: without the folder on its path), compilation."""
     pyx, c = f"{wrapper}.pyx", f"{wrapper}.c"
     cython = Step(pyx, (sys.executable, "-P", "-m", "cython", "-3", pyx, "-o", c))
-    name = () if wrapper == module else (f"-DPyInit_{wrapper}=PyInit_{module}",)
-    command = (*compiler.command, *FLAGS["wrapper"], *name, "-I", str(include), "-c", c, "-o", object_file(c))
-    return [*([] if translated else [cython]), Step(c, command)]
+    command = (*compiler.command, *FLAGS["wrapper"], "-I", str(include), "-c", c, "-o", object_file(c))
+    return [cython, Step(c, command)]
 
 
 def _link_command(compiler: Compiler) -> tuple[str, ...]:

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.cache import MANIFEST_NAME, Entry, Manifest, cache_root
-from msfp_gen.jit.translation import remove_translations
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 # Models, those for batches in vector lanes of earlier versions, and unfinished ones.
+_WRAPPER = re.compile(r"wrapper-[0-9a-f]{20}\.o")
 _NAME = re.compile(r"(msfp_\d+_\d+_\d+(?:_lanes\d+)?-[0-9a-f]{20})(\.part-\d+)?")
 DAY = 86400.0
 
@@ -72,7 +72,7 @@ def prune(days: float) -> tuple[list[CachedModel], list[CachedModel]]:
     """
     if not days >= 0:
         raise InputError(f"days = {days}: give a number of days, 0 or more")
-    remove_translations(days)
+    _remove_wrappers(days)
     removed: list[CachedModel] = []
     in_use: list[CachedModel] = []
     for item in cached_models():
@@ -134,6 +134,15 @@ def _remove(folder: Path) -> bool:
                 folder.rename(renamed)
         shutil.rmtree(renamed, ignore_errors=True)
         return not (folder.exists() or renamed.exists())
+
+
+def _remove_wrappers(days: float) -> None:
+    """Delete the objects of wrappers that were not used for `days` days."""
+    root = cache_root()
+    for path in root.iterdir() if root.is_dir() else ():
+        with suppress(OSError):
+            if _WRAPPER.fullmatch(path.name) and path.stat().st_mtime <= time.time() - days * 86400.0:
+                path.unlink()
 
 
 def _remove_locks() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from reference import friction_laws as reference
-from support import ROOT, scene_of, thinned
+from support import ROOT, scene_of
 from support.flights import shaken
 from support.friction_scenes import FORMULA, LAWS, P_REF, VALUES, heated, lawful
 from support.resuming import assert_same, interrupted
@@ -76,7 +76,8 @@ def test_flights_under_a_law() -> None:
     assert np.abs(rows.temperature[:, 3] - want).max() < 2e-3 * (want.max() - 20.0)
 
 
-@pytest.mark.parametrize("word", thinned(LAWS, lambda word: word == "custom"))
+@pytest.mark.slow
+@pytest.mark.parametrize("word", LAWS)
 def test_sliders_without_mass(word: str) -> None:
     """A slow test: inertia is nothing, and so the law sees the same."""
     massless, inertial = simulate(under(word, sliders="massless")), run_under(word)
@@ -87,7 +88,7 @@ def test_sliders_without_mass(word: str) -> None:
     assert force[0] == pytest.approx(force[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("uplift", [False, True])
+@pytest.mark.parametrize("uplift", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_run_that_heats_goes_on_from_its_checkpoint(
     uplift: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +102,7 @@ def test_a_run_that_heats_goes_on_from_its_checkpoint(
     assert_same(whole, simulate(scene, checkpoint=tmp_path / "run.ck", resume=True))
 
 
+@pytest.mark.slow
 def test_heat_is_taken_in_on_the_way() -> None:
     """Left to be chosen, the run begins with pv and goes on with pvt once heat matters: the same temperatures."""
     scene = replace(load_scene(EXAMPLE), duration=5.0)

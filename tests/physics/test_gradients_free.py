@@ -263,7 +263,11 @@ def test_derivatives_after_rim_contacts_are_as_exact_as_the_run(
 
 @pytest.mark.parametrize(
     ("scene", "least"),
-    [(slow_contact, 0.95), (massless_contacts, 0.95), pytest.param(fast_contacts, 0.85, marks=slow)],
+    [
+        (slow_contact, 0.95),
+        pytest.param(massless_contacts, 0.95, marks=slow),
+        pytest.param(fast_contacts, 0.85, marks=slow),
+    ],
 )
 def test_the_stated_error_covers_the_true_one(scene: Callable[[], Scene], least: float) -> None:
     """Of 95 of 100 rows, and the largest error of sliding displacements in every run.

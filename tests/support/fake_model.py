@@ -7,8 +7,10 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 HEADER = "double msfp_twice(double x);\nextern const double msfp_factor;\n"
+SYMBOLS = "#define MSFP_MODEL msfp_fake\n"
 KERNEL = '#include "msfp_model.h"\n\ndouble msfp_twice(double x) { return msfp_factor * x; }\n'
 RUNTIME = '#include "msfp_model.h"\n\nconst double msfp_factor = 2.0;\n'
+RUNTIME += "const struct msfp_api *msfp_fake(void);\nconst struct msfp_api *msfp_fake(void) { return 0; }\n"
 WRAPPER = """\
 cdef extern from "msfp_model.h":
     double msfp_twice(double x)
@@ -21,7 +23,7 @@ STAGES = {"derive": 0.25, "lower": 0.5, "emit": 0.125}
 
 
 def sources(kernel: str = KERNEL, wrapper: str = WRAPPER) -> dict[str, str]:
-    return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, "msfp_module.pyx": wrapper}
+    return {"msfp_model.h": HEADER, "msfp_kernels.c": kernel, "msfp_module.pyx": wrapper, "msfp_symbols.h": SYMBOLS}
 
 
 def generate(spec: object) -> SimpleNamespace:

@@ -18,7 +18,7 @@ DAMPED = {"contact_damping": 1e-3}
 def single(hysteresis: str = "report") -> Scene:
     """A single pendulum without masses and dampers in the plane, under two cycles: its steps are quasi-static."""
     scene, motion = load_scene("single-push"), Motion.harmonic(0.1, 0.5, cycles=2.0)
-    effects = Effects(dimension="planar", sliders="massless", rims=False, bouc_wen=hysteresis)
+    effects = Effects(dimension="planar", sliders="massless", bouc_wen=hysteresis)
     bearing = scene.bearing.replace(rim_damping=0.0, mass=1e-3, inertia=1e-3)
     scene = replace(scene, bearing=bearing, top=replace(scene.top, damping=0.0, stiffness=1e9))
     scene = replace(

@@ -20,7 +20,6 @@ from support import fake_model
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
 from msfp_gen.jit import build, cache, compiler, pruning
-from msfp_gen.jit.translation import find_translation, translation_path
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())
@@ -72,8 +71,8 @@ def assert_works() -> None:
     assert build.load_extension(info.path, MODULE).twice(2.0) == 4.0
 
 
-def translation() -> Path:
-    return translation_path(fake_model.WRAPPER)
+def kept_wrapper() -> Path:
+    return build.kept_wrapper(fake_model.sources(), cache.Entry.of(SPEC).inputs)
 
 
 # --- what is not as it was written
@@ -138,23 +137,25 @@ def test_altered_sources_are_not_handed_out(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "unit.c").read_text() == fake_model.RUNTIME
 
 
-def test_an_altered_translation_of_the_wrapper_is_made_again(entry: cache.Entry) -> None:
-    whole, dice = translation().read_bytes(), random.Random(5)
-    assert find_translation(fake_model.WRAPPER) == whole.partition(b"\n")[2].decode()
+def test_an_altered_object_of_the_wrapper_is_made_again(entry: cache.Entry) -> None:
+    path = kept_wrapper()
+    whole, dice = path.read_bytes(), random.Random(5)
+    assert compiler.read_kept(path) == whole.partition(b"\n")[2]
     for at in {0, 64, 65, len(whole) - 1, *(dice.randrange(len(whole)) for _ in range(50))}:
-        translation().write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
-        assert find_translation(fake_model.WRAPPER) is None
-        translation().write_bytes(whole[:at])
-        assert find_translation(fake_model.WRAPPER) is None
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        assert compiler.read_kept(path) is None
+        path.write_bytes(whole[:at])
+        assert compiler.read_kept(path) is None
     shutil.rmtree(entry.folder)
-    assert not build.prepare(SPEC).cached and translation().read_bytes() == whole
+    assert not build.prepare(SPEC).cached and path.read_bytes() == whole
+    assert_works()
 
 
 # --- builds that are killed, and builds at the same time
 
 
 def test_a_full_disk_in_the_middle_of_a_build_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(sources: dict[str, str], module: str, folder: Path, *_: object) -> Path:
+    def full(sources: dict[str, str], module: str, folder: Path, *_: object, **__: object) -> Path:
         (folder / "half.c").write_text("int x")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder / "half.c"))
 
@@ -182,7 +183,7 @@ def test_builds_killed_at_any_moment(house: Path, tmp_path: Path) -> None:
     assert run_child(house, models).communicate()[0].split()[1] == "42.0"
     names = sorted(path.name for path in models.iterdir())
     folder = cache.Entry.of(SPEC).folder.name
-    assert names == [folder, f"{folder}.lock", translation().name], "what the killed ones left is cleared away"
+    assert names == [folder, f"{folder}.lock", kept_wrapper().name], "what the killed ones left is cleared away"
     assert_works()
 
 
@@ -275,11 +276,11 @@ def test_only_what_was_not_used_goes(stock: Callable[[], dict[str, str]], entry:
     removed, held = pruning.prune(30.0)
     assert {item.state for item in removed} == {"damaged or old", "other version", "unfinished"}
     assert len(removed) == 5 and not held
-    kept = {entry.folder.name, f"{entry.folder.name}.lock", translation().name}
-    assert set(stock()) == kept | {"thesis", "msfp_notes.txt"}
+    left = {entry.folder.name, f"{entry.folder.name}.lock", kept_wrapper().name}
+    assert set(stock()) == left | {"thesis", "msfp_notes.txt"}
     then = time.time() - 40.0 * pruning.DAY
-    os.utime(translation(), (then, then))
-    assert pruning.prune(30.0) == ([], []) and not translation().exists()
+    os.utime(kept_wrapper(), (then, then))
+    assert pruning.prune(30.0) == ([], []) and not kept_wrapper().exists()
     assert_works()
 
 

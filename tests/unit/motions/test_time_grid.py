@@ -194,7 +194,7 @@ def test_every_method_ends_beside_a_knot(method: Any, gap: float) -> None:
 
 def test_the_grid_of_a_scene_holds_all_its_histories() -> None:
     turned = Rotation.from_arrays([0, 1.5, 4], [[0, 0], [0, 1e-3], [0, 0]])
-    scene = scene_of(load=PULSE, top_rotation=turned, effects=replace(PLANAR, top_rotation=True))
+    scene = scene_of(load=PULSE, top_rotation=turned, effects=Effects(top_rotation=True))
     assert {1.5, 5.0, 5.005, 5.01} <= set(time_grid(scene).stops)
     with pytest.raises(RunError, match="max_steps"):
         simulate(replace(scene, solver=Solver(max_steps=3)))

@@ -121,7 +121,7 @@ def test_it_opens_at_the_peak_and_plays_from_the_start(start, page, saved):
     assert js(browser, "return at('time', current)") < 5
 
 
-@pytest.mark.parametrize("still", [True, False])
+@pytest.mark.parametrize("still", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_bearing_stays_inside_the_frame(browser, still):
     """At both ends of the motion and from every side, no drawn pixel of a body touches the edge of the view."""
     last = int(browser.find_element("id", "frame").get_attribute("max"))

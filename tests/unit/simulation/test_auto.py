@@ -315,6 +315,7 @@ def test_the_temperatures_of_the_monitor_are_those_of_the_law() -> None:
     np.testing.assert_allclose(at.temperature_parts.sum(axis=1), full.history.temperature[-1] - 20.0, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_the_note_of_heat_gives_the_peak(tmp_path: Any, monkeypatch: Any) -> None:
     """The limit is passed at 0.6 s, the peak is that of the last of two models; streamed and resumed runs agree."""
     time = np.linspace(0.0, 12.0, 601)

@@ -222,7 +222,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("processes", [False, True])
+@pytest.mark.parametrize("processes", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_ctrl_c_ends_a_batch(processes: bool, tmp_path: Any) -> None:
     script = tmp_path / "script.py"
     script.write_text(PROGRAM.format(tests=ROOT / "tests", processes=processes), encoding="utf-8")
@@ -267,13 +267,13 @@ def test_bad_input_is_refused_before_anything_runs(call: Any, words: str, monkey
 
 
 def test_a_run_that_fails_at_its_start_has_the_state_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    surface = Surface(radius=0.1, friction=0.5, yield_displacement=1e-4, capacity=0.14)
-    body = Body(mass=1.0, height=0.09, centroid=0.08, inertia=(1e-4, 1e-4))
+    surface = Surface(radius=0.1, friction=0.5, yield_displacement=1e-4, capacity=0.14, rim_stiffness=1e8)
+    body = Body(mass=1.0, height=0.09, centroid=0.08, inertia=(1e-4, 1e-4), rim_radius=0.01)
     bearing = Bearing(
         layout=Layout(2, 1, 0), base_height=0.02, base_rim_radius=0.01, gravity=9.8, surfaces=[surface], bodies=[body]
     )
     start = InitialState([[0.0, -0.3, 0.0]], [[0.0] * 3], [[1.0, 0.0]])
-    effects = Effects(dimension="planar", rims=False)
+    effects = Effects(dimension="planar")
     stuck = Scene(bearing, STILL, Top.prescribed((0.0, 0.0, 0.0)), effects, initial_state=start)
     with pytest.raises(RunError) as caught:
         simulate(stuck)

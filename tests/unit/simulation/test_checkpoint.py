@@ -391,7 +391,7 @@ def test_kill_at_any_moment_loses_no_checkpoint(tmp_path: Path, uninterrupted: R
     """SIGKILL, again and again, mostly in the middle of writing: with chunks this short that is all the run does."""
     dice, path = random.Random(3), tmp_path / "run.ck"
     reached = [0.0]
-    for _ in range(5):
+    for _ in range(3):
         process = started(tmp_path, "--resume" if path.exists() else "--checkpoint", "run.ck", chunk=20)
         before = path.stat().st_mtime_ns if path.exists() else 0
         deadline = time.monotonic() + 60

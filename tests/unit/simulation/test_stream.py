@@ -176,7 +176,13 @@ def test_a_run_without_a_row_writes_no_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("scene", [SCENES["even rows"], leaving()], ids=["one model", "two models"])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(SCENES["even rows"], marks=pytest.mark.slow, id="one model"),
+        pytest.param(leaving(), id="two models"),
+    ],
+)
 def test_a_checkpoint_and_its_rows_continue_to_the_same_file(scene: Scene, tmp_path: Path) -> None:
     path, file = tmp_path / "run.ck", tmp_path / "run.nc"
     end = scene.end

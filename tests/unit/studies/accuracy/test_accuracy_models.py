@@ -126,6 +126,7 @@ def test_model_errors_are_measured_against_the_full_model(study):
     assert not any(point.wrong for point in study.points)
 
 
+@pytest.mark.slow
 def test_steps_are_told_from_tolerances(study):
     settings = {point.series: point.trial.setting for point in study.points}
     assert settings["linearised"] == "0.0015 s" and settings["planar"] == "0.0001"
