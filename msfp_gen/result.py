@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.analysis.characterise import Characterisation
-    from msfp_gen.results.stored_group import Attribute, StoredGroup
+    from msfp_gen.results.files import Storage
 
 __all__ = ["Counters", "Event", "History", "Result"]
 
@@ -40,13 +40,6 @@ class Result(RunData):
         return brief_html(self)
 
     @cached_property
-    def dataset(self) -> xr.Dataset:
-        """Rows and events as an xarray.Dataset, with units and meanings in attributes; built at first use."""
-        from msfp_gen.results.dataset import to_dataset
-
-        return to_dataset(self)
-
-    @cached_property
     def summary(self) -> dict[str, Any]:
         """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
         from msfp_gen.analysis.summary import summarise
@@ -59,7 +52,7 @@ class Result(RunData):
 
         Raises InputError where the run computed none.
         """
-        from msfp_gen.results.gradient_dataset import to_gradient_dataset
+        from msfp_gen.results.dataset import to_gradient_dataset
 
         return to_gradient_dataset(self)
 
@@ -82,25 +75,9 @@ class Result(RunData):
 
         return characterise(self)
 
-    def groups(self) -> dict[str, xr.Dataset]:
-        """The polynomials of the motion, where its table cannot make it again, and the derivatives of the run."""
-        from msfp_gen.results import stored_gradient
-        from msfp_gen.results.gradient_dataset import gradient_group
-        from msfp_gen.scene.file.stored_motion import GROUP, needs_pieces, to_pieces
-
-        motion = {GROUP: to_pieces(self.scene.motion)} if needs_pieces(self.scene) else {}
-        return motion | ({} if self.gradients is None else {stored_gradient.GROUP: gradient_group(self)})
-
     @classmethod
-    def fields_in(cls, root: StoredGroup, about: dict[str, Attribute], arrays: dict[str, Any]) -> dict[str, Any]:
-        """The fields from a file, as `ResultFiles.fields_in`."""
-        from msfp_gen.results.reading import fields_in
+    def storage(cls) -> Storage:
+        """The functions of `results/dataset.py`."""
+        from msfp_gen.results import dataset
 
-        return fields_in(root, about, arrays)
-
-    @classmethod
-    def edition(cls) -> str:
-        """A digest of the names that a file of this version has."""
-        from msfp_gen.results.reading import edition
-
-        return edition()
+        return dataset

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from msfp_gen.analysis.characterise import tables
 from msfp_gen.analysis.characterise.loops import Loop, Path
 from msfp_gen.analysis.characterise.report import Characterisation
 from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
@@ -141,39 +142,47 @@ def _demand(one: BearingResult) -> BearingDemand:
     )
 
 
-def _rows(found: BuildingCharacterisation) -> list[tuple[str, str]]:
-    period = "" if found.secant_period is None else f", period {found.secant_period:.3g} s"
-    cycles = [loop for loop in found.cycles if loop.effective_damping is not None]
+def _rows(system: BuildingCharacterisation) -> list[tuple[str, str]]:
+    period = "" if system.secant_period is None else f", period {system.secant_period:.3g} s"
+    cycles = [loop for loop in system.cycles if loop.effective_damping is not None]
     effective = [
         ("effective", f"stiffness {1e-6 * np.mean([x.effective_stiffness for x in cycles]):.4g} kN/mm, damping "
          f"{100 * np.mean([x.effective_damping for x in cycles]):.3g} % of {len(cycles)} cycles")
     ] if cycles else []  # fmt: skip
     return [
-        ("peak displacement", f"{1e3 * found.peak_displacement:.4g} mm, mean of the bearings"),
-        ("peak base shear", f"{1e-6 * found.peak_force:.4g} MN ({found.peak_force / found.weight:.3f} of the weight)"),
-        ("at the peak", f"secant stiffness {1e-6 * found.secant_stiffness:.4g} kN/mm{period}"),
+        ("peak displacement", f"{1e3 * system.peak_displacement:.4g} mm, mean of the bearings"),
+        (
+            "peak base shear",
+            f"{1e-6 * system.peak_force:.4g} MN ({system.peak_force / system.weight:.3f} of the weight)",
+        ),
+        ("at the peak", f"secant stiffness {1e-6 * system.secant_stiffness:.4g} kN/mm{period}"),
         *effective,
-        ("residual", f"{1e3 * found.residual_displacement:.4g} mm" + ("" if found.at_rest else ", still moving")),
-        ("dissipated", f"{1e-3 * found.energy_dissipated:.4g} kJ in the bearings"),
-        *([("not defined", "; ".join(found.notes))] if found.notes else []),
+        (
+            "residual",
+            f"{1e3 * system.residual_displacement:.4g} mm" + ("" if system.at_rest else ", still moving"),
+        ),
+        ("dissipated", f"{1e-3 * system.energy_dissipated:.4g} kJ in the bearings"),
+        *([("not defined", "; ".join(system.notes))] if system.notes else []),
     ]
 
 
-def building_tables(found: BuildingCharacterisation) -> list[Table]:
-    """Tables of the isolation system and of the demands on its bearings."""
+def characterisation_tables(system: BuildingCharacterisation | Characterisation) -> list[Table]:
+    """Tables of a characterisation: of one bearing, or of an isolation system and the demands on its bearings."""
+    if isinstance(system, Characterisation):
+        return tables.characterisation_tables(system)
     rows = [
         (
-            str(each.number),
-            each.name or "-",
-            f"{1e3 * each.peak_displacement:.1f}",
-            f"{1e3 * each.capacity_left:.1f}",
-            yes(each.capacity_left <= 0),
-            f"{each.minimum_load_ratio:.2f} ... {each.maximum_load_ratio:.2f}",
-            f"{1e3 * each.residual_displacement:.2f}",
-            f"{1e-3 * each.dissipated:.1f}",
+            str(demand.number),
+            demand.name or "-",
+            f"{1e3 * demand.peak_displacement:.1f}",
+            f"{1e3 * demand.capacity_left:.1f}",
+            yes(demand.capacity_left <= 0),
+            f"{demand.minimum_load_ratio:.2f} ... {demand.maximum_load_ratio:.2f}",
+            f"{1e3 * demand.residual_displacement:.2f}",
+            f"{1e-3 * demand.dissipated:.1f}",
         )
-        for each in found.bearings
+        for demand in system.bearings
     ]
     columns = ("no.", "name", "u [mm]", "left [mm]", "rim", "N / N at rest", "residual [mm]", "dissipated [kJ]")
-    system = Table(f"isolation system of {found.name or 'the building'}", (), _rows(found))
-    return [system, Table("bearings; left: least capacity less sliding", columns, rows)]
+    whole = Table(f"isolation system of {system.name or 'the building'}", (), _rows(system))
+    return [whole, Table("bearings; left: least capacity less sliding", columns, rows)]

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.buildings.effects import undamped
-from msfp_gen.buildings.peaks import Peaks, along_time, named
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
+from msfp_gen.buildings.peaks import Peaks
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below, undamped
 from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import coordinates_of, named_columns
-from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.files import ResultFiles, attributes_of
+from msfp_gen.results.extremes import Extremes, by_axis, largest
+from msfp_gen.results.files import KINDS, ResultFiles, Storage, attributes_of
 from msfp_gen.results.history import Event, first_peak
 from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.effect_selection import doubtful_values
@@ -173,18 +173,18 @@ def peaks_of_rows(result: BuildingData) -> Peaks:
     force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
     base = scene.bearings[0].node
     return Peaks(
-        node_acceleration=along_time(nodes[:, :, 2, :3]),
-        node_displacement=along_time(nodes[:, :, 0, :3] - result.ground[:, 0]),
-        drift=along_time(np.moveaxis(result.drift[..., :3], 1, 0)),
-        storey_shear=along_time(np.moveaxis(result.storey_force[..., :3], 1, 0)),
+        node_acceleration=largest(nodes[:, :, 2, :3]),
+        node_displacement=largest(nodes[:, :, 0, :3] - result.ground[:, 0]),
+        drift=largest(np.moveaxis(result.drift[..., :3], 1, 0)),
+        storey_shear=largest(np.moveaxis(result.storey_force[..., :3], 1, 0)),
         storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
         base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
-        mean_displacement=along_time(across.mean(axis=0)),
-        base_reaction=along_time(result.base_reaction),
+        mean_displacement=largest(across.mean(axis=0)),
+        base_reaction=largest(result.base_reaction),
         base_torsion=np.abs(result.base_torsion).max(keepdims=True),
         energy=np.array([result.kinetic.max(), result.strain.max()]),
-        bearing_displacement=along_time(across),
-        top_force=along_time(force),
+        bearing_displacement=largest(across),
+        top_force=largest(force),
         axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
         sliding=sliding.max(axis=0),
         normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
@@ -380,14 +380,14 @@ class BearingResult(ResultFiles):
         minimum_normal_force and maximum_normal_force [N]. Others: number (from 1), name, layout, position;
         minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at the end [J].
         """
-        extremes, force = self.extremes, named(self.extremes.top_force)
+        extremes, force = self.extremes, by_axis(self.extremes.top_force)
         ratio = self.building.peaks.axial_force[self.index] / self.axial_load
         return {
             "number": self.index + 1,
             "name": self.scene.bearings[self.index].name,
             "layout": self.bearing.layout.name,
             "position": self.scene.places[self.index].tolist(),
-            "peak_displacement": named(extremes.displacement),
+            "peak_displacement": by_axis(extremes.displacement),
             "peak_top_force": force,
             "axial_load": self.axial_load,
             "peak_force_ratio": force["radial"] / self.axial_load,
@@ -400,6 +400,11 @@ class BearingResult(ResultFiles):
             "maximum_normal_force": extremes.most_normal.tolist(),
             "dissipated": float(self.dissipated[-1]),
         }
+
+    @classmethod
+    def storage(cls) -> Storage:
+        """It has none of its own: the file of the building is read."""
+        raise InputError(f"this is the result of {KINDS[cls.source]}")
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -414,7 +419,7 @@ class BearingResult(ResultFiles):
         one = self.scene.bearings[self.index]
         parts = {"bearing": bearing_table(one.bearing), "interface": plain_table(one.interface)}
         text = dumps({"axial_load": self.axial_load, **parts})
-        about = attributes_of(self, text, self.notes, {}) | {"bearing": self.label}
+        about = attributes_of(self, "", text, self.notes, {}) | {"bearing": self.label}
         return xr.Dataset(dict(rows) | more, coordinates_of(self.time, self.surfaces), about)
 
     def characterise(self) -> Characterisation:

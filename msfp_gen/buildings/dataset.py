@@ -55,13 +55,13 @@ def scene_text(scene: BuildingScene) -> str:
             "column": [{"name": column.name} for column in building.columns],
             "bearing": [
                 {
-                    **plain_table(each),
-                    "bearing": bearing_table(each.bearing),
-                    "interface": plain_table(each.interface),
-                    "effects": None if each.effects is None else plain_table(each.effects),
+                    **plain_table(one),
+                    "bearing": bearing_table(one.bearing),
+                    "interface": plain_table(one.interface),
+                    "effects": None if one.effects is None else plain_table(one.effects),
                     "ground": ground,
                 }
-                for each, ground in zip(scene.bearings, scene.grounds[1], strict=True)
+                for one, ground in zip(scene.bearings, scene.grounds[1], strict=True)
             ],
         }
     )
@@ -72,21 +72,21 @@ def to_arrays(building: Building) -> xr.Dataset:
     import xarray as xr
 
     square = ("row", "column")
-    found: dict[str, Any] = {name: (square, getattr(building, name)) for name in MATRICES}
+    variables: dict[str, Any] = {name: (square, getattr(building, name)) for name in MATRICES}
     shape = (-1, FREEDOMS, len(building.mass))
     node, storey = ("node", "freedom", "row"), ("storey", "freedom", "row")
-    found["node_rows"] = (node, np.reshape([each.rows for each in building.nodes], shape))
-    found["node_position"] = (("node", "axis"), np.reshape([each.position for each in building.nodes], (-1, 3)))
-    found["deformation"] = (storey, np.reshape([each.deformation for each in building.columns], shape))
-    found["inertia"] = (storey, np.reshape([each.inertia for each in building.columns], shape))
-    return xr.Dataset(found)
+    variables["node_rows"] = (node, np.reshape([each.rows for each in building.nodes], shape))
+    variables["node_position"] = (("node", "axis"), np.reshape([each.position for each in building.nodes], (-1, 3)))
+    variables["deformation"] = (storey, np.reshape([each.deformation for each in building.columns], shape))
+    variables["inertia"] = (storey, np.reshape([each.inertia for each in building.columns], shape))
+    return xr.Dataset(variables)
 
 
 def shapes(size: int, nodes: int, columns: int) -> dict[str, tuple[int, ...]]:
     """The shapes of these arrays."""
-    found: dict[str, tuple[int, ...]] = dict.fromkeys(MATRICES, (size, size))
-    found |= {"node_rows": (nodes, FREEDOMS, size), "node_position": (nodes, 3)}
-    return found | dict.fromkeys(("deformation", "inertia"), (columns, FREEDOMS, size))
+    table: dict[str, tuple[int, ...]] = dict.fromkeys(MATRICES, (size, size))
+    table |= {"node_rows": (nodes, FREEDOMS, size), "node_position": (nodes, 3)}
+    return table | dict.fromkeys(("deformation", "inertia"), (columns, FREEDOMS, size))
 
 
 def ground_name(index: int) -> str:
@@ -98,9 +98,9 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     """The inverse of `scene_text`, with the arrays of `to_arrays` and all motions of the ground. Raises InputError."""
     table = toml_table(text)
     given = zip(table.get("node", []), arrays["node_position"], arrays["node_rows"], strict=True)
-    nodes = tuple(Node(str(each["name"]), place, rows, bool(each["carries"])) for each, place, rows in given)
+    nodes = tuple(Node(str(row["name"]), place, rows, bool(row["carries"])) for row, place, rows in given)
     stated = zip(table.get("column", []), arrays["deformation"], arrays["inertia"], strict=True)
-    columns = tuple(Columns(str(each["name"]), *both) for each, *both in stated)
+    columns = tuple(Columns(str(row["name"]), *both) for row, *both in stated)
     building = Building(arrays["mass"], arrays["damping"], arrays["stiffness"], nodes, columns)
     bearings = []
     for index, row in enumerate(table["bearing"]):
@@ -229,7 +229,7 @@ def to_dataset(result: BuildingData) -> xr.Dataset:
     variables = {name: _array(variable, rows) for name, (variable, rows) in values.items()}
     variables |= {name: _array(variable, variable.values(result)) for name, variable in _derived(result)}
     counters = {**result.counts, "wall_time": result.wall_time}
-    about = attributes_of(result, scene_text(result.scene), result.monitored, counters)
+    about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
     return xr.Dataset(variables, dict(_coordinates(result)), attrs=about)
 

@@ -16,10 +16,8 @@ from msfp_gen.coupling.response import DISSIPATED
 from msfp_gen.specification.contract import WORKS, names
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from msfp_gen.buildings.characterise import BuildingCharacterisation
-    from msfp_gen.results.stored_group import Attribute, StoredGroup
+    from msfp_gen.results.files import Storage
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -45,13 +43,6 @@ class BuildingResult(BuildingData):
 
         return summarise(self)
 
-    @cached_property
-    def dataset(self) -> xr.Dataset:
-        """Rows as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
-        from msfp_gen.buildings.dataset import to_dataset
-
-        return to_dataset(self)
-
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
 
@@ -61,32 +52,12 @@ class BuildingResult(BuildingData):
 
         return characterise_building(self)
 
-    def groups(self) -> dict[str, xr.Dataset]:
-        """Matrices, motions of the ground and peaks, for the netCDF-4 file."""
-        from msfp_gen.buildings.dataset import groups_of
-
-        return groups_of(self)
-
     @classmethod
-    def fields_in(cls, root: StoredGroup, about: dict[str, Attribute], arrays: dict[str, Any]) -> dict[str, Any]:
-        """The fields from a file, as `ResultFiles.fields_in`."""
-        from msfp_gen.buildings.dataset import fields_in
+    def storage(cls) -> Storage:
+        """The functions of `buildings/dataset.py`."""
+        from msfp_gen.buildings import dataset
 
-        return fields_in(root, about, arrays)
-
-    @classmethod
-    def edition(cls) -> str:
-        """A digest of the names that a file of this version has."""
-        from msfp_gen.buildings.dataset import edition
-
-        return edition()
-
-    @property
-    def derived(self) -> list[str]:
-        """Variables of the dataset that follow from the others."""
-        from msfp_gen.buildings.dataset import DERIVED
-
-        return [name for name in DERIVED if name in self.dataset]
+        return dataset
 
 
 def result_of(run: BuildingRun) -> BuildingResult:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import Progress, SceneName, note, say, show
-from msfp_gen.cli.inputs import build, load_source, of_building, one_bearing, result_of
+from msfp_gen.cli.inputs import build, load_source, one_bearing, result_of
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, characterisation_tables, write_csv
-    from msfp_gen.buildings.characterise import building_tables
+    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, write_csv
+    from msfp_gen.buildings.characterise import characterisation_tables
     from msfp_gen.common.output import check_output
 
     if output is not None:
@@ -50,7 +50,7 @@ def characterise(
     if as_json:
         say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
     else:
-        show(building_tables(found) if of_building(result) else characterisation_tables(found))
+        show(characterisation_tables(found))
     if output is not None:
         note(f"wrote {write_csv(found, output)}")
 

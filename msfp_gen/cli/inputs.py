@@ -8,6 +8,8 @@ from msfp_gen.cli.console import Progress, building
 from msfp_gen.errors import InputError, RunError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from msfp_gen.buildings.load import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
@@ -31,10 +33,9 @@ def load_source(source: str) -> AnyResult | AnyScene:
 
 def is_result(loaded: object) -> bool:
     """Whether this is a result, not a scene."""
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.result import Result
+    from msfp_gen.results.files import ResultFiles
 
-    return isinstance(loaded, Result | BuildingResult)
+    return isinstance(loaded, ResultFiles)
 
 
 def of_building(loaded: object) -> bool:
@@ -43,6 +44,13 @@ def of_building(loaded: object) -> bool:
     from msfp_gen.buildings.scene import BuildingScene
 
     return isinstance(loaded, BuildingScene | BuildingResult)
+
+
+def figures_of(loaded: object) -> Mapping[str, Callable[..., Any]]:
+    """The figures of a scene or result, of one bearing or of a building, by their names."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+
+    return BUILDING_FIGURES if of_building(loaded) else FIGURES
 
 
 def one_bearing(loaded: Any, what: str) -> Any:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -47,6 +48,28 @@ Arrays = dict[str, Any]
 F = TypeVar("F", bound="ResultFiles")
 
 
+class Storage(Protocol):
+    """A module that makes the dataset of one kind of result, and reads its files."""
+
+    DERIVED: dict[str, Any]  # variables of the dataset that follow from the others: they are written but not read
+
+    def to_dataset(self, result: Any) -> xr.Dataset:
+        """The dataset of a result."""
+
+    def groups_of(self, result: Any) -> dict[str, xr.Dataset]:
+        """The groups of the netCDF-4 file beside the dataset, by name."""
+
+    def edition(self) -> str:
+        """A digest of the names that a file of this version has."""
+
+    def fields_in(self, root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
+        """The fields of the result from a file, except status, message and provenance.
+
+        about: attributes of the file; arrays: takes the arrays that were read, by their paths in the file. Raises
+        InputError, or what `DAMAGE` lists.
+        """
+
+
 class ResultFiles(ABC):
     """The files of a result, and the identity of its scene.
 
@@ -55,10 +78,15 @@ class ResultFiles(ABC):
 
     source: ClassVar[str]
 
-    @property
+    @classmethod
     @abstractmethod
+    def storage(cls) -> Storage:
+        """What makes the dataset of its kind of result, and reads its files."""
+
+    @cached_property
     def dataset(self) -> xr.Dataset:
-        """Rows along `time`, with units and meanings in attributes."""
+        """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
+        return self.storage().to_dataset(self)
 
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
@@ -71,32 +99,9 @@ class ResultFiles(ABC):
             """How the run ended."""
 
     @property
-    def derived(self) -> Collection[str]:
-        """Variables of the dataset that follow from the others: they are written but not read."""
-        return ()
-
-    @property
     def title(self) -> str:
         """What the result is of, for the head of a table."""
         return self.scene.name or "unnamed scene"
-
-    def groups(self) -> dict[str, xr.Dataset]:
-        """The groups of the netCDF-4 file beside the dataset, by name."""
-        return {}
-
-    @classmethod
-    def fields_in(cls, root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
-        """The fields of the class from a file, except status, message, notes and provenance.
-
-        about: attributes of the file; arrays: takes the arrays that were read, by their paths in the file. Raises
-        InputError, or what `DAMAGE` lists.
-        """
-        raise InputError(f"this is the result of {KINDS[cls.source]}")
-
-    @classmethod
-    def edition(cls) -> str:
-        """A digest of the names that a file of this version has."""
-        return ""
 
     @property
     def identity(self) -> str:
@@ -116,8 +121,9 @@ class ResultFiles(ABC):
         Raises InputError where the suffix is not .nc or the folder does not exist.
         """
         path = check_output(path, DATASET_SUFFIXES)
-        groups = self.groups()
-        value = digest_of_dataset(self.dataset.drop_vars(self.derived), groups)
+        storage = self.storage()
+        groups = storage.groups_of(self)
+        value = digest_of_dataset(self.dataset.drop_vars(storage.DERIVED, errors="ignore"), groups)
         write_groups(path, self.dataset.assign_attrs({DIGEST: value}), groups)
         return path
 
@@ -309,13 +315,13 @@ def _matlab(values: Any) -> Any:
 
 
 def attributes_of(
-    result: Any, scene: str, notes: Sequence[Note], counters: Mapping[str, float]
+    result: Any, edition: str, scene: str, notes: Sequence[Note], counters: Mapping[str, float]
 ) -> dict[str, str | int | float]:
     """The attributes of every dataset: name, kind, how the run ended, notes, scene as TOML text, counters, versions."""
     return {
         "title": result.scene.name or "unnamed",
         "source": result.source,
-        EDITION: result.edition(),
+        EDITION: edition,
         "status": result.status,
         "message": result.message,
         "notes": json.dumps([asdict(note) for note in notes]),
@@ -408,7 +414,7 @@ def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
     try:
         return _read(root, about, kind)
     except (InputError, *DAMAGE) as error:
-        if edition != kind.edition():
+        if edition != kind.storage().edition():
             raise InputError(
                 "another version of msfp-gen wrote this result, which this one cannot read; run its scene again "
                 "(attribute scene)"
@@ -420,7 +426,7 @@ def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
     if not all(isinstance(about.get(name), str) for name in WORDS):
         raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
     written, arrays = about.pop(DIGEST, None), dict[str, Any]()
-    fields = kind.fields_in(root, about, arrays)
+    fields = kind.storage().fields_in(root, about, arrays)
     if not str(about["status"]).isidentifier():
         raise ValueError(f"status = {about['status']!r} is no word")
     if written is not None and written != digest_of(about, arrays):  # another program may have left it out

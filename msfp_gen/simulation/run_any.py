@@ -7,8 +7,6 @@ from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
 from msfp_gen.buildings.compiled_run import BuildingRun, start_run
 from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.scene import BuildingScene
@@ -16,8 +14,7 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
-from msfp_gen.specification.contract import STATUSES
-from msfp_gen.version import __version__
+from msfp_gen.simulation.outcome import provenance_of, stopped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +24,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
 STEPS_PER_CALL = 20  # of a building, between two looks at interrupts, progress and checkpoints
-_FAILURES = {status.name: status for status in STATUSES}
 _OF_BUILDINGS = ("progress", "checkpoint", "every", "resume", "threads")
 
 
@@ -106,7 +102,7 @@ def simulate_building(
         message = failure(run, status)
     result = None
     if status == "ok" or run.run.row_count:
-        about = {"msfp_gen": __version__, "numpy": np.__version__}
+        about = provenance_of(scene.solver, ", ".join(spec.key for spec in scene.specs))
         ended = {"status": status, "message": message, "wall_time": monotonic() - begin}
         result = replace(result_of(run), provenance=about, **ended)  # type: ignore[arg-type]
     if result is None or message:
@@ -130,11 +126,8 @@ def _advance(run: BuildingRun, progress: bearings.Progress | None, keeper: Check
 def failure(run: BuildingRun, status: str) -> str:
     """One line with bearing, time, surface, cause and remedy."""
     _, bearing, surface, value = run.run.status
-    known = _FAILURES[status]
     who = run.scene.label(bearing - 1) if bearing else "building"
-    where = f", surface {surface}" if surface else ""
-    where += f", {known.quantity} = {value:.4g}" if surface and known.quantity else ""
-    return f"{who}: stopped at t = {run.time:.6g} s of {run.scene.end:.6g} s{where}: {known.failure}"
+    return f"{who}: {stopped(run.time, run.scene.end, status, surface, value)}"
 
 
 def identity(run: BuildingRun) -> Identity:

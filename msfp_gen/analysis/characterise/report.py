@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal
@@ -67,12 +67,12 @@ class Cycle:
 
     def stage_stiffness(self) -> dict[tuple[int, ...], float]:
         """Sliding surfaces -> stiffness [N/m], mean of both half cycles; regimes in which all stick are left out."""
-        found: dict[tuple[int, ...], list[float]] = {}
+        stiffness: dict[tuple[int, ...], list[float]] = {}
         for branch in self.branches:
             for stage in branch.stages:
                 if stage.surfaces:
-                    found.setdefault(stage.surfaces, []).append(stage.stiffness)
-        return {surfaces: float(np.mean(values)) for surfaces, values in found.items()}
+                    stiffness.setdefault(stage.surfaces, []).append(stage.stiffness)
+        return {surfaces: float(np.mean(values)) for surfaces, values in stiffness.items()}
 
 
 @dataclass(frozen=True)
@@ -153,29 +153,17 @@ def characterise(result: RunData) -> Characterisation:
         return branch_of(u[rows], force[rows], slip[rows], plastic[rows], history.gap[rows])
 
     dissipated, turning = _dissipated(result), path.turning
-    cycles = [
-        Cycle(
-            number,
-            float(history.time[start]),
-            float(history.time[end]),
-            loop,
-            _period(loop.effective_stiffness, load, result.scene.bearing.gravity),
-            float(dissipated[end] - dissipated[start]),
-            (branch(start, middle), branch(middle, end)),
-            surface_demands(result, slice(start, end + 1)),
-        )
-        for number, (start, middle, end, loop) in enumerate(path.cycles(), 1)
-    ]
+    cycles = _cycles(path, load, result.scene.bearing, dissipated, lambda rows: surface_demands(result, rows), branch)
     kind: Kind = "cycles" if cycles else "monotonic" if is_monotonic(result) else _directions(path)
     name, status, demands = result.scene.name, result.status, surface_demands(result)
-    found = _whole(name, status, kind, path, load, cycles, demands, dissipated, result.extremes)
-    notes = list(found.notes)
+    whole = _whole(name, status, kind, path, load, cycles, demands, dissipated, result.extremes)
+    notes = list(whole.notes)
     if any(demand.maximum_uplift is None for demand in demands):
         notes.append("uplift is not modelled in this run")
     if load is None:
         notes.append("no constant axial load: no effective period")
     return replace(
-        found,
+        whole,
         first_loading=branch(turning[0], turning[1]) if len(turning) > 1 else None,
         transitions=transitions(result, load) if kind == "monotonic" else None,
         notes=tuple(notes),
@@ -201,7 +189,24 @@ def characterise_rows(
     name, status: of the run. load: at rest [N]. gap: to the rims, shape (T, n-1) [m]. dissipated: energy since the
     start, shape (T,) [J]. extremes: over all steps.
     """
-    cycles = [
+    cycles = _cycles(path, load, bearing, dissipated, lambda rows: capacity_demands(bearing, gap[rows].min(axis=0)))
+    kind: Kind = "cycles" if cycles else _directions(path)
+    demands = capacity_demands(bearing, extremes.gap)
+    note = "the rows of a building have no slip velocities: no sliding regimes, velocities, heat and uplift of surfaces"
+    whole = _whole(name, status, kind, path, load, cycles, demands, dissipated, extremes)
+    return replace(whole, notes=(*whole.notes, f"{note}; periods are with N at rest"))
+
+
+def _cycles(
+    path: Path,
+    load: float | None,
+    bearing: Bearing,
+    dissipated: Array,
+    demands: Callable[[slice], tuple[SurfaceDemand, ...]],
+    branch: Callable[[int, int], Branch] | None = None,
+) -> list[Cycle]:
+    """The closed cycles of a path. demands: over some rows. branch: from one row to another; None: not known."""
+    return [
         Cycle(
             number,
             float(path.time[start]),
@@ -209,16 +214,11 @@ def characterise_rows(
             loop,
             _period(loop.effective_stiffness, load, bearing.gravity),
             float(dissipated[end] - dissipated[start]),
-            (),
-            capacity_demands(bearing, gap[start : end + 1].min(axis=0)),
+            () if branch is None else (branch(start, middle), branch(middle, end)),
+            demands(slice(start, end + 1)),
         )
-        for number, (start, _, end, loop) in enumerate(path.cycles(), 1)
+        for number, (start, middle, end, loop) in enumerate(path.cycles(), 1)
     ]
-    kind: Kind = "cycles" if cycles else _directions(path)
-    demands = capacity_demands(bearing, extremes.gap)
-    note = "the rows of a building have no slip velocities: no sliding regimes, velocities, heat and uplift of surfaces"
-    found = _whole(name, status, kind, path, load, cycles, demands, dissipated, extremes)
-    return replace(found, notes=(*found.notes, f"{note}; periods are with N at rest"))
 
 
 def _whole(
@@ -263,12 +263,12 @@ def _period(stiffness: float, load: float | None, gravity: float) -> float | Non
 
 def _envelope(cycles: Sequence[Cycle]) -> dict[str, Range]:
     """Quantity -> its range over the cycles in which it is defined."""
-    found = {}
+    ranges = {}
     for name in LOOP_QUANTITIES:
         values = [v for v in (loop_quantity(cycle, name) for cycle in cycles) if v is not None]
         if values:
-            found[name] = Range(min(values), float(np.mean(values)), max(values))
-    return found
+            ranges[name] = Range(min(values), float(np.mean(values)), max(values))
+    return ranges
 
 
 def loop_quantity(cycle: Cycle, name: str) -> float | None:

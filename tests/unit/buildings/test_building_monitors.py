@@ -9,7 +9,7 @@ import pytest
 from support.buildings import BEARING, LOAD, rocking
 
 from msfp_gen import Auto, Effects, RunError, simulate
-from msfp_gen.buildings import effects as selection
+from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.results.restart_state import RestartState
