@@ -19,8 +19,7 @@ from msfp_gen import Scene, load_scene, simulate
 from msfp_gen.analysis.transitions import RIMS, STOPS, stopping_displacement, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.result import Result
-from msfp_gen.studies.calibration.intervals import identified, spread_of, weak
-from msfp_gen.studies.calibration.noise import Noise
+from msfp_gen.studies.calibration.intervals import Noise, identified, spread_of, weak
 
 LOAD = 112e3  # axial load of the preset [N]
 SMALL = 1e-7  # change of a coefficient in which rows are linear

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
-    from msfp_gen.simulation.batch import simulate_batch
     from msfp_gen.simulation.run_any import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
+    from msfp_gen.studies.batch import simulate_batch
     from msfp_gen.studies.bounding import bound
     from msfp_gen.studies.calibration import Measurement, fit
     from msfp_gen.studies.study.run import study
@@ -73,7 +73,7 @@ _MODULES = {
     "load_scene": "buildings.load",
     "presets": "scene.file.presets",
     "simulate": "simulation.run_any",
-    "simulate_batch": "simulation.batch",
+    "simulate_batch": "studies.batch",
     "study": "studies.study.run",
 }
 

@@ -109,7 +109,7 @@ class Building:
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies on fixed attachments, ascending [Hz]; without damping."""
+        """Natural frequencies on fixed attachments, ascending, shape (modes,) [Hz]; without damping."""
         return self.fixed.frequencies / (2 * np.pi)
 
     @cached_property

@@ -64,7 +64,10 @@ def fixed_base(mass: Array, stiffness: Array, boundary: Sequence[int]) -> FixedB
 
 
 def modal_damping(mass: Array, fixed: FixedBase, ratios: Array) -> Array:
-    """C of damping ratios of the modes on fixed attachments, from the lowest; the last is that of all higher ones."""
+    """C of damping ratios of the modes on fixed attachments, ndarray, shape (n, n) [N s/m], [N m s].
+
+    ratios: from the lowest mode, shape (k,); the last is that of all higher ones.
+    """
     count = len(fixed.frequencies)
     each = np.concatenate([ratios, np.full(max(count - len(ratios), 0), ratios[-1])])[:count]
     inner = np.ix_(fixed.inner, fixed.inner)
@@ -76,7 +79,10 @@ def modal_damping(mass: Array, fixed: FixedBase, ratios: Array) -> Array:
 def rayleigh_damping(
     mass: Array, stiffness: Array, fixed: FixedBase, ratio: float, frequencies: tuple[float, float]
 ) -> Array:
-    """C = a M + b K of a damping ratio at two frequencies [Hz], with M of the motion relative to the attachments."""
+    """C = a M + b K, ndarray, shape (n, n) [N s/m], [N m s], of a damping ratio at two frequencies [Hz].
+
+    M is that of the motion relative to the attachments.
+    """
     low, high = (2 * np.pi * frequency for frequency in frequencies)
     a, b = 2 * ratio * low * high / (low + high), 2 * ratio / (low + high)
     rows = fixed.relative
@@ -91,7 +97,9 @@ Matrix = ArrayLike | str | PathLike[str]
 
 
 def matrix_of(source: Matrix, name: str) -> Array:
-    """A square symmetric matrix: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
+    """A square symmetric matrix, ndarray, shape (n, n).
+
+    source: an array, or a file of Matrix Market (.mtx) or of NumPy (.npz, the array `name`).
 
     Raises InputError that names `building.name`.
     """

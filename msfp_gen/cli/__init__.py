@@ -22,7 +22,7 @@ from msfp_gen.cli import (
     reporting,
     running,
     serving,
-    studying,
+    study_commands,
 )
 from msfp_gen.cli.console import fail, say
 from msfp_gen.cli.interrupts import signals_as_interrupts
@@ -42,7 +42,7 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    running, batching, studying, exporting, drawing, assessment_commands, fitting, benching, reporting, exploring,
+    running, batching, study_commands, exporting, drawing, assessment_commands, fitting, benching, reporting, exploring,
     records, building, serving, fmu_command, cache_command,
 ):  # fmt: skip
     app.add_typer(group.app)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
 from msfp_gen.cli.inputs import build, load_source, one_bearing, result_of
 from msfp_gen.errors import RunError
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from msfp_gen.studies.bounding import Bounds
 
 app = typer.Typer()
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
 
 
 @app.command(
@@ -46,13 +44,13 @@ def characterise(
     result, failure = result_of(loaded)
     if failure is not None:
         raise failure
-    found = result.characterise()
+    characterisation = result.characterise()
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(characterisation.as_dict(), indent=2, allow_nan=False))
     else:
-        show(characterisation_tables(found))
+        show(characterisation_tables(characterisation))
     if output is not None:
-        note(f"wrote {write_csv(found, output)}")
+        note(f"wrote {write_csv(characterisation, output)}")
 
 
 @app.command(
@@ -75,24 +73,24 @@ def bound(
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors
-    from msfp_gen.studies.bounding.tables import bounding_tables
+    from msfp_gen.studies.bounding.output import bounding_tables
 
     chosen, table = load_scene(scene), load_factors(factors)
     bounded_scenes(chosen, table)  # refuses a table that does not fit the bearing before anything is written
     if output is not None:
         make_folder(output, "--output")
     build(chosen)
-    with ExitStack() as stack:
-        found = run_bounds(chosen, table, progress=lambda case: stack.enter_context(Progress(case)))
+    with Progress("3 cases") as progress:
+        bounds = run_bounds(chosen, table, progress=progress)
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(bounds.as_dict(), indent=2, allow_nan=False))
     else:
-        show(bounding_tables(found))
-    written = _save(found, output) if output is not None else []
+        show(bounding_tables(bounds))
+    written = _save(bounds, output) if output is not None else []
     for path in written:
         note(f"wrote {path}")
-    if not found.succeeded:
-        failed = "; ".join(f"{case.name}: {case.failure}" for case in found.cases if case.failure)
+    if not bounds.succeeded:
+        failed = "; ".join(f"{case.name}: {case.failure}" for case in bounds.cases if case.failure)
         raise RunError(f"not all cases could be run; {failed}", status="bound")
 
 
@@ -110,11 +108,10 @@ def factors(
         say(factor_text(name).rstrip("\n"))
 
 
-def _save(found: Bounds, folder: Path) -> list[Path]:
+def _save(bounds: Bounds, folder: Path) -> list[Path]:
     """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
-    from msfp_gen.studies.bounding.figure import plot_bounds
-    from msfp_gen.studies.bounding.tables import write_quantities
+    from msfp_gen.studies.bounding.output import plot_bounds, write_quantities
 
-    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in found.cases if case.result is not None]
-    plot_bounds(found, folder / "bounds.png")
-    return [*written, write_quantities(found, folder / "bounds.csv"), folder / "bounds.png"]
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases]
+    plot_bounds(bounds, folder / "bounds.png")
+    return [*written, write_quantities(bounds, folder / "bounds.csv"), folder / "bounds.png"]

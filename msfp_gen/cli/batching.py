@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, say, scenes, show, whole_number
+from msfp_gen.cli.console import Progress, Workers, note, say, scenes, show
 from msfp_gen.common.output import check_output, make_folder
+from msfp_gen.common.tables import TABLE_SUFFIXES
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.sweep import Row
-    from msfp_gen.studies.sweep.variations import Variation
+    from msfp_gen.studies.sweep import Row, Variation
 
 app = typer.Typer()
 LONGEST = 80  # characters of the name of a file, without its number
@@ -50,18 +50,15 @@ def batch(
         Path | None,
         typer.Option(metavar="FILE", help="Write one row for each run, varied fields included: .csv or .parquet."),
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
-    ] = None,
+    workers: Workers = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print summaries and varied fields as JSON, and nothing else.")
     ] = False,
 ) -> None:
     """Simulate many scenes, or one with fields varied, on all cores. Ctrl-C keeps the runs that have ended."""
     from msfp_gen.scene.file.suite import load_suite
-    from msfp_gen.studies.sweep import TABLE_SUFFIXES
-    from msfp_gen.studies.sweep.variations import variations, varied_field
+    from msfp_gen.studies.batch import ENDED
+    from msfp_gen.studies.sweep import variations, varied_field
 
     if table is not None:
         check_output(table, TABLE_SUFFIXES, "--table")
@@ -72,14 +69,15 @@ def batch(
     rows: list[Row] = []
     with _reported(rows, len(chosen), table, as_json):
         _run(chosen, workers, output, rows)
-    if failed := [row.summary for row in sorted(rows) if row.summary["status"] not in ("ok", "stopped")]:
+    if failed := [row.summary for row in sorted(rows) if row.summary["status"] not in ENDED]:
         first = f"{failed[0]['name']}: {failed[0]['message']}"
         raise RunError(f"{len(failed)} of {len(rows)} runs did not reach their end; the first: {first}")
 
 
 def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, rows: list[Row]) -> None:
     """Run all scenes; each run is written, and its row appended to `rows`, as it ends."""
-    from msfp_gen.studies.sweep import completed_runs, row_of
+    from msfp_gen.studies.batch import completed_runs
+    from msfp_gen.studies.sweep import row_of
 
     started = completed_runs([variation.scene for variation in chosen], workers)
     if folder is not None:

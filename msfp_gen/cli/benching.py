@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, note, number, parser_of, say, show
+from msfp_gen.cli.console import SceneName, note, number, numbers, say, show
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -23,12 +23,6 @@ bench = typer.Typer(
     "  msfp-gen bench model-error fenz-test2 -o study",
 )
 app.add_typer(bench, name="bench")
-
-
-def _numbers(text: str | None, default: Sequence[float]) -> Sequence[float]:
-    """Numbers of a list separated by commas; `default` if there is no text."""
-    parse = parser_of(lambda given: [float(part) for part in given.split(",")], "list of numbers")
-    return default if text is None else parse(text)
 
 
 Tolerances = Annotated[
@@ -73,7 +67,7 @@ def work_precision(
         lambda chosen: study(
             chosen,
             methods=methods.split(",") if methods else None,
-            tolerances=_numbers(tolerances, TOLERANCES),
+            tolerances=TOLERANCES if tolerances is None else numbers(tolerances),
             limit=limit,
             say=note,
         ),
@@ -101,7 +95,9 @@ def model_error(
         duration,
         output,
         as_json,
-        lambda chosen: model_errors(chosen, tolerances=_numbers(tolerances, TOLERANCES), limit=limit, say=note),
+        lambda chosen: model_errors(
+            chosen, tolerances=TOLERANCES if tolerances is None else numbers(tolerances), limit=limit, say=note
+        ),
     )
 
 
@@ -118,11 +114,11 @@ def _report(
         scene = replace(scene, duration=duration)
     if folder is not None:
         make_folder(folder, "--output")
-    found = study(scene)
+    result = study(scene)
     if as_json:
-        say(json.dumps(as_dict(found), indent=2, allow_nan=False))
+        say(json.dumps(as_dict(result), indent=2, allow_nan=False))
     else:
-        show(tables(found))
-    written: Sequence[Path] = write(found, folder) if folder is not None else ()
+        show(tables(result))
+    written: Sequence[Path] = write(result, folder) if folder is not None else ()
     for path in written:
         note(f"wrote {path}")

@@ -74,6 +74,12 @@ def _option(name: str, rule: Rule) -> Any:
 
 
 whole_number, number = parser_of(int, "whole number"), parser_of(float, "number")
+numbers = parser_of(lambda text: tuple(map(float, text.split(","))), "list of numbers")
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(parser=whole_number, metavar="NUMBER", help="Runs at the same time; default: one for each core."),
+]
 Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write every row: .nc (netCDF-4), .csv, .parquet or .mat."),

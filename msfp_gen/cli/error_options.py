@@ -71,7 +71,7 @@ class ErrorTarget:
     def simulate(self, scene: Scene) -> Within:
         """Run the scene to the requested error."""
         from msfp_gen.studies.accuracy import simulate_within
-        from msfp_gen.studies.accuracy.effects import with_all_effects
+        from msfp_gen.studies.accuracy.error_target import with_all_effects
 
         for each in (scene, with_all_effects(scene)):  # of the run, and of its reference run
             build(each)

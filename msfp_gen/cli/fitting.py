@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
 from msfp_gen.cli.inputs import build
 from msfp_gen.errors import InputError
 
@@ -57,7 +57,7 @@ def fit(
         Path | None,
         typer.Option(metavar="FILE.html", help="Write a page with values, limits, loops and residuals; no network."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, every number in SI, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Fit friction and other values of a scene to laboratory tests, with 95 % intervals.
 
@@ -66,9 +66,8 @@ def fit(
     from msfp_gen.buildings.load import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
-    from msfp_gen.studies.calibration import fit as run_fit
-    from msfp_gen.studies.calibration.fitting import start_fit
-    from msfp_gen.studies.calibration.tables import fit_tables
+    from msfp_gen.studies.calibration.fit_result import fit_tables
+    from msfp_gen.studies.calibration.fitting import end_fit, start_fit
 
     if report is not None:
         check_output(report, REPORT_SUFFIXES, "--report")
@@ -76,7 +75,7 @@ def fit(
     read = _measurements(tests, column or (), axial_load, weights)
     paths = [path for text in parameters for path in text.split(",")]
     limits = dict(_limits(text) for text in bounds or ())
-    prepared = start_fit(chosen, read, paths, limits)  # refuses bad input before anything is built or written
+    prepared = start_fit(chosen, read, paths, limits, offset)  # refuses bad input before anything is built or written
     if output is not None:
         make_folder(output, "--output")
     for each in prepared.scenes:
@@ -90,15 +89,14 @@ def fit(
             line.name = f"evaluation {count}" + (f", deviation {deviation:.4g} N" if deviation == deviation else "")
             update(share, 1.0)
 
-        found = run_fit(
-            chosen, read, paths, bounds=limits, offset=offset, progress=None if update is None else show_evaluation
-        )
+        prepared.progress = None if update is None else show_evaluation
+        result = end_fit(chosen, prepared)
     if as_json:
-        say(json.dumps(found.as_dict(), indent=2, allow_nan=False))
+        say(json.dumps(result.as_dict(), indent=2, allow_nan=False))
     else:
-        show(fit_tables(found))
-    written = [] if output is None else found.save(output)
-    for path in [*written, *([] if report is None else [write_fit_report(found, report)])]:
+        show(fit_tables(result))
+    written = [] if output is None else result.save(output)
+    for path in [*written, *([] if report is None else [write_fit_report(result, report)])]:
         note(f"wrote {path}")
 
 
@@ -115,11 +113,11 @@ def _measurements(
             raise InputError(f"--column = {text!r}: give the column and its header: force=Load cell [kN]")
         names[name.strip()] = header.strip()
     read = [read_measurement(path, names) for path in paths]
-    given = {
+    options = {
         "axial_load": _numbers("--axial-load", loads, len(read)),
         "weight": _numbers("--weights", weights, len(read)),
     }
-    for name, values in given.items():
+    for name, values in options.items():
         if values is not None:
             read = [replace(test, **{name: value}) for test, value in zip(read, values, strict=True)]  # type: ignore[arg-type]
     return read

@@ -1,13 +1,20 @@
-"""Tables of text, independent of their output: aligned plain text for pipes and logs, or a formatted terminal table."""
+"""Tables: of text, as aligned plain text or formatted for a terminal; and of columns of values, as CSV or Parquet."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import csv
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.common.output import check_output, write_bytes
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
+
+TABLE_SUFFIXES = (".csv", ".parquet")
 
 
 @dataclass(frozen=True)
@@ -64,3 +71,63 @@ def yes(value: object) -> str:
 def vector(values: Iterable[float], scale: float = 1.0) -> str:
     """Components of a vector, each times `scale`, with four significant digits and separated by commas."""
     return ", ".join(f"{value * scale:.4g}" for value in values)
+
+
+def write_columns(path: str | Path, columns: Mapping[tuple[str, str], Sequence[Any]], name: str = "output") -> Path:
+    """Write a table of columns as CSV or Parquet, by the suffix; completely or not at all.
+
+    columns: (name, unit) -> values, None where there is none. Names carry units in CSV (`peak_displacement [m]`); in
+    Parquet units are metadata of the columns. name: of the option in messages. Raises InputError for an invalid path.
+    """
+    target = check_output(path, TABLE_SUFFIXES, name)
+    content = _csv(columns) if target.suffix.lower() == ".csv" else parquet_bytes(columns)
+    write_bytes(target, [content])
+    return target
+
+
+def write_rows(path: str | Path, rows: Sequence[Mapping[str, Any]], name: str = "output") -> Path:
+    """Write rows of names and values as `write_columns` does, without units; a row may lack values."""
+    names = dict.fromkeys(key for row in rows for key in row)
+    return write_columns(path, {(key, ""): [row.get(key) for row in rows] for key in names}, name)
+
+
+def _csv(columns: Mapping[tuple[str, str], Sequence[Any]]) -> bytes:
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in columns])
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue().encode()
+
+
+def parquet_bytes(
+    columns: Mapping[tuple[str, str], Sequence[Any]],
+    types: Mapping[str, str] | None = None,
+    about: Mapping[str, str] | None = None,
+) -> bytes:
+    """The content of a Parquet file, with checksums of its pages.
+
+    columns: as of `write_columns`. types: name -> type in the words of Arrow; None: from the values. about: metadata of
+    the file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    arrays = [
+        pa.array(_one_type(values)) if types is None else pa.array(values, types[name])
+        for (name, _), values in columns.items()
+    ]
+    fields = [
+        pa.field(name, array.type, metadata={"units": unit})
+        for (name, unit), array in zip(columns, arrays, strict=True)
+    ]
+    content = BytesIO()
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=about)), content, write_page_checksum=True)
+    return content.getvalue()
+
+
+def _one_type(values: Sequence[Any]) -> list[Any]:
+    """Values of one type for a column: numbers stay numbers; where texts occur, all are texts."""
+    kinds = {type(value) for value in values if value is not None}
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    return list(values) if len(kinds) <= 1 else [None if value is None else str(value) for value in values]

@@ -92,7 +92,7 @@ class ServedBearing:
         self._pending = False  # a trial is given and not yet integrated
 
     def answer(self, message: Array) -> Array | None:
-        """The numbers that answer a message; None where the client expects no answer."""
+        """The numbers that answer a message, shape (k,); None where the client expects no answer."""
         action = Action(int(message[0]))
         if action is Action.SET_TRIAL:
             self._set_trial(message[1:])

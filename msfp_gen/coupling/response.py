@@ -18,10 +18,13 @@ class Source(Protocol):
     """The two-port of a trial."""
 
     def unpacked(self, row: Array) -> dict[str, Array]:
-        """The values of a row by their names."""
+        """The values of a row, shape (row size,), by their names; shapes and units of `History`, without time."""
 
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
-        """Derivatives of the wrenches of trial `number` along displacements, rates and accelerations of the ends."""
+        """Derivatives of the wrenches of trial `number`, ndarray, shape (12, 12) [N/m], [N/rad], [N m/m], [N m/rad].
+
+        direction: factors of displacements, rates and accelerations of the ends.
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -173,11 +173,11 @@ class TwoPort:
         self.revert()
 
     def unpacked(self, row: Array) -> dict[str, Array]:
-        """The values of a row by their names, for `Response`."""
+        """The values of a row by their names, shapes and units as of `Model.unpack`, for `Response`."""
         return self.model.unpack(row)
 
     def derivative(self, number: int, word: str, direction: tuple[float, float, float]) -> Array:
-        """Derivatives of the wrenches of trial `number`, for its `Response`; word: what they are called there."""
+        """Derivatives of the wrenches of trial `number`, shape (12, 12), for its `Response`; word: their name there."""
         if number != self._number or self._trial is None:
             raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
         if self._trial[0] == self.time:

@@ -126,12 +126,12 @@ def subscript(number: int) -> str:
 
 
 def displacement(values: ArrayLike) -> Array:
-    """Displacement across the bearing [m], as a result holds it, in mm and in the sign of the figures."""
+    """Displacement across the bearing [m], as a result holds it, in mm and in the sign of the figures; same shape."""
     return shown_sign().factor * MILLI * np.asarray(values)
 
 
 def force(values: ArrayLike, scale: Scale) -> Array:
-    """Force on the top [N], as a result holds it, in the unit of `scale` and in the sign of the figures."""
+    """Force on the top [N], as a result holds it, in the unit of `scale` and the sign of the figures; same shape."""
     return shown_sign().factor * scale.factor * np.asarray(values)
 
 

@@ -13,6 +13,9 @@ EventRow = tuple[float, int, int, tuple[float, ...], tuple[float, ...]]
 class Stack(Protocol):
     """One bearing with its top. Arrays are contiguous float64 in SI units.
 
+    Shapes, with b = n - 1 bodies and c coordinates each, 3, or 6 with uplift: q, v, a (b, c); f and friction rates
+    (b, 2); base (3, 6); load (6,); row (row size,), of the fields of `specification.rows`; powers (works,); u unknowns.
+
     state: keywords `rise`, the temperature above its start value [K], for friction laws with temperature; and `foot`,
     height of the foot of a mass on a vertical spring and its rate [m], [m/s]; left out: at rest.
     """
@@ -20,7 +23,7 @@ class Stack(Protocol):
     def accelerations(
         self, q: Array, v: Array, f: Array, base: Array, load: Array, *, report: bool = False, **state: Array
     ) -> tuple[str, Array, Array, Array, float, int, int, Array | None]:
-        """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns."""
+        """Status, accelerations, row, friction rates, residual, iterations, sign of the determinant, unknowns, (u,)."""
 
     def observe(
         self, q: Array, v: Array, a: Array, f: Array, base: Array, load: Array, **state: Array
@@ -41,7 +44,7 @@ class Stack(Protocol):
         beta: float,
         **state: Array,
     ) -> tuple[str, Array, Array, Array]:
-        """Status, residual, tangent, and Y, Z of the condensed equations."""
+        """Status, residual, shape (b c,), tangent, (b c, b c), and Y, Z, (b, 2), of the condensed equations."""
 
     def report(
         self,
@@ -53,10 +56,13 @@ class Stack(Protocol):
         unknowns: Array,
         variables: Sequence[tuple[int, int, int]] = (),
     ) -> tuple[Array, Array, Array]:
-        """Residual of the balances (3.26)-(3.29), its Jacobian, and that of the friction rates."""
+        """Residual of the balances (3.26)-(3.29), (u,), its Jacobian, (u, k), and that of the friction rates, (2 b, k).
+
+        k: number of variables, u where none is given.
+        """
 
     def vectors(self, q: Array, v: Array, a: Array, base: Array) -> tuple[Array, Array, Array]:
-        """Named points, rotations and bases (3.1)-(3.12)."""
+        """Named points, rotations and bases (3.1)-(3.12), in shapes as of `evaluation.named_vectors`."""
 
 
 class AnyRun(Protocol):
@@ -95,7 +101,7 @@ class Run(AnyRun, Protocol):
 
     @property
     def extremes(self) -> Array:
-        """Extremes over all accepted steps, one number after the other."""
+        """Extremes over all accepted steps, one number after the other, shape (extremes size,)."""
 
     @property
     def dropped_rows(self) -> int:
@@ -151,7 +157,7 @@ class Port(Protocol):
 
     @property
     def row(self) -> Array:
-        """The row of that state."""
+        """The row of that state, shape (row size,)."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -161,7 +167,7 @@ class Port(Protocol):
         """Go from the committed state to `time`, with the ends at `ends`, shape (2, 3, 6); returns `status`."""
 
     def derivative(self, direction: Array) -> tuple[str, Array]:
-        """Status, and derivatives of the wrenches along displacements, rates and accelerations of the ends."""
+        """Status, and derivatives of the wrenches, shape (12, 12); direction: as of `Response`."""
 
     def commit(self) -> None:
         """Accept the last trial. Raises ValueError."""

@@ -95,7 +95,10 @@ def bodies_and_surfaces(bearing: Bearing, effects: Effects, top: Top | None = No
 
 
 def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
-    """Parameters of the top in contract order. anchor: horizontal position of the fixed end of its springs [m]."""
+    """Parameters of the top in contract order, ndarray, shape (values,), SI units.
+
+    anchor: horizontal position of the fixed end of its springs, shape (2,) [m].
+    """
     values = dict.fromkeys(contract.names(contract.TOP), 0.0)
     values["anchor_x"], values["anchor_y"] = np.asarray(anchor, dtype=float)
     given = {} if top is None else vars(top)
@@ -164,8 +167,9 @@ class Evaluation:
 def named_vectors(n: int, points: Array, rotations: Array, bases: Array) -> dict[str, Array]:
     """Vectors by their names in `Model.kinematics`, from the arrays of the extension.
 
-    points: of each body and named point position, velocity and acceleration. rotations: omega, omega', alpha, alpha'
-    of each body. bases: rows t_1, t_2, t_3 of each body.
+    Each is an ndarray, shape (3,) or (3, 3). points: of each body and named point position, velocity and acceleration
+    [m], [m/s], [m/s^2]. rotations: omega, omega', alpha, alpha' of each body [rad/s], [rad/s^2]. bases: rows t_1, t_2,
+    t_3 of each body.
     """
     out: dict[str, Array] = {}
     between = "" if n < 10 else "_"  # "11" would be both a point of body 1 and the centre of body 11

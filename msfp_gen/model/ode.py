@@ -35,7 +35,7 @@ class Equations(Protocol):
         """See `Model.stack`."""
 
     def unpack(self, rows: Array) -> dict[str, Array]:
-        """See `Model.unpack`."""
+        """See `Model.unpack`: rows, shape (..., row size), as arrays by name."""
 
 
 class Ode:
@@ -101,12 +101,15 @@ class Ode:
         return self.rates(t, y)[0]
 
     def rates(self, t: float, y: Array) -> tuple[Array, int]:
-        """The value of `fun`, and the number of Newton iterations."""
+        """The value of `fun`, shape (8(n-1),), and the number of Newton iterations."""
         a, _, rates, iterations = self._accelerations(t, y)
         return np.concatenate([self._split(np.asarray(y))[1].ravel(), a.ravel(), rates.ravel()]), iterations
 
     def observe(self, t: float, y: Array) -> dict[str, Array]:
-        """The row that a run would record of this state, as arrays by name. Raises RunError as `fun` does."""
+        """The row that a run would record of this state, as arrays by name; shapes of `History` less time.
+
+        Raises RunError as `fun` does.
+        """
         return self.model.unpack(self._accelerations(t, y)[1])
 
     def jac(self, t: float, y: Array) -> Array:

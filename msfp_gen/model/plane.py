@@ -34,7 +34,7 @@ class State:
 
 
 def rotated(vectors: Array, angle: float) -> Array:
-    """Components (..., 3) of vectors in a frame that is rotated by `angle` [rad] about E3."""
+    """Components, shape (..., 3), of vectors in a frame that is rotated by `angle` [rad] about E3."""
     c, s = cos(angle), sin(angle)
     one, two, three = np.moveaxis(vectors, -1, 0)
     # Component by component: the digits of a product of matrices depend on the number of vectors.
@@ -122,7 +122,7 @@ def into_plane(state: State) -> State:
 
 
 def rotated_pairs(pairs: Array, angle: float) -> Array:
-    """Components (..., 2) along t_1, t_2 in a frame that is rotated by `angle` [rad]."""
+    """Components, shape (..., 2), along t_1, t_2 in a frame that is rotated by `angle` [rad]."""
     if not angle:
         return pairs
     padded = np.concatenate([pairs, np.zeros((*pairs.shape[:-1], 1))], axis=-1)

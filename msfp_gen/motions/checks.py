@@ -64,12 +64,12 @@ def vector(field: str, values: ArrayLike, components: int = 3) -> Array:
 
 
 def finite(field: str, values: ArrayLike) -> Array:
-    """`values` as a contiguous array of floats of at least one dimension. Raises InputError as `numbers`."""
+    """`values` as a contiguous array of floats of their shape, (1,) for a number. Raises InputError as `numbers`."""
     return np.ascontiguousarray(numbers(field, values))
 
 
 def numbers(field: str, values: ArrayLike) -> Array:
-    """`values` as an array of floats. Raises InputError unless all are finite numbers."""
+    """`values` as an array of floats of their shape. Raises InputError unless all are finite numbers."""
     try:
         if values is None or np.iscomplexobj(values):
             raise TypeError

@@ -41,7 +41,10 @@ _DERIVATIVE_FACTORS = np.array(
 
 
 def powers(values: ArrayLike, count: int = ORDER) -> Array:
-    """Powers 0 to count - 1 along a new last axis, by products: the `**` of NumPy depends on the processor."""
+    """Powers 0 to count - 1 along a new last axis, shape (..., count).
+
+    By products: the `**` of NumPy depends on the processor.
+    """
     factors = np.repeat(np.asarray(values, dtype=float)[..., None], count, axis=-1)
     factors[..., 0] = 1.0
     found: Array = np.cumprod(factors, axis=-1)
@@ -123,7 +126,10 @@ def from_rates(knots: Array, velocity: Array, acceleration: Array) -> Array:
 
 
 def refined(knots: Array, coefficients: Array, new_knots: Array) -> Array:
-    """Coefficients of the same function on `new_knots`, a superset of `knots`: its Taylor expansion at each of them."""
+    """Coefficients of the same function on `new_knots`, a superset of `knots`: its Taylor expansion at each of them.
+
+    Shapes: knots (k+1,) [s], coefficients (k, channels, 6).
+    """
     taylor = [evaluate(knots, coefficients, new_knots[:-1], d) / factorial(d) for d in range(ORDER)]
     return np.stack(taylor, axis=-1)
 

@@ -123,7 +123,7 @@ class TimeGrid:
 
 
 def distinct_times(times: Array) -> Array:
-    """Times [s] in increasing order; of times that are equal to `TIME_TOLERANCE` only the first."""
+    """Times, shape (k,) [s], in increasing order; of times that are equal to `TIME_TOLERANCE` only the first."""
     ordered: Array = np.unique(times)
     distinct = np.append(True, np.diff(ordered) > TIME_TOLERANCE * np.maximum(1.0, ordered[1:]))
     found: Array = ordered[distinct[: len(ordered)]]
@@ -131,12 +131,15 @@ def distinct_times(times: Array) -> Array:
 
 
 def short_pieces(knots: Array) -> Array:
-    """Starts [s] of the pieces that are shorter than any step: what changes in them is a jump for a run."""
+    """Starts, shape (k,) [s], of the pieces shorter than any step: what changes in them is a jump for a run."""
     return knots[:-1][np.diff(knots) <= TIME_TOLERANCE * np.maximum(1.0, knots[1:])]
 
 
 def matched(values: Array, times: Array) -> Array:
-    """Times [s], each replaced by the element of the increasing `times` that equals it to `TIME_TOLERANCE`, if any."""
+    """Times, shape (k,) [s], each replaced by the element of the increasing `times` that equals it, if any.
+
+    Equal: to `TIME_TOLERANCE`.
+    """
     if not len(times):
         return values
     after = np.minimum(np.searchsorted(times, values), len(times) - 1)
@@ -147,7 +150,10 @@ def matched(values: Array, times: Array) -> Array:
 
 
 def snapped(knots: Array, coefficients: Array, times: Array) -> tuple[Array, Array]:
-    """Knots [s] matched to `times`, and coefficients; without the pieces of which both ends become equal."""
+    """Knots, shape (k+1,) [s], matched to `times`, and coefficients, (k, channels, 6).
+
+    Without the pieces of which both ends become equal.
+    """
     moved = matched(knots, times)
     kept = np.diff(moved) > 0
     return np.append(moved[:-1][kept], moved[-1]), np.ascontiguousarray(coefficients[kept])

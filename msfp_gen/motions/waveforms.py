@@ -46,7 +46,7 @@ def product(first: Wave, second: Wave) -> Wave:
 
 
 def wave_knots(rise: float, duration: float, shortest_period: float) -> Array:
-    """Knots [s] for quintic pieces that approximate an enveloped sine to 1e-9 of its amplitude.
+    """Knots, shape (k+1,) [s], for quintic pieces that approximate an enveloped sine to 1e-9 of its amplitude.
 
     There are 128 in a period and at least 128 in the rise, whose end is a knot.
 

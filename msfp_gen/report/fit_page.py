@@ -11,8 +11,8 @@ from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.tables import Table
 from msfp_gen.report.content import KILO, MILLI
 from msfp_gen.report.template import picture, render
+from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
-from msfp_gen.studies.calibration.tables import correlation_table, estimate_table, residual_table
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ TERMS = (
 )  # fmt: skip
 
 
-def write_fit_report(found: Fit, path: str | Path) -> Path:
+def write_fit_report(fit: Fit, path: str | Path) -> Path:
     """Write the page of a fit to `path`; the file appears only when complete, and loads no other file.
 
     Raises InputError for a path that does not end in .html or cannot be written.
@@ -47,49 +47,49 @@ def write_fit_report(found: Fit, path: str | Path) -> Path:
     from msfp_gen.report.page import REPORT_SUFFIXES
 
     path = check_output(path, REPORT_SUFFIXES)
-    write_bytes(path, [fit_html(found).encode()])
+    write_bytes(path, [fit_html(fit).encode()])
     return path
 
 
-def fit_html(found: Fit) -> str:
+def fit_html(fit: Fit) -> str:
     """The page of a fit as text."""
     from msfp_gen.scene.explain import explain
     from msfp_gen.scene.file.loader import scene_text
     from msfp_gen.studies.calibration.figure import plot_fit, plot_residuals
 
-    limits = {"What the tests do not tell": found.unidentified, "Notes": found.notes}
+    limits = {"What the tests do not tell": fit.unidentified, "Notes": fit.notes}
     return render(
         "fit.html.jinja",
-        name=f"{found.scene.name or 'unnamed scene'}: calibration to tests",
+        name=f"{fit.scene.name or 'unnamed scene'}: calibration to tests",
         kind="fit",
-        lead=_lead(found),
-        values=_values(found),
+        lead=_lead(fit),
+        values=_values(fit),
         limits=[(title, lines) for title, lines in limits.items() if lines],
-        correlation=correlation_table(found) if len(found.estimates) > 1 else None,
-        tests=_tests(found),
+        correlation=correlation_table(fit) if len(fit.estimates) > 1 else None,
+        tests=_tests(fit),
         figures=[
-            picture("Measured and fitted loops, and residuals over time", plot_fit(found.tests)),
-            picture("Where the residuals lie", plot_residuals(found.tests)),
+            picture("Measured and fitted loops, and residuals over time", plot_fit(fit.tests)),
+            picture("Where the residuals lie", plot_residuals(fit.tests)),
         ],
-        settings=explain(found.scene),
-        scene=scene_text(found.scene),
-        provenance=_provenance(found),
+        settings=explain(fit.scene),
+        scene=scene_text(fit.scene),
+        provenance=_provenance(fit),
         terms=TERMS,
     )
 
 
-def _lead(found: Fit) -> str:
+def _lead(fit: Fit) -> str:
     """What was fitted to what, in one sentence."""
     rows, offsets = (
-        sum(len(test.force) for test in found.tests),
-        sum(not np.isfinite(e.bounds[1]) for e in found.estimates),
+        sum(len(test.force) for test in fit.tests),
+        sum(not np.isfinite(e.bounds[1]) for e in fit.estimates),
     )
-    values = _count(len(found.estimates) - offsets, "value")
+    values = _count(len(fit.estimates) - offsets, "value")
     shifts = f" and {_count(offsets, 'offset')} of force" if offsets else ""
     return (
         f"{values} of the scene{shifts} fitted to "
-        f"{_count(len(found.tests), 'laboratory test')} of {_count(rows, 'row')}, by least squares of the force with "
-        f"exact derivatives, in {_count(found.evaluations, 'evaluation')}, by msfp-gen {__version__}."
+        f"{_count(len(fit.tests), 'laboratory test')} of {_count(rows, 'row')}, by least squares of the force with "
+        f"exact derivatives, in {_count(fit.evaluations, 'evaluation')}, by msfp-gen {__version__}."
     )
 
 
@@ -97,10 +97,10 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _values(found: Fit) -> Table:
+def _values(fit: Fit) -> Table:
     """The table of estimates with the change from the start and the bounds."""
-    table = estimate_table(found)
-    pairs = zip(table.rows, found.estimates, strict=True)
+    table = estimate_table(fit)
+    pairs = zip(table.rows, fit.estimates, strict=True)
     rows = [(*row, _run_error(each), _change(each), _bounds(each)) for row, each in pairs]
     return Table(table.title, (*table.columns, "error of the runs", "change", "bounds"), rows)
 
@@ -117,35 +117,35 @@ def _bounds(estimate: Estimate) -> str:
     return "{:.4g} to {:.4g}".format(*estimate.bounds) if np.isfinite(estimate.bounds).all() else "none"
 
 
-def _tests(found: Fit) -> Table:
+def _tests(fit: Fit) -> Table:
     """The table of deviations with what was tested."""
-    table = residual_table(found)
+    table = residual_table(fit)
     rows = [
         (
             *row,
             f"{np.abs(test.measured.displacement).max() * MILLI:.4g}",
             f"{np.abs(test.measured.force).max() * KILO:.4g}",
-            _load(found, test),
+            _load(fit, test),
             f"{test.measured.weight:g}",
             f"{lag_one([test.residual]):.2f}",
         )
-        for row, test in zip(table.rows, found.tests, strict=True)
+        for row, test in zip(table.rows, fit.tests, strict=True)
     ]
     more = ("largest u [mm]", "largest force [kN]", "axial load [kN]", "weight", "correlation of consecutive residuals")
     return Table(table.title, (*table.columns, *more), rows)
 
 
-def _load(found: Fit, test: FittedTest) -> str:
+def _load(fit: Fit, test: FittedTest) -> str:
     """Axial load of a test, or that of the scene [kN]."""
     load = test.measured.axial_load
-    return f"{(found.scene.top.axial_load if load is None else load) * KILO:.5g}"  # type: ignore[attr-defined]
+    return f"{(fit.scene.top.axial_load if load is None else load) * KILO:.5g}"  # type: ignore[attr-defined]
 
 
-def _provenance(found: Fit) -> Table:
+def _provenance(fit: Fit) -> Table:
     """Versions and methods."""
     import scipy
 
-    solver = found.scene.solver
+    solver = fit.scene.solver
     rows = [
         ("msfp gen", __version__),
         ("numpy", np.__version__),
@@ -153,6 +153,6 @@ def _provenance(found: Fit) -> Table:
         ("optimiser", 'scipy.optimize.least_squares, method "trf", exact Jacobian'),
         ("intervals", "Laplace with autocorrelated noise of each test, Student's t, and the error of the runs"),
         ("method of the runs", solver.method),
-        ("rtol of the runs", f"{solver.rtol:g} in the search, {found.rtol:g} at its end"),
+        ("rtol of the runs", f"{solver.rtol:g} in the search, {fit.rtol:g} at its end"),
     ]
     return Table("versions and methods", (), rows)

@@ -73,6 +73,8 @@ class RestartState:
 def transferred_state(bearing: Bearing, top: Top, model: Model, at: RestartState) -> tuple[Array, Array, Array]:
     """The state q, v, f of the earlier model for the next one (docs/effects.md).
 
+    Shapes (n-1, 3), (n-1, 3), or 6 in place of 3 with separations, and (n-1, 2) [rad], [m], [rad/s], [m/s].
+
     Angles, rates and friction states describe the same stack. Where the earlier model had no separations, they follow
     from the interface forces without those of the rims: the unilateral contacts are compressed by them.
     """
@@ -107,7 +109,7 @@ def _is_oblique(azimuth: float) -> bool:
 def transferred_heights(
     bearing: Bearing, top: Top, model: Model, at: RestartState, added_load: float = 0.0
 ) -> tuple[Array, Array]:
-    """Origin and foot of the earlier model for the next one: see `RestartState`.
+    """Origin, shape (3,) [m], and foot, shape (2,) [m], [m/s], of the earlier model for the next: see `RestartState`.
 
     Separations that the earlier model did not have lower the top plate at rest and change the length of a spring below
     a mass, whose compliance they take over: the next model goes on as if it had been there from the start. added_load:

@@ -24,7 +24,10 @@ MARGIN = 2.0  # of the stiffness over what the load at rest needs, below which t
 
 
 def links(bearing: Bearing) -> Array:
-    """Height of the upper sphere centre of bodies 2..n above the lower one; of the top plate: of r_nn, (n-1,) [m]."""
+    """Height of the upper sphere centre of bodies 2..n above the lower one; of the top plate: of r_nn.
+
+    ndarray, shape (n-1,) [m].
+    """
     centres = np.array([sign * s.radius for sign, s in zip(bearing.layout.signs, bearing.surfaces, strict=True)])
     heights = np.array([body.height for body in bearing.bodies])
     lengths: Array = heights + np.append(centres[1:], 0.0) - centres

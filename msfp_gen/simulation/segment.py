@@ -140,7 +140,7 @@ def start_run(
 
 
 def start_temperatures(segments: Sequence[Segment], scene: Scene) -> dict[str, Array]:
-    """The temperature of every surface at the start [degC] as "temperature"; nothing if the last model has none.
+    """The temperature of every surface at the start as "temperature", shape (n-1,) [degC]; nothing without one.
 
     It is that of the rows of earlier models without heat, and of the friction law in them.
     """
@@ -152,7 +152,10 @@ def start_temperatures(segments: Sequence[Segment], scene: Scene) -> dict[str, A
 
 
 def wrench_pieces(scene: Scene) -> tuple[Array, Array]:
-    """Knots and polynomials of force and moment on the top plate: those of the top and of the load history."""
+    """Knots, shape (k+1,) [s], and polynomials, (k, 6, 6), of force and moment on the top plate [N], [N m].
+
+    Those of the top and of the load history.
+    """
     knots, pieces = np.array([0.0, max(scene.end, 1.0)]), np.zeros((1, 6, ORDER))
     if scene.load is not None:
         load = scene.load.until(scene.end)
@@ -201,7 +204,10 @@ def _first_load(scene: Scene) -> float:
 
 
 def state_in_plane(q: Array, v: Array, f: Array, azimuth: float) -> tuple[Array, Array, Array]:
-    """An initial state in the frame of a planar model; raises InputError where it leaves the plane."""
+    """An initial state, shapes (n-1, 3), (n-1, 3), (n-1, 2) [rad], [rad/s], [1], in the frame of a planar model.
+
+    Raises InputError where it leaves the plane.
+    """
     q, v = (tilts_into_plane(x, azimuth, f"initial_state.{name}") for x, name in ((q, "q"), (v, "v")))
     f = np.ascontiguousarray(rotated_pairs(f, azimuth))
     if np.any(np.abs(f[:, 1]) > 1e-12):

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from msfp_gen.studies.assessment.pareto import Goals, pareto
     from msfp_gen.studies.assessment.rows import read_study
     from msfp_gen.studies.assessment.sensitivity import sobol, tornado
+    from msfp_gen.studies.study.chunks import Status, study_status
     from msfp_gen.studies.study.loader import load_study
     from msfp_gen.studies.study.run import Outcome
-    from msfp_gen.studies.study.status import Status, study_status
 
 # Public name -> the module that defines it.
 _MODULES = {
@@ -38,9 +38,9 @@ _MODULES = {
     "plot_pareto": "assessment.figures",
     "plot_sobol": "assessment.figures",
     "plot_tornado": "assessment.figures",
-    "Status": "study.status",
+    "Status": "study.chunks",
     "load_study": "study.loader",
-    "study_status": "study.status",
+    "study_status": "study.chunks",
 }
 
 __all__ = [

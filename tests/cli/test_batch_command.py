@@ -24,8 +24,8 @@ from msfp_gen.cli import main
 from msfp_gen.cli.interrupts import signals_as_interrupts
 from msfp_gen.motions import records
 from msfp_gen.result import Result
-from msfp_gen.studies.sweep import completed_runs, row_of, sweep_table, write_table
-from msfp_gen.studies.sweep.variations import variations, varied_field
+from msfp_gen.studies.batch import completed_runs
+from msfp_gen.studies.sweep import row_of, sweep_table, variations, varied_field, write_table
 
 
 def test_runs_and_table_are_written(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

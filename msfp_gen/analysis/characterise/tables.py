@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator
 from math import atan2, degrees
 from pathlib import Path
@@ -10,8 +9,8 @@ from pathlib import Path
 from msfp_gen.analysis.characterise.report import LOOP_QUANTITIES, Characterisation, Cycle, loop_quantity
 from msfp_gen.analysis.characterise.stages import Branch
 from msfp_gen.analysis.characterise.surfaces import SurfaceDemand
-from msfp_gen.common.output import check_output, replacing
-from msfp_gen.common.tables import Table
+from msfp_gen.common.output import check_output
+from msfp_gen.common.tables import Table, write_rows
 
 CSV_SUFFIXES = (".csv",)
 UNITS = {
@@ -59,14 +58,7 @@ def write_csv(found: Characterisation, path: str | Path) -> Path:
 
     The file appears only when complete. Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    path = check_output(path, CSV_SUFFIXES)
-    rows = csv_rows(found)
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, names, restval="")
-        writer.writeheader()
-        writer.writerows(rows)
-    return path
+    return write_rows(check_output(path, CSV_SUFFIXES), csv_rows(found))
 
 
 def csv_rows(found: Characterisation) -> list[Row]:

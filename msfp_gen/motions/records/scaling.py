@@ -76,7 +76,10 @@ class ScaleTo:
         return self.ratio(target, spectrum.psa[:, column])
 
     def ordinates(self) -> tuple[Array, Array]:
-        """Periods [s] at which a spectrum is compared with the target, and the target there [m/s^2]; not of a peak."""
+        """Periods at which a spectrum is compared with the target [s], and the target there [m/s^2], shape (p,) both.
+
+        Not of a peak acceleration.
+        """
         if self.between is None:
             return np.array([self.period], dtype=float), np.array([self.sa], dtype=float)
         periods = np.geomspace(*self.between, _FIT_POINTS)

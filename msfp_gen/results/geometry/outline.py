@@ -36,7 +36,7 @@ def outline(bearing: Bearing, body: int) -> Array:
 
 
 def slider_face(bearing: Bearing, surface: int) -> Array:
-    """Half meridian of the face of the slider of a surface (index from 0), with the coordinates of `outline`."""
+    """Half meridian of the face of the slider of a surface (index from 0), shape (k, 2) [m], as of `outline`."""
     body = bearing.slider(surface)
     face = _face(bearing, surface, body)
     if bearing.layout.signs[surface] > 0:

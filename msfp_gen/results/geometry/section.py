@@ -33,7 +33,7 @@ class Plane:
         return np.array([-np.sin(self.azimuth), np.cos(self.azimuth), 0.0])
 
     def project(self, points: Array) -> Array:
-        """Points (..., 3) seen along the normal: (..., 2), along the plane and up."""
+        """Points, shape (..., 3) [m], seen along the normal: shape (..., 2) [m], along the plane and up."""
         return np.stack([points @ self.along, points[..., 2]], axis=-1)
 
 

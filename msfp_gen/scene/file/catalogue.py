@@ -1,14 +1,15 @@
-"""The presets as plain tables, read from their TOML files; `presets` and `loader` convert them to objects."""
+"""The presets as plain tables, from TOML files, which `presets` and `loader` make objects of; checks of tables."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
+from msfp_gen.common.fields import Rule
 from msfp_gen.errors import InputError
 
 Table = dict[str, Any]
@@ -45,6 +46,22 @@ def suggestion(word: str, known: Mapping[str, Any] | list[str]) -> str:
     """`; did you mean 'x'?` where one of the known words is similar to `word`, else an empty text."""
     close = get_close_matches(word, list(known), n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def known_keys(table: Mapping[str, Any], keys: Iterable[str], where: str) -> None:
+    """Raise InputError for a key of a table, which lies at `where`, that is not one of `keys`."""
+    for key in table:
+        if key not in keys:
+            hint = suggestion(key, list(keys)) or f"; the keys here are {', '.join(keys)}"
+            raise InputError(f"{where}{key}: unknown key{hint}")
+
+
+def parsed(rule: Rule, value: object, path: str) -> Any:
+    """A value by a rule of `common.fields`. Raises InputError that names its path."""
+    try:
+        return rule.parse(value)
+    except ValueError as error:
+        raise InputError(f"{path} = {value!r}: {error}") from None
 
 
 def _find(kind: str, name: str) -> Table:

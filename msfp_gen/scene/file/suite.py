@@ -17,7 +17,6 @@ from msfp_gen.scene.file.motion_tables import RecordMotion, resolved
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.motions.records import ScaledSuite
-    from msfp_gen.scene.scene import Scene
 
 Table = dict[str, Any]
 
@@ -29,10 +28,6 @@ class SuiteRecord:
     name: str
     table: Table
     motion: Motion
-
-    def of(self, scene: Scene) -> Scene:
-        """`scene` with this motion. Raises InputError where it is shorter than the duration of the scene."""
-        return replace(scene, motion=self.motion, motion_table={"kind": RecordMotion.kind, **self.table})
 
 
 @dataclass(frozen=True)

@@ -2,30 +2,33 @@
 
 The error is estimated by a reference run of a method of another family, at a tenth of the tolerance, with steps of at
 most half the mean step, and where affordable with steps that resolve the ringing of stuck sliders. SAFETY covers
-the error of the reference run; docs/accuracy.md compares such estimates with true errors.
+the error of the reference run; docs/accuracy.md compares such estimates with true errors. Half of the error is left to
+effect selection, half to the method.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING, Any, Final, cast
 
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_selection import slider_period
+from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.simulation.simulate import Progress, simulate
-from msfp_gen.studies.accuracy.effects import effects_for, with_all_effects
-from msfp_gen.studies.accuracy.output import AFTER_IMPACTS, attempt_table, reason_table, ringing_left_out, within_table
+from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, Attempt, Trial, dopri5_cost, errors, largest_error, run_native
 
 if TYPE_CHECKING:
-    from msfp_gen.common.tables import Table
     from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
 
+AFTER_IMPACTS = ", and after impacts,"
 CANDIDATE_TOLERANCES = tuple(float(f"{10 ** (-k / 2):.1g}") for k in range(4, 21))  # 1e-2, 3e-3, 1e-3 ... 1e-10
 REFERENCE_OFFSET = 2  # places from a candidate tolerance to that of its reference run: a factor of ten
 REFERENCE_METHODS = {"implicit": "esdirk4", "esdirk4": "implicit"}  # other stages, order and dense output
@@ -36,6 +39,30 @@ DAMPED = 0.02  # damping ratio above which the ringing of stuck sliders decays a
 STAGNATION_RATIO = 0.7  # an estimate that falls by less than this over two candidates is not due to the tolerance
 BUDGET = 120.0  # [s] of wall time for the whole search
 METHOD: Final = "implicit"
+
+
+def effects_for(scene: Scene, error: float) -> tuple[Effects | Auto, str]:
+    """Effects for a run with relative error `error` [-], and the reasons in words.
+
+    Effects that the scene gives are kept. With effect selection (`Auto`), they are selected for half of `error`; the
+    other half is left to the method.
+    """
+    effects = scene.effects
+    if isinstance(effects, Effects):
+        return effects, f"effects as the scene has them: {effects.dimension}, {effects.sliders} sliders"
+    effects = replace(effects, error=min(effects.error, error / 2))
+    reasons = replace(scene, effects=effects).effect_selection.reasons
+    return effects, "; ".join(f"{reason.effect} = {reason.chosen}: {reason.because}" for reason in reasons)
+
+
+def with_all_effects(scene: Scene) -> Scene:
+    """The scene with every effect that it has parameters for and does not fix, to measure the error of a selection.
+
+    A scene whose effects are given (`Effects`) is returned unchanged.
+    """
+    if isinstance(scene.effects, Effects):
+        return scene
+    return replace(scene, effects=all_effects(scene))
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,10 +226,10 @@ class _Search:
 
     def _run(self, method: str, scene: Scene, tolerance: float) -> Trial:
         left = self.deadline - time.perf_counter()
-        found = run_native(method, scene, tolerance, max(left, 0.05), repeats=0)
-        if found.status == CUT_OFF:
+        trial = run_native(method, scene, tolerance, max(left, 0.05), repeats=0)
+        if trial.status == CUT_OFF:
             raise RunError(self._target_missed(), status="accuracy")
-        return found
+        return trial
 
     def loosest(self) -> int:
         """Index of the loosest tolerance that meets the target.
@@ -251,15 +278,15 @@ class _Search:
 
     def attempt(self, index: int) -> Attempt:
         """Cost and estimated error at a candidate tolerance, by its reference run or that of the looser neighbour."""
-        trial, found, estimate = self.trials[index], None, None
+        trial, differences, estimate = self.trials[index], None, None
         reference = next((self.references[k] for k in (index, index - 1) if k in self.references), None)
         if trial.finished and reference is not None and reference.finished:
-            found = errors(trial, reference)
-        if found is not None:
+            differences = errors(trial, reference)
+        if differences is not None:
             # The reference run of the looser neighbour has a third of the tolerance: more of its own error counts.
             factor = SAFETY if index in self.references else 2 * SAFETY
-            estimate = factor * largest_error(found)
-        return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, found, trial.status)
+            estimate = factor * largest_error(differences)
+        return Attempt(trial.method, trial.rtol, trial.seconds, trial.newton, estimate, differences, trial.status)
 
     def next_step(self, index: int) -> Attempt | None:
         """The next tighter tolerance, run if it has not been; None if there is no time for it."""
@@ -310,3 +337,79 @@ class _Search:
             f"an error of {self.target:g} was not reached{'' if failed else ' in the time given'}: {so_far}; "
             "give a larger error, a larger budget, or a tolerance (rtol) to run without an estimate"
         )
+
+
+def within_table(
+    target: float, chosen: Attempt, step: Attempt | None, seconds: float, left_out: str, known: bool
+) -> Table:
+    """Requested and estimated error, settings and cost, and the cost of the next tighter tolerance.
+
+    Args:
+        target: requested error [-].
+        chosen: the run.
+        step: the next tighter tolerance; None if it was not run.
+        seconds: wall time with the search [s].
+        left_out: what the estimate does not include.
+        known: whether what is left out is small enough for the estimate to be one of the true error.
+    """
+    estimate = f"{share(chosen.estimate)}: {_parts(chosen)}"
+    rows = [
+        ("requested error", share(target)),
+        ("estimated error of this run", estimate if known else f"not known; without what is left out {estimate}"),
+        *([("not in the estimate", left_out)] if left_out else []),
+        ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
+        (
+            "cost of this run",
+            f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(seconds)}",
+        ),
+        ("next tighter tolerance", _next(step, chosen)),
+    ]
+    return Table("accuracy, relative to peaks", (), rows)
+
+
+def ringing_left_out(frequency: float, impact: bool) -> str:
+    """What an estimate without the ringing of stuck sliders leaves out; frequency: of the slowest of them [Hz]."""
+    return (
+        f"the ringing of stuck sliders{AFTER_IMPACTS if impact else ''} at {frequency:.0f} Hz and above, which has no "
+        "damping and is filtered: resolved on purpose it moved the force of other scenes by up to 1 % "
+        "(docs/accuracy.md); give contact_damping"
+    )
+
+
+def attempt_table(attempts: Sequence[Attempt]) -> Table:
+    """Every run of the search."""
+    columns = ("rtol", "outcome", "time", "Newton iterations", "estimated error")
+    rows = [(f"{a.rtol:g}", a.status, _seconds(a.seconds), str(a.newton), share(a.estimate)) for a in attempts]
+    return Table("tolerances tried, each compared with a tighter one", columns, rows)
+
+
+def reason_table(reasons: Sequence[str]) -> Table:
+    """Why these settings were chosen."""
+    return Table("reasons", (), [("-", reason) for reason in reasons])
+
+
+def share(value: float | None) -> str:
+    """`value` as a percentage with two digits."""
+    return "not known" if value is None else f"{100 * value:.2g} %"
+
+
+def _parts(attempt: Attempt) -> str:
+    if attempt.errors is None:
+        return "not estimated"
+    differences = attempt.errors
+    return (
+        f"force {share(differences.force_rms)} RMS, {share(differences.force_peak)} at its peak; sliding "
+        f"{share(differences.sliding_rms)} RMS, {share(differences.sliding_peak)} at its peak"
+    )
+
+
+def _next(step: Attempt | None, chosen: Attempt) -> str:
+    if step is None:
+        return "not run in the time given"
+    smaller = (step.estimate or 1.0) < (chosen.estimate or 0.0)
+    error = f"about {share(step.estimate)}" if smaller else "no smaller estimate"
+    return f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
+
+
+def _seconds(value: float) -> str:
+    return f"{1e3 * value:.3g} ms" if value < 1 else f"{value:.3g} s"

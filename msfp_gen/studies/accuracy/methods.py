@@ -159,10 +159,10 @@ def _force_and_sliding(ode: Ode, times: Array, states: Array) -> tuple[Array, Ar
     force, sliding = np.zeros((len(states), 2)), np.zeros((len(states), ode.count))
     for row, (t, y) in enumerate(zip(times, states, strict=False)):
         try:
-            found = ode.observe(t, y)
+            observed = ode.observe(t, y)
         except RunError:
             return force[:row], sliding[:row]
-        force[row], sliding[row] = found["top_force"][:2], found["sliding"]
+        force[row], sliding[row] = observed["top_force"][:2], observed["sliding"]
     return force, sliding
 
 

@@ -138,15 +138,15 @@ def _integrate(ops: Any, scene: Scene, times: Array) -> tuple[int, Array]:
     ops.analyze(10)
     ops.loadConst("-time", 0.0)
     ops.wipeAnalysis()
-    found, rig = np.zeros((len(times), 2)), isinstance(scene.top, RigTop)
+    forces, rig = np.zeros((len(times), 2)), isinstance(scene.top, RigTop)
     (_static if rig else _dynamic)(ops, scene, times)
     # With a rig the top is moved instead of the base, so displacement and force change sign.
     sign, step = (1.0, ()) if rig else (-1.0, (float(times[1]),))
     for row in range(1, len(times)):
         if ops.analyze(1, *step):
-            return row - 1, found[:row]
-        found[row] = sign * np.array(ops.eleForce(ELEMENT))[6:8]  # at the upper node
-    return len(times) - 1, found
+            return row - 1, forces[:row]
+        forces[row] = sign * np.array(ops.eleForce(ELEMENT))[6:8]  # at the upper node
+    return len(times) - 1, forces
 
 
 def _padded(values: Array) -> list[float]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import platform
 import subprocess
-from collections.abc import Sequence
 from dataclasses import fields
 from math import isfinite, nan
 from pathlib import Path
@@ -15,20 +13,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.output import make_folder, replacing
-from msfp_gen.common.tables import Table
+from msfp_gen.common.output import make_folder, write_bytes
+from msfp_gen.common.tables import Table, write_rows
 from msfp_gen.errors import CompileError
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, ERRORS, REFUSED, Errors
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.studies.accuracy.study import Point, Study
-    from msfp_gen.studies.accuracy.timed_run import Attempt
+
+NAMES = tuple(field.name for field in fields(Errors))
+HEADS = (
+    "",
+    "tolerance",
+    "outcome",
+    "seconds",
+    "Newton iterations",
+    "force max",
+    "force RMS",
+    "sliding max",
+    "sliding RMS",
+)
 
 
 def machine() -> dict[str, str]:
     """Name -> text: processor, cores, system, compiler, versions, commit of a checkout; without unknown ones."""
-    found = {
+    about = {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
         "system": f"{platform.system()} {platform.machine()}",
@@ -38,7 +48,7 @@ def machine() -> dict[str, str]:
         "msfp_gen": __version__,
         "commit": _commit(),
     }
-    return {name: value for name, value in found.items() if value}
+    return {name: value for name, value in about.items() if value}
 
 
 def _compiler() -> str:
@@ -72,60 +82,29 @@ def _commit() -> str:
     return run.stdout.strip()
 
 
-NAMES = tuple(field.name for field in fields(Errors))
-COLUMNS = (
-    "series",
-    "method",
-    "rtol",
-    "status",
-    "seconds",
-    "expected_seconds",
-    "newton",
-    "evaluations",
-    "steps",
-    "reached",
-    *NAMES,
-    "wrong",
-    "message",
-)
-HEADS = (
-    "",
-    "tolerance",
-    "outcome",
-    "seconds",
-    "Newton iterations",
-    "force max",
-    "force RMS",
-    "sliding max",
-    "sliding RMS",
-)
-
-
 def rows(study: Study) -> list[dict[str, Any]]:
-    """One dict of plain values per point, keys as in `COLUMNS`; None where a value is not defined."""
+    """One dict of plain values per point; None where a value is not defined."""
     return [_row(point) for point in study.points]
 
 
 def _row(point: Point) -> dict[str, Any]:
     trial = point.trial
     known = {} if point.errors is None else point.errors.as_dict()
-    found = {name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES}
-    values = (
-        point.series,
-        trial.method,
-        trial.rtol,
-        trial.status,
-        trial.seconds,
-        trial.expected_seconds,
-        trial.newton,
-        trial.evaluations,
-        trial.steps,
-        trial.reached,
-        *found.values(),
-        point.wrong,
-        trial.message,
-    )
-    return dict(zip(COLUMNS, values, strict=True))
+    return {
+        "series": point.series,
+        "method": trial.method,
+        "rtol": trial.rtol,
+        "status": trial.status,
+        "seconds": trial.seconds,
+        "expected_seconds": trial.expected_seconds,
+        "newton": trial.newton,
+        "evaluations": trial.evaluations,
+        "steps": trial.steps,
+        "reached": trial.reached,
+        **{name: known[name] if isfinite(known.get(name, nan)) else None for name in NAMES},
+        "wrong": point.wrong,
+        "message": trial.message,
+    }
 
 
 def as_dict(study: Study) -> dict[str, Any]:
@@ -157,9 +136,9 @@ def _cells(point: Point) -> tuple[str, ...]:
     trial = point.trial
     expected = f"{trial.seconds:.3g}" if trial.status != CUT_OFF else f"(about {trial.expected_seconds:.2g})"
     known = {} if point.errors is None else point.errors.as_dict()
-    found = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
+    shown = [f"{known[name]:.1e}" if isfinite(known.get(name, nan)) else "-" for name in ERRORS]
     outcome = "WRONG SUCCESS" if point.wrong else trial.status
-    return point.series, trial.setting, outcome, expected, str(trial.newton), *found
+    return point.series, trial.setting, outcome, expected, str(trial.newton), *shown
 
 
 def reference_text(study: Study) -> str:
@@ -224,8 +203,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     base = folder / study.kind
     written = [write_csv(study, base.with_suffix(".csv"))]
     for suffix, text in ((".json", json.dumps(as_dict(study), indent=2, allow_nan=False)), (".md", markdown(study))):
-        with replacing(base.with_suffix(suffix)) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_bytes(base.with_suffix(suffix), [text.encode()])
         written.append(base.with_suffix(suffix))
     for suffix in (".svg", ".png"):
         draw(study, base.with_suffix(suffix))
@@ -234,88 +212,5 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 
 def write_csv(study: Study, path: Path) -> Path:
-    """Write one row per run, columns as in `COLUMNS`; the file appears only when complete."""
-    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows(study))
-    return path
-
-
-AFTER_IMPACTS = ", and after impacts,"
-
-
-def within_table(
-    target: float, chosen: Attempt, step: Attempt | None, seconds: float, left_out: str, known: bool
-) -> Table:
-    """Requested and estimated error, settings and cost, and the cost of the next tighter tolerance.
-
-    Args:
-        target: requested error [-].
-        chosen: the run.
-        step: the next tighter tolerance; None if it was not run.
-        seconds: wall time with the search [s].
-        left_out: what the estimate does not include.
-        known: whether what is left out is small enough for the estimate to be one of the true error.
-    """
-    estimate = f"{share(chosen.estimate)}: {_parts(chosen)}"
-    rows = [
-        ("requested error", share(target)),
-        ("estimated error of this run", estimate if known else f"not known; without what is left out {estimate}"),
-        *([("not in the estimate", left_out)] if left_out else []),
-        ("settings", f"{chosen.method}, rtol {chosen.rtol:g}"),
-        (
-            "cost of this run",
-            f"{_seconds(chosen.seconds)}, {chosen.newton} Newton iterations; with the search {_seconds(seconds)}",
-        ),
-        ("next tighter tolerance", _next(step, chosen)),
-    ]
-    return Table("accuracy, relative to peaks", (), rows)
-
-
-def ringing_left_out(frequency: float, impact: bool) -> str:
-    """What an estimate without the ringing of stuck sliders leaves out; frequency: of the slowest of them [Hz]."""
-    return (
-        f"the ringing of stuck sliders{AFTER_IMPACTS if impact else ''} at {frequency:.0f} Hz and above, which has no "
-        "damping and is filtered: resolved on purpose it moved the force of other scenes by up to 1 % "
-        "(docs/accuracy.md); give contact_damping"
-    )
-
-
-def attempt_table(attempts: Sequence[Attempt]) -> Table:
-    """Every run of the search."""
-    columns = ("rtol", "outcome", "time", "Newton iterations", "estimated error")
-    rows = [(f"{a.rtol:g}", a.status, _seconds(a.seconds), str(a.newton), share(a.estimate)) for a in attempts]
-    return Table("tolerances tried, each compared with a tighter one", columns, rows)
-
-
-def reason_table(reasons: Sequence[str]) -> Table:
-    """Why these settings were chosen."""
-    return Table("reasons", (), [("-", reason) for reason in reasons])
-
-
-def share(value: float | None) -> str:
-    """`value` as a percentage with two digits."""
-    return "not known" if value is None else f"{100 * value:.2g} %"
-
-
-def _parts(attempt: Attempt) -> str:
-    if attempt.errors is None:
-        return "not estimated"
-    found = attempt.errors
-    return (
-        f"force {share(found.force_rms)} RMS, {share(found.force_peak)} at its peak; sliding "
-        f"{share(found.sliding_rms)} RMS, {share(found.sliding_peak)} at its peak"
-    )
-
-
-def _next(step: Attempt | None, chosen: Attempt) -> str:
-    if step is None:
-        return "not run in the time given"
-    smaller = (step.estimate or 1.0) < (chosen.estimate or 0.0)
-    error = f"about {share(step.estimate)}" if smaller else "no smaller estimate"
-    return f"rtol {step.rtol:g}: {error} in {_seconds(step.seconds)}"
-
-
-def _seconds(value: float) -> str:
-    return f"{1e3 * value:.3g} ms" if value < 1 else f"{value:.3g} s"
+    """Write the rows as CSV; the file appears only when complete."""
+    return write_rows(path, rows(study))

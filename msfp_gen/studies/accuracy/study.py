@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from msfp_gen.errors import InputError
 from msfp_gen.simulation.simulate import simulate
-from msfp_gen.studies.accuracy.effects import with_all_effects
+from msfp_gen.studies.accuracy.error_target import with_all_effects
 from msfp_gen.studies.accuracy.methods import METHODS, Method, methods_named
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, REFUSED, Errors, Reference, Trial, best_reference, errors
 
@@ -96,8 +96,8 @@ def work_precision(
     check_settings(tolerances, limit)
     scene, trials, notes = without_stop(scene), [], []
     for method in chosen:
-        found, left_out = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
-        trials += found
+        runs, left_out = run_tolerances(method, scene, sorted(tolerances, reverse=True), limit, say)
+        trials += runs
         notes += left_out
     trials = with_reruns(trials, rerun_to_end(scene, trials, limit, say))
     reference = best_reference([*trials, *tighter_runs(scene, trials, limit, say)], families())
@@ -161,15 +161,15 @@ def trial_line(trial: Trial) -> str:
 def tighter_runs(scene: Scene, trials: Sequence[Trial], limit: float, say: Say, name: str = "implicit") -> list[Trial]:
     """Runs of one method below the tightest tolerance that finished, until one does not finish: for a reference."""
     done = [t.rtol for t in trials if t.method == name and t.finished]
-    rtol, found = min(done, default=1e-2) / 10, []
+    rtol, tighter = min(done, default=1e-2) / 10, []
     while rtol > TIGHTEST:
         trial = METHODS[name].attempt(scene, rtol, limit)
         say(f"reference: {trial_line(trial)}")
         if not trial.finished:
             break
-        found.append(trial)
+        tighter.append(trial)
         rtol /= 10
-    return found
+    return tighter
 
 
 def rerun_to_end(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) -> list[Trial]:
@@ -180,11 +180,11 @@ def rerun_to_end(scene: Scene, trials: Sequence[Trial], limit: float, say: Say) 
     longer = CONFIRMING_LIMIT * limit
     possible = [t for t in trials if t.status == CUT_OFF and 1.3 * t.expected_seconds < longer]
     tightest = {t.method: t for t in sorted(possible, key=lambda t: -t.rtol)}
-    found = []
+    reruns = []
     for trial in sorted(tightest.values(), key=lambda t: t.expected_seconds)[:CONFIRMING_RUNS]:
-        found.append(METHODS[trial.method].attempt(scene, trial.rtol, longer))
-        say(f"reference: {trial_line(found[-1])}")
-    return found
+        reruns.append(METHODS[trial.method].attempt(scene, trial.rtol, longer))
+        say(f"reference: {trial_line(reruns[-1])}")
+    return reruns
 
 
 def with_reruns(trials: Sequence[Trial], reruns: Sequence[Trial]) -> list[Trial]:
@@ -195,16 +195,16 @@ def with_reruns(trials: Sequence[Trial], reruns: Sequence[Trial]) -> list[Trial]
 
 def point_of(series: str, trial: Trial, reference: Reference) -> Point:
     """One run as a point of a series; the reference and runs that did not finish have no errors."""
-    found = errors(trial, reference.trial) if trial.finished and trial is not reference.trial else None
-    return Point(series, trial, found, found is not None and is_wrong(trial, found, reference))
+    differences = errors(trial, reference.trial) if trial.finished and trial is not reference.trial else None
+    return Point(series, trial, differences, differences is not None and is_wrong(trial, differences, reference))
 
 
-def is_wrong(trial: Trial, found: Errors, reference: Reference) -> bool:
+def is_wrong(trial: Trial, differences: Errors, reference: Reference) -> bool:
     """Whether a run reported success while its RMS error is far above its tolerance and above the reference's floor."""
     if reference.floor is None:
         return False
     floor = 3 * reference.floor.worst_rms
-    return trial.finished and found.worst_rms > max(min(WRONG * trial.rtol, ALWAYS_WRONG), NEVER_WRONG, floor)
+    return trial.finished and differences.worst_rms > max(min(WRONG * trial.rtol, ALWAYS_WRONG), NEVER_WRONG, floor)
 
 
 def reference_notes(reference: Reference) -> list[str]:

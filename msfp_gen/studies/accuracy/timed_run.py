@@ -25,6 +25,9 @@ ERRORS = {
     "sliding_max": "sliding, maximum",
     "sliding_rms": "sliding, RMS",
 }
+ROWS = 2000  # intervals between the instants at which runs are compared
+QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
+CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
 
 
 @dataclass(frozen=True)
@@ -97,9 +100,9 @@ def errors(trial: Trial, reference: Trial) -> Errors | None:
     )
 
 
-def largest_error(found: Errors) -> float:
+def largest_error(differences: Errors) -> float:
     """The error that a target bounds: the largest of the RMS and peak errors of force and sliding, relative [-]."""
-    return max(found.force_rms, found.sliding_rms, found.force_peak, found.sliding_peak)
+    return max(differences.force_rms, differences.sliding_rms, differences.force_peak, differences.sliding_peak)
 
 
 def _peaks(trial: Trial) -> tuple[float, float]:
@@ -141,15 +144,10 @@ def best_reference(trials: Iterable[Trial], families: dict[str, str]) -> Referen
 
 def _difference(first: Trial, second: Trial) -> Errors:
     """Errors of `second` against `first`, both finished."""
-    found = errors(second, first)
-    if found is None:
+    differences = errors(second, first)
+    if differences is None:
         raise RunError("a finished run has no rows", status="rows")
-    return found
-
-
-ROWS = 2000  # intervals between the instants at which runs are compared
-QUICK, REPEATS = 0.1, 5  # runs shorter than this [s] are timed this often; the fastest counts
-CUT_OFF, REFUSED, OK = "cut off", "refused", "ok"
+    return differences
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
-from msfp_gen.studies.study.recipe import INTENSITY
+from msfp_gen.studies.study.scene_factory import INTENSITY
 
 FRACTILES = (0.16, 0.5, 0.84)
 POINTS = 50  # of the fractiles of curves with different intensities
@@ -111,9 +111,9 @@ def _interpolated(levels: Array, x: Array, y: Array, ended: Any) -> Array:
     """The demand of a curve at each level, linear between its runs; infinite beyond the last before one ended early."""
     beyond = x[~ended].min(initial=np.inf)
     known = ended & (x < beyond)
-    found = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
+    values = np.interp(levels, [0.0, *x[known]], [0.0, *y[known]])
     last = x[known].max(initial=0.0)
-    return np.where((levels > last) & np.isfinite(beyond), np.inf, found)
+    return np.where((levels > last) & np.isfinite(beyond), np.inf, values)
 
 
 def _curve_numbers(rows: Any, measure: str) -> Any:
@@ -136,14 +136,14 @@ def axes_of(rows: Any) -> list[str]:
     return names[names.index("run") + 1 : names.index("status")]
 
 
-def ida_table(found: Ida) -> Table:
+def ida_table(result: Ida) -> Table:
     """The fractiles for a terminal."""
-    shares = [name for name in found.fractiles.columns if name.startswith("p")]
+    shares = [name for name in result.fractiles.columns if name.startswith("p")]
     rows = [
-        [f"{row[found.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
+        [f"{row[result.measure]:.4g}", f"{row['curves']:.0f}", f"{row['ended_early']:.0f}"]
         + ["beyond" if np.isinf(row[name]) else f"{row[name]:.4g}" for name in shares]
-        for _, row in found.fractiles.iterrows()
+        for _, row in result.fractiles.iterrows()
     ]
-    unit = f" [{found.unit}]" if found.unit else ""
-    title = f"fractiles of {found.demand}{unit} by {found.measure}"
-    return Table(title, (found.measure, "curves", "ended early", *shares), rows)
+    unit = f" [{result.unit}]" if result.unit else ""
+    title = f"fractiles of {result.demand}{unit} by {result.measure}"
+    return Table(title, (result.measure, "curves", "ended early", *shares), rows)

@@ -12,13 +12,12 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
-from msfp_gen.studies.assessment.rows import complete, numbers, read_study, unknown_column, write_frame
-from msfp_gen.studies.assessment.samples import STATISTICS
+from msfp_gen.studies.assessment.rows import STATISTICS, complete, numbers, read_study, unknown_column, write_frame
+from msfp_gen.studies.pool import Pool, pool_from, require
 from msfp_gen.studies.study.definition import Study
-from msfp_gen.studies.study.engines import Engine, engine_from, require
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.run import run_on
-from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.sampling import Sampling, values_at
 
 LARGEST = 1e30  # objective of a design that is not feasible, so that every feasible one is better
 DESIGNS = "designs.parquet"
@@ -111,29 +110,26 @@ def pareto(
     study = _search_study(source)
     _check(study, goals, population, generations)
     folder = Path(output)
-    with engine_from(**engine) as started:
+    with pool_from(**engine) as pool:
         search = _search(study, goals, population, generations, seed)
         number, shares = next(search)
-        found = [_evaluated(study, number, shares, goals, started, folder)]
+        generation_designs = [_evaluated(study, number, shares, goals, pool, folder)]
         while number < generations:
             if progress is not None:
                 progress(number, generations)
-            number, shares = search.send(_objectives(found[-1], goals))
-            found.append(_evaluated(study, number, shares, goals, started, folder))
-    return _front(found, goals, folder)
+            number, shares = search.send(_objectives(generation_designs[-1], goals))
+            generation_designs.append(_evaluated(study, number, shares, goals, pool, folder))
+    return _front(generation_designs, goals, folder)
 
 
 def _search_study(source: str | Path | Mapping[str, Any]) -> Study:
     """The study with one design, at the medians of the axes."""
-    if not isinstance(source, Mapping):
-        found = load_study(source, design=True)
-    else:
-        found = load_study(dict(source), design=True)
-    if not any(axis.random for axis in found.axes):
+    study = load_study(source, design=True)
+    if not any(axis.random for axis in study.axes):
         raise InputError(
             "axes: none has a distribution, so that there is nothing to search; give its bounds as `uniform`"
         )
-    return found
+    return study
 
 
 def _check(study: Study, goals: Goals, population: int, generations: int) -> None:
@@ -172,17 +168,15 @@ def _search(
         algorithm.tell(infills=asked)
 
 
-def _evaluated(study: Study, number: int, shares: Array, goals: Goals, engine: Engine, folder: Path) -> Any:
+def _evaluated(study: Study, number: int, shares: Array, goals: Goals, pool: Pool, folder: Path) -> Any:
     """The designs of a generation with their statistics, as a DataFrame."""
     import pandas as pd
 
-    drawn = [axis.distribution for axis in study.axes if axis.distribution is not None]
-    clipped = np.clip(shares, 2.0**-53, 1 - 2.0**-53)
-    values = np.column_stack([each.values(clipped[:, index]) for index, each in enumerate(drawn)])
+    values = values_at(shares, study.distributions)
     sampling = Sampling("listed", values=tuple(map(tuple, values.tolist())))
     table = {**study.table, "sampling": {"method": "listed", "values": values.tolist()}}
     place = folder / f"generation-{number:03d}"
-    run_on(engine, replace(study, sampling=sampling, table=table), place)
+    run_on(pool, replace(study, sampling=sampling, table=table), place)
     wanted = list(dict.fromkeys((*goals.names, *(goals.at_most or {}))))
     rows = read_study(place, wanted)
     axes = [axis.name for axis in study.axes if axis.random]
@@ -192,11 +186,11 @@ def _evaluated(study: Study, number: int, shares: Array, goals: Goals, engine: E
     feasible = complete(rows).reshape(shape).all(axis=0) & ~np.isnan(list(statistics.values())).any(axis=0)
     for name, bound in (goals.at_most or {}).items():
         feasible &= statistics[name] <= bound
-    found = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
-    found["ended"] = complete(rows).reshape(shape).mean(axis=0)
-    found["feasible"] = feasible
-    found.attrs["units"] = rows.attrs["units"]
-    return found
+    designs = pd.DataFrame({"generation": number, **dict(zip(axes, values.T, strict=True)), **statistics})
+    designs["ended"] = complete(rows).reshape(shape).mean(axis=0)
+    designs["feasible"] = feasible
+    designs.attrs["units"] = rows.attrs["units"]
+    return designs
 
 
 def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
@@ -210,15 +204,15 @@ def _objectives(designs: Any, goals: Goals) -> tuple[Array, Array]:
     return np.where(unknown[:, None], LARGEST, values), np.column_stack(violated)
 
 
-def _front(found: Sequence[Any], goals: Goals, folder: Path) -> Front:
+def _front(parts: Sequence[Any], goals: Goals, folder: Path) -> Front:
     import pandas as pd
 
-    designs = pd.concat([each.drop(columns="ended") for each in found], ignore_index=True)
+    designs = pd.concat([each.drop(columns="ended") for each in parts], ignore_index=True)
     designs["front"] = designs.feasible.to_numpy() & not_dominated(
         np.where(designs.feasible.to_numpy()[:, None], designs[list(goals.names)].to_numpy() * goals.signs, np.inf)
     )
     write_frame(designs, folder / DESIGNS)
-    return Front(goals, dict(found[0].attrs["units"]), designs)
+    return Front(goals, dict(parts[0].attrs["units"]), designs)
 
 
 def not_dominated(values: Array) -> Any:
@@ -229,11 +223,11 @@ def not_dominated(values: Array) -> Any:
     return ~better
 
 
-def front_table(found: Front) -> Table:
+def front_table(front: Front) -> Table:
     """The front for a terminal, sorted by its first objective."""
-    chosen = found.designs[found.designs.front].sort_values(found.goals.names[0])
+    chosen = front.designs[front.designs.front].sort_values(front.goals.names[0])
     columns = [name for name in chosen.columns if name not in ("generation", "feasible", "front")]
     rows = [[f"{value:.4g}" for value in row] for row in chosen[columns].to_numpy()]
-    count, feasible = len(found.designs), int(found.designs.feasible.sum())
+    count, feasible = len(front.designs), int(front.designs.feasible.sum())
     title = f"{len(chosen)} designs on the Pareto front, of {feasible} feasible ones among {count}"
     return Table(title, columns, rows)

@@ -9,8 +9,8 @@ import numpy as np
 
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
-from msfp_gen.studies.assessment.samples import by_sample
-from msfp_gen.studies.study.engines import require
+from msfp_gen.studies.assessment.rows import by_sample
+from msfp_gen.studies.pool import require
 from msfp_gen.studies.study.sampling import Sampling
 
 
@@ -73,18 +73,18 @@ def tornado(folder: str | Path, name: str, statistic: str = "median") -> Tornado
     folder: of a study with `sampling.method = "one-at-a-time"`. statistic: over all runs of a sample, such as those of
     several records: "median", "mean", "max" or "min". Raises InputError.
     """
-    found = by_sample(folder, name, statistic, "one-at-a-time")
-    low, high = found.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
+    samples = by_sample(folder, name, statistic, "one-at-a-time")
+    low, high = samples.sampling.get("quantiles", Sampling("one-at-a-time").quantiles)
     bars = [
         Bar(
             axis,
-            *(float(v) for v in found.values[1 + 2 * k : 3 + 2 * k, k]),
-            *(float(v) for v in found.found[1 + 2 * k : 3 + 2 * k]),
+            *(float(v) for v in samples.values[1 + 2 * k : 3 + 2 * k, k]),
+            *(float(v) for v in samples.reduced[1 + 2 * k : 3 + 2 * k]),
         )
-        for k, axis in enumerate(found.axes)
+        for k, axis in enumerate(samples.axes)
     ]
     bars.sort(key=lambda bar: -bar.swing)
-    return Tornado(name, found.unit, statistic, (low, high), float(found.found[0]), tuple(bars))
+    return Tornado(name, samples.unit, statistic, (low, high), float(samples.reduced[0]), tuple(bars))
 
 
 def sobol(folder: str | Path, name: str, statistic: str = "median", level: float = 0.95, seed: int = 0) -> Sobol:
@@ -98,45 +98,50 @@ def sobol(folder: str | Path, name: str, statistic: str = "median", level: float
 
     if not 0 < level < 1:
         raise InputError(f"level = {level:g}: give a share between 0 and 1, such as 0.95")
-    found = by_sample(folder, name, statistic, "sobol-indices")
-    if not np.ptp(found.found):
+    samples = by_sample(folder, name, statistic, "sobol-indices")
+    if not np.ptp(samples.reduced):
         raise InputError(f"{name}: it has the same value in all samples; give another quantity")
-    count = len(found.axes)
-    problem = {"num_vars": count, "names": list(found.axes), "bounds": [[0.0, 1.0]] * count}
+    count = len(samples.axes)
+    problem = {"num_vars": count, "names": list(samples.axes), "bounds": [[0.0, 1.0]] * count}
     indices = analysis.analyze(
-        problem, found.found, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
+        problem, samples.reduced, calc_second_order=False, conf_level=level, print_to_console=False, seed=seed
     )
     order = np.argsort(-np.asarray(indices["ST"]), kind="stable")
     columns = {key: tuple(float(indices[key][k]) for k in order) for key in ("S1", "ST", "S1_conf", "ST_conf")}
     return Sobol(
-        name, found.unit, statistic, tuple(found.axes[k] for k in order),
-        columns["S1"], columns["ST"], columns["S1_conf"], columns["ST_conf"], level, len(found.found) // (count + 2),
+        name, samples.unit, statistic, tuple(samples.axes[k] for k in order),
+        columns["S1"], columns["ST"], columns["S1_conf"], columns["ST_conf"], level,
+        len(samples.reduced) // (count + 2),
     )  # fmt: skip
 
 
-def tornado_table(found: Tornado) -> Table:
+def tornado_table(result: Tornado) -> Table:
     """The bars for a terminal."""
     rows = [
         (bar.axis, f"{bar.low:.4g}", f"{bar.high:.4g}", f"{bar.at_low:.4g}", f"{bar.at_high:.4g}", f"{bar.swing:.4g}")
-        for bar in found.bars
+        for bar in result.bars
     ]
-    unit = f" {found.unit}" if found.unit else ""
-    low, high = found.quantiles
-    title = f"{found.statistic} of {found.name}: {found.base:.4g}{unit} at medians; each axis at {low:g} and {high:g}"
+    unit = f" {result.unit}" if result.unit else ""
+    low, high = result.quantiles
+    title = (
+        f"{result.statistic} of {result.name}: {result.base:.4g}{unit} at medians; each axis at {low:g} and {high:g}"
+    )
     return Table(title, ("axis", "low", "high", "at low", "at high", "swing"), rows)
 
 
-def sobol_table(found: Sobol) -> Table:
+def sobol_table(result: Sobol) -> Table:
     """The indices for a terminal."""
     rows = [
         (
             axis,
-            f"{found.first[k]:.3f}",
-            f"± {found.first_interval[k]:.3f}",
-            f"{found.total[k]:.3f}",
-            f"± {found.total_interval[k]:.3f}",
+            f"{result.first[k]:.3f}",
+            f"± {result.first_interval[k]:.3f}",
+            f"{result.total[k]:.3f}",
+            f"± {result.total_interval[k]:.3f}",
         )
-        for k, axis in enumerate(found.axes)
+        for k, axis in enumerate(result.axes)
     ]
-    title = f"Sobol' indices of the {found.statistic} of {found.name}, {found.samples} samples, {100 * found.level:g} %"
+    title = (
+        f"Sobol' indices of the {result.statistic} of {result.name}, {result.samples} samples, {100 * result.level:g} %"
+    )
     return Table(title, ("axis", "first order", "", "total", ""), rows)

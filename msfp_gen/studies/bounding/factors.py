@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from math import prod
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from msfp_gen.common.fields import Quantity, Text
 from msfp_gen.common.inputs import read_input
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.catalogue import suggestion
+from msfp_gen.scene.file.catalogue import known_keys, parsed, suggestion
 
 Pair = tuple[float, float]
 
@@ -147,8 +147,8 @@ def load_factors(source: str | Path) -> FactorTable:
 def _bundled() -> dict[str, str]:
     """Name -> text of the tables that come with the package."""
     folder = files(__package__) / "codes"
-    found = {path.name.removesuffix(".toml"): path for path in folder.iterdir() if path.name.endswith(".toml")}
-    return {name: found[name].read_text(encoding="utf-8") for name in sorted(found)}
+    paths = {path.name.removesuffix(".toml"): path for path in folder.iterdir() if path.name.endswith(".toml")}
+    return {name: paths[name].read_text(encoding="utf-8") for name in sorted(paths)}
 
 
 def _read(name: str, text: str) -> FactorTable:
@@ -157,12 +157,12 @@ def _read(name: str, text: str) -> FactorTable:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"no valid TOML: {error}") from None
-    _known_keys(table, _TABLE_KEYS, "")
+    known_keys(table, _TABLE_KEYS, "")
     rule = _choice(table.get("rule"), RULES, "rule")
     default = RULES[rule].adjustment
     if "adjustment" not in table and default is None:
         raise InputError(f"adjustment is missing: {RULES[rule].remedy}")
-    adjustment = _parsed(_SHARE, table.get("adjustment", default), "adjustment")
+    adjustment = parsed(_SHARE, table.get("adjustment", default), "adjustment")
     if adjustment > 1:
         raise InputError(f"adjustment = {adjustment}: {RULES[rule].remedy}")
     rows = table.get("factor", [])
@@ -170,15 +170,15 @@ def _read(name: str, text: str) -> FactorTable:
         raise InputError("factor is missing: give at least one table [[factor]] with a property and its causes")
     factors = tuple(_factor(row, f"factor[{index}]") for index, row in enumerate(rows))
     limits = _pair(table["limits"], "limits") if "limits" in table else None
-    description, source = (_parsed(Text(), table.get(key, ""), key) for key in ("description", "source"))
+    description, source = (parsed(Text(), table.get(key, ""), key) for key in ("description", "source"))
     return FactorTable(name, description, source, rule, adjustment, limits, factors)
 
 
 def _factor(row: Mapping[str, Any], path: str) -> Factor:
     """Parse one table [[factor]]; `path` names it in messages."""
-    _known_keys(row, _FACTOR_KEYS, f"{path}.")
+    known_keys(row, _FACTOR_KEYS, f"{path}.")
     named = _choice(row.get("property"), PROPERTIES, f"{path}.property")
-    surfaces = _parsed(_SURFACES, row.get("surfaces", []), f"{path}.surfaces")
+    surfaces = parsed(_SURFACES, row.get("surfaces", []), f"{path}.surfaces")
     if "surfaces" in row and not surfaces:
         raise InputError(f"{path}.surfaces = []: give numbers of surfaces, from 1, or leave it out for all")
     causes = {key: _causes(row.get(key, {}), f"{path}.{key}") for key in ("environment", "direct")}
@@ -195,20 +195,12 @@ def _causes(table: Any, path: str) -> dict[str, Pair]:
 
 def _pair(value: Any, path: str) -> Pair:
     """A pair (least <= 1, most >= 1): the scene itself is the nominal case."""
-    low, high = _parsed(_PAIR, value, path)
+    low, high = parsed(_PAIR, value, path)
     if not low <= 1 <= high:
         raise InputError(
             f"{path} = {value!r}: give [least, most] with least <= 1 <= most; the scene is the nominal case"
         )
     return low, high
-
-
-def _parsed(rule: Quantity | Text, value: Any, path: str) -> Any:
-    """`value` by the rule of its field. Raises InputError that names the field."""
-    try:
-        return rule.parse(value)
-    except ValueError as error:
-        raise InputError(f"{path} = {value!r}: {error}") from None
 
 
 def _choice(value: Any, known: Mapping[str, Any], path: str) -> str:
@@ -218,12 +210,3 @@ def _choice(value: Any, known: Mapping[str, Any], path: str) -> str:
         hint = suggestion(str(value), known) or f"; give one of {', '.join(known)}"
         raise InputError(f"{path} = {value!r}: unknown name{hint}")
     return value
-
-
-def _known_keys(table: Mapping[str, Any], known: Iterable[str], path: str) -> None:
-    """Raise InputError for an unknown key of a table."""
-    names = list(known)
-    for key in table:
-        if key not in names:
-            hint = suggestion(key, names) or f"; the keys here are {', '.join(names)}"
-            raise InputError(f"{path}{key}: unknown key{hint}")

@@ -1,24 +1,25 @@
-"""Runs of a scene at lower bound, nominal and upper bound properties, and their results side by side."""
+"""Runs of a scene at lower bound, nominal and upper bound properties, and the quantities that are compared."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.errors import InputError, RunError
+from msfp_gen.errors import InputError
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.run_any import simulate
 from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
+from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
-from msfp_gen.studies.bounding.measures import Measure, measures_of
 
 if TYPE_CHECKING:
+    from msfp_gen.analysis.characterise import Characterisation
     from msfp_gen.buildings.load import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
@@ -33,7 +34,78 @@ WIDER: dict[str, tuple[str, Any]] = {
     "uplift": ("uplift", True),
     "pvt": ("friction", "pvt"),
 }
-Progress = Callable[[str], Callable[[float, float], None] | None]
+Progress = Callable[[float, float], None]
+
+
+class Measure(NamedTuple):
+    """A quantity that is compared.
+
+    Attributes:
+        unit: SI unit.
+        governs: whether its largest or its least value governs a design; "" if neither does.
+        read: its value from a characterisation; None if it is not defined.
+    """
+
+    unit: str
+    governs: Literal["most", "least", ""]
+    read: Callable[[Any], float | None]
+
+
+def measures_of(scene: AnyScene) -> dict[str, Measure]:
+    """The quantities that are compared for a scene."""
+    return measures(len(scene.bearing.surfaces)) if isinstance(scene, Scene) else building_measures()
+
+
+def building_measures() -> dict[str, Measure]:
+    """Name -> quantity that is compared for a building on bearings."""
+    return {
+        "peak_displacement": Measure("m", "most", lambda run: max(each.peak_displacement for each in run.bearings)),
+        "peak_base_shear": Measure("N", "most", lambda run: run.peak_force),
+        "peak_floor_acceleration": Measure("m/s^2", "most", lambda run: run.peak_floor_acceleration),
+        "peak_drift_ratio": Measure("1", "most", lambda run: run.peak_drift_ratio),
+        "minimum_load_ratio": Measure("1", "least", lambda run: min(e.minimum_load_ratio for e in run.bearings)),
+        "maximum_load_ratio": Measure("1", "most", lambda run: max(e.maximum_load_ratio for e in run.bearings)),
+        "capacity_left": Measure("m", "least", lambda run: min(each.capacity_left for each in run.bearings)),
+        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
+        "secant_period": Measure("s", "", lambda run: run.secant_period),
+        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
+        "energy_dissipated": Measure("J", "", lambda run: run.energy_dissipated),
+    }
+
+
+def measures(surfaces: int) -> dict[str, Measure]:
+    """Name -> quantity that is compared, for a stack with this number of surfaces; loop properties are cycle means."""
+    whole = {
+        "peak_displacement": Measure("m", "most", lambda run: run.peak_displacement),
+        "peak_force": Measure("N", "most", lambda run: run.peak_force),
+        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
+        "effective_stiffness": Measure("N/m", "", _mean("effective_stiffness")),
+        "effective_period": Measure("s", "", _mean("effective_period")),
+        "energy_dissipated": Measure("J", "", _mean("energy_dissipated")),
+        "effective_damping": Measure("1", "", _mean("effective_damping")),
+        "zero_displacement_force": Measure("N", "", _mean("zero_displacement_force")),
+        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
+        "maximum_uplift": Measure("m", "most", lambda run: run.maximum_uplift),
+    }
+    kinds: dict[str, tuple[str, Literal["most", "least"]]] = {
+        "capacity_left": ("m", "least"),
+        "peak_velocity": ("m/s", "most"),
+        "peak_heat_flux": ("W/m^2", "most"),
+    }
+    each = {
+        f"{name}_{surface}": Measure(unit, governs, _of_surface(name, surface))
+        for name, (unit, governs) in kinds.items()
+        for surface in range(1, surfaces + 1)
+    }
+    return whole | each
+
+
+def _mean(name: str) -> Callable[[Characterisation], float | None]:
+    return lambda run: run.envelope[name].mean if name in run.envelope else None
+
+
+def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
+    return lambda run: getattr(run.surfaces[surface - 1], name)
 
 
 @dataclass(frozen=True)
@@ -43,15 +115,15 @@ class Case:
     Attributes:
         name: "lower", "nominal" or "upper".
         scene: the scene with its properties multiplied.
-        result: the run; of a run that failed what was computed until then, if anything.
-        found: characterisation; None if the run failed.
+        result: the run; of a run that failed its rows until then.
+        characterisation: None if the run failed.
         failure: message of a failure, else empty.
     """
 
     name: str
     scene: AnyScene
-    result: Result | BuildingResult | None
-    found: Characterisation | BuildingCharacterisation | None
+    result: Result | BuildingResult
+    characterisation: Characterisation | BuildingCharacterisation | None
     failure: str = ""
 
 
@@ -92,7 +164,10 @@ class Bounds:
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
         return {
-            name: {case.name: None if case.found is None else measure.read(case.found) for case in self.cases}
+            name: {
+                case.name: None if case.characterisation is None else measure.read(case.characterisation)
+                for case in self.cases
+            }
             for name, measure in self.measures.items()
         }
 
@@ -121,7 +196,10 @@ class Bounds:
             "quantities": self.quantities(),
             "governing": self.governing(),
             "cases": {
-                case.name: {"failure": case.failure, "characterisation": case.found and case.found.as_dict()}
+                case.name: {
+                    "failure": case.failure,
+                    "characterisation": case.characterisation and case.characterisation.as_dict(),
+                }
                 for case in self.cases
             },
         }
@@ -137,11 +215,11 @@ def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = No
     Args:
         scene: the nominal case.
         table: factors of the properties.
-        progress: called with the name of each case; returns the progress callback for `simulate`.
+        progress: called with the share of the runs that is done, and 1.
 
     Raises:
         InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
-        RunError: only if the user interrupts.
+        RunError: a run failed at its start, so that it has no rows.
     """
     cases = _cases(scene, table, progress)
     if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
@@ -153,8 +231,7 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     """`Auto` with every effect that the last model of any case has; None where all cases have the same model."""
     if not isinstance(scene.effects, Auto):
         return None
-    ran = [case.result.provenance["model"] for case in cases if case.result is not None]
-    models = [set(model.split(", then ")[-1].split("-")) for model in ran]
+    models = [set(case.result.provenance["model"].split(", then ")[-1].split("-")) for case in cases]
     if all(model == models[0] for model in models):
         return None
     used = set().union(*models)
@@ -162,20 +239,17 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
 
 
 def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> list[Case]:
-    """The runs of `bound`."""
-    cases = []
-    for name, bounded in bounded_scenes(scene, table).items():
-        callback = progress(name) if progress else None
-        try:
-            result = simulate(bounded, progress=callback)
-        except RunError as error:
-            if error.status == "interrupted":
-                raise
-            partial: Any = error.result
-            cases.append(Case(name, bounded, partial, None, str(error)))
-        else:
-            cases.append(Case(name, bounded, result, result.characterise()))
-    return cases
+    """The runs of `bound`, at the same time."""
+    scenes = bounded_scenes(scene, table)
+    with closing(completed_runs(list(scenes.values()), labels=list(scenes), progress=progress)) as runs:
+        results = dict(runs)
+    return [_case(name, results[index]) for index, name in enumerate(scenes)]
+
+
+def _case(name: str, result: Any) -> Case:
+    if result.status in ENDED:
+        return Case(name, result.scene, result, result.characterise())
+    return Case(name, result.scene, result, None, result.message)
 
 
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
@@ -189,7 +263,8 @@ def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
     if not buildings:
         return scenes
     common = [
-        max(found, key=lambda effects: effects.uplift) for found in zip(*(b.modelled for b in buildings), strict=True)
+        max(effects_of_cases, key=lambda effects: effects.uplift)
+        for effects_of_cases in zip(*(b.modelled for b in buildings), strict=True)
     ]
     return {
         case: replace(
@@ -258,20 +333,21 @@ def _lambdas(bearing: Bearing, table: FactorTable) -> dict[str, dict[str, tuple[
         for surface in factor.surfaces or range(1, count + 1):
             if surface > count:
                 raise InputError(f"factor[{index}].surfaces has {surface}: this bearing has surfaces 1 to {count}")
-            found = pairs.setdefault(factor.property, {})
-            if surface in found:
+            of_surfaces = pairs.setdefault(factor.property, {})
+            if surface in of_surfaces:
                 raise InputError(
                     f"factor[{index}]: {factor.property} of surface {surface} has a factor already; "
                     "give one factor for each property of a surface"
                 )
-            found[surface] = table.combined(factor)
+            of_surfaces[surface] = table.combined(factor)
     ends = {"lower": 0, "upper": 1}
     return {
         named: {
             case: tuple(
-                found.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0 for surface in range(1, count + 1)
+                of_surfaces.get(surface, (1.0, 1.0))[ends[case]] if case in ends else 1.0
+                for surface in range(1, count + 1)
             )
             for case in CASES
         }
-        for named, found in pairs.items()
+        for named, of_surfaces in pairs.items()
     }

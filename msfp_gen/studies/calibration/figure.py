@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from msfp_gen.figures.style import Scale
-    from msfp_gen.studies.calibration.fitted_test import FittedTest
+    from msfp_gen.studies.calibration.measurement import FittedTest
 
 ACROSS = 4  # tests beside each other
 DRAWN = 24  # tests; more would make a picture that few programs open

@@ -1,4 +1,4 @@
-"""`Fit`: values, intervals and correlations of a calibration, what it cannot identify, and the search behind them."""
+"""`Fit`: values, intervals and correlations of a calibration, and what it cannot identify; as text and as tables."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import make_folder, write_bytes
-from msfp_gen.errors import InputError, RunError
-from msfp_gen.studies.calibration.fitted_test import FittedTest
-from msfp_gen.studies.calibration.residuals import Evaluation, Residuals
+from msfp_gen.common.tables import Table, write_columns
+from msfp_gen.studies.calibration.measurement import FittedTest
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -104,9 +103,8 @@ class Fit:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers in SI as plain values; None where a value is not determined."""
-        names = ("name", "unit", "value", "start", "deviation", "low", "high", "run_error", "bounds", "at_bound")
         return {
-            "estimates": [{n: _plain(getattr(e, n)) for n in names} for e in self.estimates],
+            "estimates": [{name: _plain(value) for name, value in vars(e).items()} for e in self.estimates],
             "correlation": [[_plain(float(value)) for value in row] for row in self.correlation],
             "condition": _plain(self.condition),
             "tests": [
@@ -132,20 +130,24 @@ class Fit:
         texts = {
             "scene.toml": scene_text(self.scene),
             "fit.json": json.dumps(self.as_dict(), indent=2, allow_nan=False) + "\n",
-            "residuals.csv": self._rows(),
         }
         for name, text in texts.items():
             write_bytes(folder / name, [text.encode()])
+        write_columns(folder / "residuals.csv", self._columns())
         plot_fit(self.tests, f"{self.scene.name or 'unnamed scene'}: fit", folder / "fit.png")
-        return [folder / name for name in (*texts, "fit.png")]
+        return [folder / name for name in (*texts, "residuals.csv", "fit.png")]
 
-    def _rows(self) -> str:
-        lines = ["test,time [s],displacement [m],measured force [N],fitted force [N],residual [N]"]
-        for test in self.tests:
-            name = '"' + test.measured.name.replace('"', '""') + '"'
-            columns = (test.measured.time, test.measured.displacement, test.measured.force, test.force, test.residual)
-            lines += [f"{name}," + ",".join(map(repr, row)) for row in np.column_stack(columns).tolist()]
-        return "\n".join(lines) + "\n"
+    def _columns(self) -> dict[tuple[str, str], list[Any]]:
+        """(name, unit) -> values at all times of all tests."""
+        rows: dict[tuple[str, str], Any] = {
+            ("time", "s"): [test.measured.time for test in self.tests],
+            ("displacement", "m"): [test.measured.displacement for test in self.tests],
+            ("measured force", "N"): [test.measured.force for test in self.tests],
+            ("fitted force", "N"): [test.force for test in self.tests],
+            ("residual", "N"): [test.residual for test in self.tests],
+        }
+        names = [test.measured.name for test in self.tests for _ in test.force]
+        return {("test", ""): names, **{key: np.concatenate(values).tolist() for key, values in rows.items()}}
 
 
 def _plain(value: Any) -> Any:
@@ -154,61 +156,47 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-TOLERANCE = 1e-5  # relative change of cost and values at which the search ends; errors of runs hide smaller ones
-WITHIN = 0.1  # standard errors: the next step that ends the search (Bates and Watts 1981)
+def fit_tables(fit: Fit) -> list[Table]:
+    """Estimates, correlations, tests, and what limits the fit."""
+    tables = [estimate_table(fit)]
+    if len(fit.estimates) > 1:
+        tables.append(correlation_table(fit))
+    tables.append(residual_table(fit))
+    remarks = [(text,) for text in (*fit.unidentified, *fit.notes)]
+    return [*tables, Table("what limits this fit", (), remarks)] if remarks else tables
 
 
-class _WithinError(Exception):
-    """Ends the search: the next step is within the errors of the values."""
+def estimate_table(fit: Fit) -> Table:
+    """Values, intervals and starts."""
+    columns = ("parameter", "value", "95 % interval", "start", "unit")
+    title = f"fitted in {fit.evaluations} evaluations, the last with rtol {fit.rtol:g}"
+    return Table(title, columns, [_row(e) for e in fit.estimates])
 
 
-def least_squares(residuals: Residuals, start: Array, low: Array, high: Array, most: int) -> tuple[Array, Evaluation]:
-    """The unknowns between two bounds for which the sum of squares is least, and the evaluation there.
+def correlation_table(fit: Fit) -> Table:
+    """Correlations of the estimates, in their order."""
+    numbers = [str(i) for i in range(1, len(fit.estimates) + 1)]
+    rows = [
+        (estimate.name, *(f"{value:+.3f}" if np.isfinite(value) else "-" for value in line))
+        for estimate, line in zip(fit.estimates, fit.correlation, strict=True)
+    ]
+    return Table(
+        f"correlation, in the same order; condition {fit.condition:.3g}",
+        ("parameter", *numbers),
+        rows,
+    )
 
-    The search also ends where the next step is shorter than a tenth of the standard errors: the noise of the tests
-    makes smaller ones meaningless, and the error of runs, which varies irregularly with the values, hides them.
 
-    most: number of evaluations. Raises RunError where the start fails, the search has not ended by then, or it ends
-    beside values whose runs fail.
-    """
-    from scipy.optimize import least_squares as search
+def residual_table(fit: Fit) -> Table:
+    """Deviation of every test."""
+    shares = [
+        (test.measured.name, f"{test.deviation:.4g}", f"{100 * test.share:.2f}", str(len(test.force)))
+        for test in fit.tests
+    ]
+    return Table("residuals", ("test", "deviation [N]", "over the peak [%]", "rows"), shares)
 
-    best, found, begun = start, residuals.at(start), False
-    failure: RunError | InputError | None = None  # of the last trial
-    if found.failure is not None:
-        raise found.failure
 
-    def values(x: Array) -> Array:
-        nonlocal best, found, failure
-        # After a failed run the next step is short because the search was thrown back, not because it ends.
-        if begun and failure is None and not np.array_equal(x, best) and found.step_in_errors(x - best) < WITHIN:
-            raise _WithinError
-        at = residuals.at(x)
-        failure = at.failure
-        if failure is None and at.square < found.square:
-            best, found = x.copy(), at
-        return at.residuals
-
-    def jacobian(x: Array) -> Array:
-        nonlocal begun
-        begun = True  # before, x differs from the start where that is nearly at a bound
-        return (found if np.array_equal(x, best) else residuals.at(x)).jacobian
-
-    limits = {"ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": None, "max_nfev": most}
-    try:
-        ended = search(values, start, jacobian, bounds=(low, high), **limits)
-    except _WithinError:
-        return best, found
-    if ended.status == 0:
-        raise RunError(
-            f"fit: not converged after {most} evaluations; give tighter bounds, fewer parameters, or more evaluations",
-            status="fit",
-        )
-    free = (best > low) & (best < high)
-    if failure is not None and found.step_in_errors(found.step(free)) > 1.0:
-        raise RunError(
-            f"fit: the search ended beside values whose runs fail ({failure}); give bounds without them, or "
-            "other values to start from",
-            status="fit",
-        )
-    return best, found
+def _row(estimate: Estimate) -> tuple[str, ...]:
+    spread = f"{estimate.low:.4g} to {estimate.high:.4g}" if np.isfinite(estimate.high) else "not determined"
+    value = f"{estimate.value:.5g}" + (" (bound)" if estimate.at_bound else "")
+    return estimate.name, value, spread, f"{estimate.start:.4g}", estimate.unit or "-"

@@ -12,12 +12,10 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.studies.calibration.fit_result import Estimate, Fit
-from msfp_gen.studies.calibration.fitted_test import FittedTest
 from msfp_gen.studies.calibration.intervals import lag_one, weak
-from msfp_gen.studies.calibration.measurement import Measurement, read_measurement
-from msfp_gen.studies.calibration.residuals import Progress, Residuals, scenes_of
+from msfp_gen.studies.calibration.measurement import FittedTest, Measurement, read_measurement
+from msfp_gen.studies.calibration.residuals import Progress, Residuals, changed_scene, scenes_of, unknowns_of
 from msfp_gen.studies.calibration.solution import SMALL, Solution, solve
-from msfp_gen.studies.calibration.unknowns import changed_scene, unknowns_of
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -76,10 +74,14 @@ def fit(
         A run of the scene as it was given fails, or the fit has not converged after `max_evaluations`.
 
     """
-    residuals = start_fit(scene, tests, parameters, bounds, offset, columns, progress)
+    return end_fit(scene, start_fit(scene, tests, parameters, bounds, offset, columns, progress), max_evaluations)
+
+
+def end_fit(scene: Scene, residuals: Residuals, max_evaluations: int = 100) -> Fit:
+    """The fit of the residuals of `start_fit`; arguments and RunError as of `fit`."""
     start, low, high = search_range(residuals)
-    found = solve(residuals, start, low, high, max_evaluations)
-    return _outcome(scene, residuals, found, (low, high))
+    solution = solve(residuals, start, low, high, max_evaluations)
+    return _outcome(scene, residuals, solution, (low, high))
 
 
 def search_range(residuals: Residuals) -> tuple[Array, Array, Array]:
@@ -123,12 +125,12 @@ def _distinct(tests: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def _outcome(scene: Scene, residuals: Residuals, found: Solution, limits: tuple[Array, Array]) -> Fit:
+def _outcome(scene: Scene, residuals: Residuals, solution: Solution, limits: tuple[Array, Array]) -> Fit:
     """The fit of a solution, with its intervals. limits: bounds of the unknowns over their scales."""
     scale, size = residuals.scale, len(residuals.unknowns)
     units = [u.unit for u in residuals.unknowns] + ["N"] * residuals.offsets
     starts = [u.start for u in residuals.unknowns] + [0.0] * residuals.offsets
-    values, half = found.x * scale, found.half * scale
+    values, half = solution.x * scale, solution.half * scale
     bounds = list(zip(*((limit * scale).tolist() for limit in limits), strict=True))
     estimates = tuple(
         Estimate(*row)
@@ -137,27 +139,27 @@ def _outcome(scene: Scene, residuals: Residuals, found: Solution, limits: tuple[
             units,
             values.tolist(),
             starts,
-            (found.spread.deviation * scale).tolist(),
+            (solution.spread.deviation * scale).tolist(),
             (values - half).tolist(),
             (values + half).tolist(),
-            (found.run_error * scale).tolist(),
+            (solution.run_error * scale).tolist(),
             bounds,
-            found.at_bound.tolist(),
+            solution.at_bound.tolist(),
             strict=True,
         )
     )
-    tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, found.end.forces, strict=True))
-    lines = weak(residuals.names[:size], values[:size], half[:size], found.spread.correlation[:size, :size])
+    tests = tuple(FittedTest(test, force) for test, force in zip(residuals.tests, solution.end.forces, strict=True))
+    lines = weak(residuals.names[:size], values[:size], half[:size], solution.spread.correlation[:size, :size])
     return Fit(
         scene=changed_scene(scene, residuals.unknowns, values[:size]),
         estimates=estimates,
-        correlation=found.spread.correlation,
-        condition=found.known.condition,
+        correlation=solution.spread.correlation,
+        condition=solution.known.condition,
         tests=tests,
-        unidentified=(*found.known.lines, *lines),
-        notes=(*_notes(estimates, tests, float(scene.top.stiffness)), *_error_notes(residuals, found)),  # type: ignore[attr-defined]
+        unidentified=(*solution.known.lines, *lines),
+        notes=(*_notes(estimates, tests, float(scene.top.stiffness)), *_error_notes(residuals, solution)),  # type: ignore[attr-defined]
         evaluations=residuals.count,
-        rtol=found.rtol,
+        rtol=solution.rtol,
     )
 
 
@@ -175,27 +177,29 @@ def _notes(estimates: Sequence[Estimate], tests: Sequence[FittedTest], stiffness
     return lines
 
 
-def _error_notes(residuals: Residuals, found: Solution) -> list[str]:
+def _error_notes(residuals: Residuals, solution: Solution) -> list[str]:
     """What makes the intervals wider than noise without correlation would."""
-    lines, spread = [], found.spread
-    if not np.isfinite(found.run_error).all():
+    lines, spread = [], solution.spread
+    if not np.isfinite(solution.run_error).all():
         lines.append(
             f"the errors of the runs could not be measured, so values have no interval: runs with "
-            f"rtol = {residuals.rtol:g} fail ({found.failure})"
+            f"rtol = {residuals.rtol:g} fail ({solution.failure})"
         )
     else:
-        some = np.isfinite(spread.half) & ~found.at_bound
-        wider = found.run_error[some] / np.maximum(spread.half[some], np.finfo(float).tiny)
+        some = np.isfinite(spread.half) & ~solution.at_bound
+        wider = solution.run_error[some] / np.maximum(spread.half[some], np.finfo(float).tiny)
         if (wider > SMALL).any():
             remedy = (
-                f"runs with a smaller one fail ({found.failure})" if found.failure else "give a smaller solver.rtol"
+                f"runs with a smaller one fail ({solution.failure})"
+                if solution.failure
+                else "give a smaller solver.rtol"
             )
             lines.append(
                 f"the errors of the runs limit this fit: intervals are wider by up to {100 * wider.max():.2g} % for "
-                f"them, with rtol = {found.rtol:g}; {remedy}"
+                f"them, with rtol = {solution.rtol:g}; {remedy}"
             )
-    if (correlation := lag_one(residuals.split(found.end.residuals))) > CORRELATED:
-        independent = np.sqrt(found.end.variance) * np.linalg.norm(found.known.factors, axis=1)
+    if (correlation := lag_one(residuals.split(solution.end.residuals))) > CORRELATED:
+        independent = np.sqrt(solution.end.variance) * np.linalg.norm(solution.known.factors, axis=1)
         some = np.isfinite(spread.deviation) & (independent > 0)
         wider = (spread.deviation[some] / independent[some]).max(initial=1.0)
         lines.append(

@@ -1,4 +1,4 @@
-"""`Measurement`: time, displacement and force of a laboratory test, from a table in a text file."""
+"""`Measurement`: time, displacement and force of a laboratory test, from a text file; `FittedTest`: beside its run."""
 
 from __future__ import annotations
 
@@ -152,24 +152,24 @@ def _number(lines: Lines, index: int, column: str, text: str) -> float:
         lines.fail(index, f"column {column!r}: {text.strip()[:24]!r} is not a finite number; repair or cut the data")
 
 
-def _place(lines: Lines, head: int, header: list[str], name: str, given: str) -> tuple[int, float]:
+def _place(lines: Lines, head: int, header: list[str], name: str, column: str) -> tuple[int, float]:
     """Index of a column and the factor of its unit to SI."""
-    wanted, unit = _split(given)
-    found = [i for i, text in enumerate(header) if text.lower() == given.strip().lower()]
-    found = found or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
-    if len(found) != 1:
-        what = "no column" if not found else f"{len(found)} columns"
+    wanted, unit = _split(column)
+    places = [i for i, text in enumerate(header) if text.lower() == column.strip().lower()]
+    places = places or [i for i, text in enumerate(header) if _split(text)[0].lower() == wanted.lower()]
+    if len(places) != 1:
+        what = "no column" if not places else f"{len(places)} columns"
         names = ", ".join(repr(text[:24]) for text in header[:12])
-        lines.fail(head, f"{what} {given!r} among {names}; name the one with columns {name}=NAME")
-    unit = unit or _split(header[found[0]])[1]
+        lines.fail(head, f"{what} {column!r} among {names}; name the one with columns {name}=NAME")
+    unit = unit or _split(header[places[0]])[1]
     if not unit:
         lines.fail(
-            head, f"column {header[found[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
+            head, f"column {header[places[0]]!r} has no unit; write {wanted} [{UNITS[name]}], here or in the columns"
         )
     try:
-        return found[0], to_si(f"1 {unit}", UNITS[name])
+        return places[0], to_si(f"1 {unit}", UNITS[name])
     except ValueError as error:
-        lines.fail(head, f"column {header[found[0]]!r}: {error}")
+        lines.fail(head, f"column {header[places[0]]!r}: {error}")
 
 
 def _split(text: str) -> tuple[str, str]:
@@ -177,3 +177,31 @@ def _split(text: str) -> tuple[str, str]:
     match = _CELL.fullmatch(text)
     assert match is not None  # the pattern matches every text of one line
     return match[1], (match[2] or match[3] or "").strip()
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTest:
+    """A test beside the run of the fitted bearing.
+
+    Attributes:
+        measured: the test at the times that were compared (at most 2000).
+        force: of the run, with the offset of the test, ndarray, shape (T,), [N].
+    """
+
+    measured: Measurement
+    force: Array
+
+    @property
+    def residual(self) -> Array:
+        """Force of the run less measured force, ndarray, shape (T,), [N]."""
+        return self.force - self.measured.force
+
+    @property
+    def deviation(self) -> float:
+        """Root mean square of the residual [N]."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def share(self) -> float:
+        """The same over the largest measured force."""
+        return self.deviation / float(np.abs(self.measured.force).max())

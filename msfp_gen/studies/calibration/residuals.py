@@ -1,10 +1,9 @@
-"""Residuals of a fit and their exact Jacobian: one run for each test, at the same time."""
+"""Unknowns of a fit, and its residuals with their exact Jacobian: one run for each test, at the same time."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,21 +14,116 @@ from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.motions.motion import Motion
-from msfp_gen.simulation.batch import Workers, raise_if_stopped
+from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
 from msfp_gen.simulation.gradients import UNDAMPED, undamped_surfaces
 from msfp_gen.simulation.simulate import simulate
 from msfp_gen.studies.calibration.intervals import SINGULAR
 from msfp_gen.studies.calibration.measurement import Measurement
-from msfp_gen.studies.calibration.unknowns import Unknown, changed_scene
+from msfp_gen.studies.pool import SharedProgress, local_pool
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
 
+RANGE = 10.0  # default bounds: the value at the start, divided and multiplied by this
+_OF_THE_TEST = {
+    "motion": "the tests give the motion",
+    "load": "the tests have no load history",
+    "initial_state": "a test starts at the centre of the bearing",
+}
 Progress = Callable[[int, float, float], None]  # number of the evaluation, its share done, last deviation [N]
 Run = tuple[Array, Array] | RunError | InputError  # force and its derivatives at the times of a test, or why not
 TRAVEL = 1.5  # largest displacement of a test over the sum of all capacities
 RATIOS = 1e-3, 5.0  # least and largest value of the largest force of a test over the axial load
 FAILED = 10.0  # residual of a run that failed, over the largest force: worse than any run, so that the step is refused
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One value to be fitted.
+
+    Attributes:
+        name: path of the parameter; of tied parameters all paths, separated by `=`.
+        members: parameters that have this value.
+        low, high: bounds [unit].
+    """
+
+    name: str
+    members: tuple[Parameter, ...]
+    low: float
+    high: float
+
+    @property
+    def start(self) -> float:
+        """Value at the start of the fit [unit]."""
+        return self.members[0].value
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return self.members[0].unit
+
+
+def unknowns_of(
+    scene: Scene, paths: Sequence[str], bounds: Mapping[str, tuple[float, float]] | None = None
+) -> tuple[Unknown, ...]:
+    """The unknowns at some paths; `A=B` is one unknown for both. bounds: path, as given or of one parameter -> (low,
+    high). Raises InputError that names the path.
+    """
+    if isinstance(paths, str) or not paths:
+        raise InputError(f"parameters = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
+    rest, unknowns = {_whole(path): limits for path, limits in (bounds or {}).items()}, []
+    for path in map(_whole, paths):
+        parts = path.split("=")
+        members = [parameters_of(scene, [part], "parameters") for part in parts]
+        groups = [(each,) for each in members[0]] if len(parts) == 1 else [tuple(p for m in members for p in m)]
+        limits = rest.pop(path, None)
+        for group in groups:
+            name = "=".join(parameter.path for parameter in group)
+            unknowns.append(_unknown(name, group, rest.pop(name, limits)))
+    if rest:
+        raise InputError(f"bounds: {next(iter(rest))!r} is no parameter of this fit; give one of its paths")
+    _check_members([member for unknown in unknowns for member in unknown.members])
+    return tuple(unknowns)
+
+
+def changed_scene(scene: Scene, unknowns: Sequence[Unknown], values: Array) -> Scene:
+    """The scene with these values of the unknowns. Raises InputError where a field does not accept its value."""
+    pairs = zip(unknowns, values, strict=True)
+    return changed_parameters(scene, {p: float(value) for unknown, value in pairs for p in unknown.members})
+
+
+def _whole(path: str) -> str:
+    """A path, or tied paths, with `friction[0]` written as `bearing.friction[0]`."""
+    parts = [part.strip() for part in str(path).split("=")]
+    return "=".join(part if "." in part else f"bearing.{part}" for part in parts)
+
+
+def _unknown(name: str, members: tuple[Parameter, ...], limits: tuple[float, float] | None) -> Unknown:
+    first = members[0]
+    if len({(member.unit, member.field) for member in members}) > 1:
+        raise InputError(f"parameters = {name!r}: different quantities cannot have one value; give them apart")
+    if limits is None:
+        if first.value == 0:
+            raise InputError(f"parameters = {name!r}: it is 0 in the scene, which gives no range; give bounds for it")
+        limits = (min(first.value / RANGE, first.value * RANGE), max(first.value / RANGE, first.value * RANGE))
+    low, high = (float(limit) for limit in limits)
+    if not low < high or not np.isfinite([low, high]).all():
+        raise InputError(f"bounds of {name} = {low:g}, {high:g}: give a lower bound below an upper one")
+    if (first.least is not None and low < first.least) or (first.above is not None and low <= first.above):
+        least = f"at least {first.least:g}" if first.least is not None else f"more than {first.above:g}"
+        raise InputError(f"bounds of {name} = {low:g}, {high:g}: this field is {least}; raise the lower bound")
+    if not low < first.value < high:
+        raise InputError(f"bounds of {name} = {low:g}, {high:g}: the scene has {first.value:g}; start between them")
+    return Unknown(name, members, low, high)
+
+
+def _check_members(members: Sequence[Parameter]) -> None:
+    paths = [member.path for member in members]
+    for member in members:
+        if paths.count(member.path) > 1:
+            raise InputError(f"parameters = {member.path!r}: given twice; give each parameter once")
+        if member.part in _OF_THE_TEST:
+            raise InputError(f"parameters = {member.path!r}: {_OF_THE_TEST[member.part]}; leave it out")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +178,6 @@ class Residuals:
     count: int = 0
     deviation: float = np.nan
     _last: tuple[bytes, Evaluation] | None = None
-    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def names(self) -> list[str]:
@@ -127,10 +220,10 @@ class Residuals:
     def evaluate(self, x: Array, jacobian: Array | None = None) -> Evaluation:
         """The evaluation at x; with a Jacobian, shape (N, k), it has this one and its runs no derivatives."""
         self.count += 1
-        found = self._evaluate(x * self.scale, jacobian)
-        if found.failure is None:
-            self.deviation = float(np.sqrt(np.mean(found.residuals**2))) * self.largest
-        return found
+        evaluation = self._evaluate(x * self.scale, jacobian)
+        if evaluation.failure is None:
+            self.deviation = float(np.sqrt(np.mean(evaluation.residuals**2))) * self.largest
+        return evaluation
 
     def split(self, rows: Array) -> list[Array]:
         """Rows of all tests as those of each."""
@@ -158,26 +251,22 @@ class Residuals:
         """Runs of all tests at these values, at the same time; the error of a run that fails."""
         for spec in dict.fromkeys(scene.spec for scene in self.scenes):
             build_model(spec.layout, spec.effects, gradients=slopes)
-        shares = np.zeros(len(self.tests))
+        shared = SharedProgress(len(self.tests), self._report)
 
         def run(index: int) -> Run:
-            def show(time: float, end: float) -> None:
-                raise_if_stopped(time, end)
-                if self.progress is not None:
-                    with self._lock:  # runs report from their own threads
-                        shares[index] = time / end
-                        self.progress(self.count, float(shares.mean()), self.deviation)
-
             try:
-                return self._run(index, values, slopes, show)
+                return self._run(index, values, slopes, shared.of(index))
             except (RunError, InputError) as error:
                 return error
 
+        self._report(0.0, 1.0)  # a short run does not report by itself
+        with local_pool(min(len(self.tests), usable_cores())) as pool:
+            runs = dict(pool.results(run, ((index, (index,)) for index in range(len(self.tests)))))
+        return [runs[index] for index in range(len(self.tests))]
+
+    def _report(self, share: float, _: float) -> None:
         if self.progress is not None:
-            self.progress(self.count, 0.0, self.deviation)  # a short run does not report by itself
-        with Workers(min(len(self.tests), usable_cores()), processes=False) as pool:
-            found = dict(pool.results(run, {index: (index,) for index in range(len(self.tests))}))
-        return [found[index] for index in range(len(self.tests))]
+            self.progress(self.count, share, self.deviation)
 
     def _run(
         self, index: int, values: Array, slopes: bool, show: Callable[[float, float], None]
@@ -224,7 +313,7 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
     zeros = np.zeros(len(test.time))
     path = np.column_stack([test.displacement - test.displacement[0], zeros, zeros])
     motion = Motion.from_arrays(test.time - test.time[0], path, name=test.name)
-    made = replace(
+    test_scene = replace(
         scene,
         name=test.name,
         motion=motion,
@@ -234,8 +323,8 @@ def _test_scene(scene: Scene, test: Measurement) -> Scene:
         output_step=motion.duration / (len(test.time) - 1),
         top=scene.top if test.axial_load is None else replace(scene.top, axial_load=test.axial_load),  # type: ignore[call-arg]
     )
-    _check_size(made, test)
-    made = replace(made, effects=made.modelled)  # so that no evaluation selects others
-    for surface in undamped_surfaces(made, made.modelled)[:1]:
+    _check_size(test_scene, test)
+    test_scene = replace(test_scene, effects=test_scene.modelled)  # so that no evaluation selects others
+    for surface in undamped_surfaces(test_scene, test_scene.modelled)[:1]:
         raise InputError(UNDAMPED.format(surface=surface))
-    return made
+    return test_scene

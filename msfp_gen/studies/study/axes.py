@@ -6,10 +6,12 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from msfp_gen.buildings.load import located_value
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.sampling import Distribution, distribution_from, number_of
@@ -66,7 +68,7 @@ def axis_from(name: str, table: Any) -> Axis:
     try:
         change, paths = _change(table)
         axis = Axis(name, change, paths, _surfaces(table))
-        made, used = _with_values(axis, table)
+        complete, used = _with_values(axis, table)
     except InputError as error:
         raise InputError(f"{path}.{error}") from None
     known = {*used, "sets", "multiplies", "factors", "surfaces"}
@@ -76,20 +78,20 @@ def axis_from(name: str, table: Any) -> Axis:
             raise InputError(f"{path}.{extra[0]}: not together with {', '.join(sorted(used))}; leave one out")
         hint = suggestion(extra[0], sorted(everything)) or f"; the keys here are {', '.join(KEYS)}"
         raise InputError(f"{path}.{extra[0]}: unknown key{hint}")
-    return made
+    return complete
 
 
 def _change(table: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
-    given = [key for key in ("sets", "multiplies", "factors") if key in table]
-    if len(given) > 1:
-        raise InputError(f"{given[1]}: not together with {given[0]}; use one axis for each")
-    if not given:
+    changes = [key for key in ("sets", "multiplies", "factors") if key in table]
+    if len(changes) > 1:
+        raise InputError(f"{changes[1]}: not together with {changes[0]}; use one axis for each")
+    if not changes:
         return "free", ()
-    value = table[given[0]]
+    value = table[changes[0]]
     paths = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list) else ()
     if not paths or not all(isinstance(each, str) and all(each.split(".")) for each in paths):
-        raise InputError(f"{given[0]} = {value!r}: give a field of the scene in quotes, such as 'bearing.friction'")
-    return given[0], paths
+        raise InputError(f"{changes[0]} = {value!r}: give a field of the scene in quotes, such as 'bearing.friction'")
+    return changes[0], paths
 
 
 def _surfaces(table: Mapping[str, Any]) -> tuple[int, ...] | None:
@@ -129,6 +131,16 @@ def grid(axis: Axis, values: Any, labels: Any = None) -> Axis:
             str(value) if isinstance(value, str | int | float) else json.dumps(value) for value in labels or values
         ]
     return replace(axis, values=tuple(values), labels=tuple(shown))
+
+
+def located(axis: Axis, folder: Path | None) -> Axis:
+    """The axis with absolute paths of the files that its values name, relative to a folder. Raises InputError."""
+    if axis.change != "sets" or axis.values is None:
+        return axis
+    values = axis.values
+    for path in axis.paths:
+        values = tuple(located_value(path, value, folder) for value in values)
+    return replace(axis, values=values)
 
 
 def _range(table: Mapping[str, Any]) -> list[float]:

@@ -1,14 +1,19 @@
-"""Chunks of a study and their files: each part is named after a digest of everything that determines its rows."""
+"""Chunks of a study, their files in its folder, and how far it has come.
+
+Each part is named after a digest of everything that determines its rows.
+"""
 
 from __future__ import annotations
 
 import os
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +21,7 @@ import numpy as np
 
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import clear_all_leftovers, write_bytes
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.jit.cache import digest_sources
 from msfp_gen.scene.file.loader import toml_file
@@ -27,6 +33,8 @@ FORMAT = 1  # of the rows of a part
 STUDY_FILE = "study.toml"
 PARTS = "part-*.parquet"
 _NAME = re.compile(r"part-(\d{7})-[0-9a-f]{16}\.parquet")
+IDLE = 3  # times the longest interval between parts, after which a study counts as not running
+LEAST_IDLE = 10.0  # that time at least [s]
 
 
 class Chunks:
@@ -71,7 +79,7 @@ class Chunks:
     @cached_property
     def _digests(self) -> list[Any]:
         """Of each grid axis the digests of its values and labels, as an array of 16 bytes each."""
-        study, found = self.study, []
+        study, digests_of_axes = self.study, []
         for index, axis in enumerate(study.axes):
             if axis.values is None:
                 continue
@@ -80,8 +88,8 @@ class Chunks:
                 for k, (value, label) in enumerate(zip(axis.values, axis.labels, strict=True))
             ]
             digests = [bytes.fromhex(fingerprint(value, study.files))[:16] for value in each]
-            found.append(np.array(digests, dtype="V16"))
-        return found
+            digests_of_axes.append(np.array(digests, dtype="V16"))
+        return digests_of_axes
 
     @cached_property
     def identity(self) -> str:
@@ -158,7 +166,7 @@ def _text(value: Any) -> str:
 
 def parts_in(folder: Path) -> dict[str, int]:
     """Name -> number of the chunk, of every part in a folder."""
-    return {path.name: int(found[1]) for path in folder.glob(PARTS) if (found := _NAME.fullmatch(path.name))}
+    return {path.name: int(match[1]) for path in folder.glob(PARTS) if (match := _NAME.fullmatch(path.name))}
 
 
 @contextmanager
@@ -195,3 +203,98 @@ def study_table(folder: Path) -> dict[str, Any]:
     except (InputError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{folder / STUDY_FILE}: not written by msfp-gen ({error}); run the study again") from None
     return {**table, "about": {**table["about"], **counts}}
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a study has come.
+
+    Attributes:
+        name: of the study.
+        runs, done, failed: numbers of runs: all, in parts, and of these not ended with `ok` or `stopped`.
+        parts, chunks: numbers of parts that are written, and of all.
+        rate: runs per second since the study was last started, on all its workers [1/s]; None before the first part.
+        running: whether parts still appear.
+        seconds_left: time left at that rate [s]; None where it is not known.
+    """
+
+    name: str
+    runs: int
+    done: int
+    failed: int
+    parts: int
+    chunks: int
+    rate: float | None
+    running: bool
+    seconds_left: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        return asdict(self)
+
+
+def study_status(folder: str | Path) -> Status:
+    """How far the study in a folder has come. Raises InputError where there is none."""
+    folder = Path(folder)
+    table = study_table(folder)
+    runs, chunk = table["about"]["runs"], table["about"]["chunk"]
+    parts = parts_in(folder)
+    written = {name: min(chunk, runs - number * chunk) for name, number in parts.items()}
+    done = sum(written.values())
+    rate, running = _rate(folder, written)
+    return Status(
+        name=str(table.get("name", "")),
+        runs=runs,
+        done=done,
+        failed=sum(failures(folder / name) for name in parts),
+        parts=len(parts),
+        chunks=-(-runs // chunk),
+        rate=rate,
+        running=running and done < runs,
+        seconds_left=None if rate is None else (runs - done) / rate,
+    )
+
+
+def _rate(folder: Path, written: dict[str, int]) -> tuple[float | None, bool]:
+    """Runs per second since the study was last started, and whether parts still appear.
+
+    Workers end their chunks in bunches, so that the time between two parts says nothing: the rate counts from the
+    start, which is the time of `study.toml`.
+    """
+    begin = (folder / STUDY_FILE).stat().st_mtime
+    stamps = ((folder / name).stat().st_mtime for name in written)
+    times = sorted((stamp, count) for stamp, count in zip(stamps, written.values(), strict=True) if stamp > begin)
+    if not times:
+        return None, False
+    ends = [begin, *(stamp for stamp, _ in times)]
+    longest = max(after - before for before, after in pairwise(ends))
+    rate = sum(count for _, count in times) / (ends[-1] - begin)
+    return rate, time.time() - ends[-1] < max(IDLE * longest, LEAST_IDLE)
+
+
+def failures(part: Path) -> int:
+    """The number of failed runs of a part. Raises InputError where it is damaged."""
+    import pyarrow.parquet as pq
+
+    with readable_parts(part):
+        return int((pq.read_schema(part).metadata or {})[b"failed"])
+
+
+def status_table(status: Status) -> Table:
+    """The status for a terminal."""
+    rows = [
+        ("runs", f"{status.done} of {status.runs} done ({100 * status.done / status.runs:.1f} %)"),
+        ("failed", f"{status.failed}; see the columns status and message" if status.failed else "0"),
+        ("parts", f"{status.parts} of {status.chunks}"),
+    ]
+    if status.rate is not None:
+        rows.append(("rate", f"{status.rate:.3g} runs per second"))
+    if status.done == status.runs:
+        rows.append(("state", "complete"))
+    elif status.running and status.seconds_left is not None:
+        rows.append(("state", f"running, {status.seconds_left:.0f} s left"))
+    elif status.rate is None and status.parts < status.chunks:
+        rows.append(("state", "no part since it was started; the same command continues it if it stopped"))
+    else:
+        rows.append(("state", "not running; the same command continues it"))
+    return Table(status.name or "study", (), rows)

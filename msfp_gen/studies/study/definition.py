@@ -20,11 +20,11 @@ from msfp_gen.common.inputs import Files, expecting, recording
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.changes import multiplied_table
-from msfp_gen.simulation.batch import check_method
+from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.study.axes import Axis
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import INTENSITY, Recipe, SceneMaker
-from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.sampling import Distribution, Sampling
+from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 MOST_RUNS = 100_000_000
 _Counts = tuple[int, int, int]  # floors, storeys and bearings of a building
@@ -119,13 +119,15 @@ class Study:
         """The axes, in the order of the columns of the table."""
         return self.recipe.axes
 
+    @property
+    def distributions(self) -> list[Distribution]:
+        """Those of the random axes."""
+        return [axis.distribution for axis in self.axes if axis.distribution is not None]
+
     @cached_property
     def samples(self) -> Array:
         """Values of the random axes, ndarray, shape (samples, random axes); one row without random axes."""
-        drawn = [axis.distribution for axis in self.axes if axis.distribution is not None]
-        if self.sampling is None:
-            return np.zeros((1, 0))
-        return self.sampling.drawn(drawn)
+        return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -163,8 +165,8 @@ class Study:
         number, row = divmod(run - 1, self.chunk)
         values, _ = self.task(number).rows(self.axes)[row]
         with expecting(self.files):
-            made = SceneMaker(self.recipe).scene(values)
-        return replace(made, name=f"{self.name or 'study'}, run {run}")
+            scene = SceneFactory(self.recipe).scene(values)
+        return replace(scene, name=f"{self.name or 'study'}, run {run}")
 
 
 def check_study(study: Study) -> Study:
@@ -188,18 +190,18 @@ def check_study(study: Study) -> Study:
 def _tried_study(study: Study) -> Study:
     """The study after all that `check_study` tries."""
     try:
-        maker = SceneMaker(study.recipe)
+        factory = SceneFactory(study.recipe)
     except InputError as error:
         raise InputError(f"scene: {error}") from None
     for axis in study.axes:
         try:
-            _check_axis(axis, maker, bool(study.recipe.records))
+            _check_axis(axis, factory, bool(study.recipe.records))
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
     surfaces, building = 0, None
     columns: tuple[str, ...] = ()
     first, base, opened = {}, "", {}
-    for place, scene, files in _tried(study, maker):  # one after the other: their motions are long
+    for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
         if place is None:
             first, base = files, fingerprint((scene, sorted(files.values())))
         elif own := sorted(digest for path, digest in files.items() if path not in first):
@@ -230,30 +232,30 @@ def _counts(scene: AnyScene) -> _Counts | None:
     return len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
 
 
-def _check_axis(axis: Axis, maker: SceneMaker, has_records: bool) -> None:
+def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
     """Raise InputError where an axis cannot change the base scene."""
     for path in axis.paths if axis.change in ("sets", "multiplies") else ():
         if path.partition(".")[0] == "motion" and has_records:
             raise InputError(f"{axis.change} = {path!r}: [records] gives the motion; change it there")
         try:
             if axis.change == "multiplies" or axis.surfaces is not None:
-                multiplied_table(maker.recipe.scene, path, 1.0, axis.surfaces)
+                multiplied_table(factory.recipe.scene, path, 1.0, axis.surfaces)
         except InputError as error:
             raise InputError(f"{axis.change} = {path!r}: {str(error).removeprefix(f'{path}: ')}") from None
-    count = min(len(bearing.surfaces) for bearing in _bearings(maker.base))
+    count = min(len(bearing.surfaces) for bearing in _bearings(factory.base))
     for surface in axis.surfaces or ():
         if surface > count:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")
 
 
-def _tried(study: Study, maker: SceneMaker) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
+def _tried(study: Study, factory: SceneFactory) -> Iterator[tuple[tuple[int, int] | None, AnyScene, Files]]:
     """The scenes of the first run, and of every value of each axis with the first values of the others.
 
     Yields the indices of the axis and of its value, None for the first run; the scene, and the files that it opened.
     """
     (base, _), *_ = study.task(0).rows(study.axes)
     named = ", ".join(f"{axis.name} = {value!r:.40}" for axis, value in zip(study.axes, base, strict=True))
-    yield None, *_made(maker, base, f"run 1 ({named})")
+    yield None, *_made(factory, base, f"run 1 ({named})")
     drawn = iter(study.samples.T)
     for index, axis in enumerate(study.axes):
         if axis.values is None:
@@ -264,13 +266,13 @@ def _tried(study: Study, maker: SceneMaker) -> Iterator[tuple[tuple[int, int] | 
             tried = list(enumerate(axis.values))[:: max(1, len(axis.values) // TRIED) if numeric else 1]
         for place, value in tried:
             changed = (*base[:index], value, *base[index + 1 :])
-            yield (index, place), *_made(maker, changed, f"axes.{axis.name}: value {value!r}")
+            yield (index, place), *_made(factory, changed, f"axes.{axis.name}: value {value!r}")
 
 
-def _made(maker: SceneMaker, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
+def _made(factory: SceneFactory, values: Sequence[Any], where: str) -> tuple[AnyScene, Files]:
     try:
         with recording() as files:
-            scene = maker.scene(values)
+            scene = factory.scene(values)
         check_method(scene)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from msfp_gen.buildings.load import located_value, with_absolute_paths
-from msfp_gen.common.fields import Quantity
+from msfp_gen.buildings.load import with_absolute_paths
+from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.inputs import is_input, recording
 from msfp_gen.errors import InputError
+from msfp_gen.scene.file.catalogue import known_keys, parsed
 from msfp_gen.scene.file.loader import scene_table, toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion
+from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.study.axes import Axis, axis_from
+from msfp_gen.studies.study.axes import Axis, axis_from, grid, located
 from msfp_gen.studies.study.definition import Limits, Study, check_study
-from msfp_gen.studies.study.fields import fields_of, known_keys
 from msfp_gen.studies.study.quantities import Keep
-from msfp_gen.studies.study.recipe import INTENSITY, Recipe
-from msfp_gen.studies.study.records import NOUN, records_from
 from msfp_gen.studies.study.sampling import Sampling
+from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, motion_of
+
+if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
 
 Table = dict[str, Any]
 Progress = Callable[[float, float], None]
+RECORD_KEYS = ("suite", "motions", "scales", "intensity")
+NOUN = "a table with motions or the file of a suite, and scales"
+COMPONENTS = ("E1", "E2", "E3", "geomean", "rotd50", "rotd100")
 KEYS = {
     "name": "a text",
     "scene": "a scene file, the name of a preset, or a table",
@@ -42,6 +47,101 @@ BUILDING_KEEP = (
     "peak_displacement", "peak_base_shear", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
 )  # fmt: skip
 _CHUNK = Quantity("", least=1, whole=True)
+
+
+def fields_of(table: Mapping[str, Any], key: str, kind: type, where: str = "") -> dict[str, Any]:
+    """The table at `key`, whose keys are fields of `kind`; empty if it is not there. Raises InputError."""
+    inner = table.get(key, {})
+    if not isinstance(inner, Mapping):
+        raise InputError(f"{where}{key} = {inner!r}: give a table")
+    known_keys(inner, [name for name, _, _ in ruled_fields(kind)], f"{where}{key}.")
+    return dict(inner)
+
+
+@dataclass(frozen=True)
+class Intensity:
+    """The intensity measure of a record: spectral pseudo-acceleration, or peak ground acceleration without a period.
+
+    period [s], damping: of the oscillator. component: of the spectrum. Raises InputError.
+    """
+
+    period: Annotated[float | None, Quantity("s", above=0.0)] = None
+    damping: Annotated[float, Quantity("", above=0.0)] = 0.05
+    component: Annotated[str, Choice(COMPONENTS)] = "geomean"
+
+    def __post_init__(self) -> None:
+        check_fields(self, "records.intensity")
+
+    def of(self, motion: Motion) -> float:
+        """The measure of a motion [m/s^2]."""
+        from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
+
+        spectrum = response_spectrum(motion, [self.period or 1.0], damping=self.damping)
+        values = spectrum.pga if self.period is None else spectrum.psa[0]
+        return float(values[MEASURES.index(self.component)])
+
+
+@dataclass(frozen=True)
+class Records:
+    """What `[records]` gives.
+
+    Attributes:
+        axes: `record`, and `scale` where scales are given; none without `[records]`.
+        tables: name -> `[motion]` table, without its key `kind`; paths are absolute.
+        intensities: name -> intensity measure at scale 1 [m/s^2]; empty where none is asked for.
+        table: `[records]` with the motions in it; empty without `[records]`.
+    """
+
+    axes: tuple[Axis, ...]
+    tables: dict[str, Table]
+    intensities: dict[str, float]
+    table: Table
+
+
+def records_from(table: Any, folder: Path | None, progress: Progress | None) -> Records:
+    """The records of a table `[records]`; None: none. folder: of the study file. Raises InputError."""
+    if table is None:
+        return Records((), {}, {}, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"records = {table!r}: give {NOUN}")
+    known_keys(table, RECORD_KEYS, "records.")
+    suite = _suite(table, folder, progress)
+    axes = [grid(Axis("record", "record"), [record.name for record in suite.records])]
+    if (scales := table.get("scales")) is not None:
+        axes.append(_scales(scales))
+    tables = {record.name: record.table for record in suite.records}
+    intensities = {}
+    if "intensity" in table:
+        measure = Intensity(**fields_of(table, "intensity", Intensity, "records."))
+        intensities = {record.name: measure.of(record.motion) for record in suite.records}
+        if weak := [name for name, value in intensities.items() if not value > 0]:
+            raise InputError(f"records.intensity: record {weak[0]!r} has none in this component; give another")
+    complete = {"motions": [*tables.values()], "scales": scales, "intensity": table.get("intensity")}
+    return Records(tuple(axes), tables, intensities, complete)
+
+
+def _suite(table: Mapping[str, Any], folder: Path | None, progress: Progress | None) -> Suite:
+    if ("suite" in table) == ("motions" in table):
+        raise InputError("records: give suite, the path of a suite file, or motions, a list of [[records.motions]]")
+    if "suite" in table:
+        if not isinstance(table["suite"], str):
+            raise InputError(f"records.suite = {table['suite']!r}: give a path in quotes")
+        path = (folder or Path()) / table["suite"]
+        return load_suite(path if is_input(path) else table["suite"], progress)
+    try:
+        return suite_from_table({"records": table["motions"]}, folder, progress)
+    except InputError as error:
+        raise InputError(f"records.motions: {error}") from None
+
+
+def _scales(values: Any) -> Axis:
+    try:
+        axis = grid(Axis("scale", "scale"), values)
+    except InputError as error:
+        raise InputError(f"records.scales: {error}") from None
+    if not axis.numeric or min(axis.labels) <= 0:
+        raise InputError(f"records.scales = {values!r}: give numbers above 0")
+    return axis
 
 
 def example_text() -> str:
@@ -89,7 +189,7 @@ def _study(table: Table, folder: Path | None, progress: Progress | None) -> Stud
 def _checked(table: Table, folder: Path | None, progress: Progress | None) -> Study:
     scene = _scene(table["scene"], folder)
     records = records_from(table.get("records"), folder, progress)
-    own = [_located(axis_from(name, each), folder) for name, each in _table(table, "axes").items()]
+    own = [_axis(name, each, folder) for name, each in _table(table, "axes").items()]
     axes = (*records.axes, *own)
     if len({axis.name for axis in axes}) < len(axes):
         raise InputError("axes: [records] makes the axes record and scale; give other names")
@@ -102,7 +202,7 @@ def _checked(table: Table, folder: Path | None, progress: Progress | None) -> St
     )
     tables = records.tables
     if tables and "motion" not in scene:
-        scene = {**scene, "motion": {"kind": RecordMotion.kind, **next(iter(tables.values()))}}
+        scene = {**scene, "motion": motion_of(next(iter(tables.values())))}
     factors = {
         path: load_factors(_beside(path, folder)) for axis in axes if axis.change == "factors" for path in axis.paths
     }
@@ -119,23 +219,18 @@ def _checked(table: Table, folder: Path | None, progress: Progress | None) -> St
             sampling=sampling,
             keep=keep,
             limits=Limits(**fields_of(table, "limits", Limits)),
-            given_chunk=_chunk(table.get("chunk")),
+            given_chunk=None if table.get("chunk") is None else parsed(_CHUNK, table["chunk"], "chunk"),
             table=complete,
         )
     )
 
 
-def _located(axis: Axis, folder: Path | None) -> Axis:
-    """The axis with absolute paths of the files that its values name, relative to the folder of the study file."""
-    if axis.change != "sets" or axis.values is None:
-        return axis
-    values = axis.values
+def _axis(name: str, table: Any, folder: Path | None) -> Axis:
+    axis = axis_from(name, table)
     try:
-        for path in axis.paths:
-            values = tuple(located_value(path, value, folder) for value in values)
+        return located(axis, folder)
     except InputError as error:
-        raise InputError(f"axes.{axis.name}: {error}") from None
-    return replace(axis, values=values)
+        raise InputError(f"axes.{name}: {error}") from None
 
 
 def _complete(axis: Axis, table: Table) -> Table:
@@ -155,13 +250,13 @@ def _table(table: Mapping[str, Any], key: str) -> Table:
 def _scene(value: Any, folder: Path | None) -> Table:
     """The table of the base scene, with absolute paths."""
     if isinstance(value, str):
-        found, path = scene_table(_beside(value, folder))
+        table, path = scene_table(_beside(value, folder))
         folder = path.parent if path is not None else None
     elif isinstance(value, Mapping):
-        found = dict(value)
+        table = dict(value)
     else:
         raise InputError(f"scene = {value!r}: give {KEYS['scene']}")
-    return with_absolute_paths(found, folder)
+    return with_absolute_paths(table, folder)
 
 
 def _beside(source: str, folder: Path | None) -> str:
@@ -194,12 +289,3 @@ def _formula(name: str, text: Any) -> str:
     if not isinstance(text, str):
         raise InputError(f"quantities.{name} = {text!r}: give a formula in quotes, such as 'peak_sliding_1 / 0.13'")
     return text
-
-
-def _chunk(value: Any) -> int | None:
-    if value is None:
-        return None
-    try:
-        return int(_CHUNK.parse(value))
-    except ValueError as error:
-        raise InputError(f"chunk = {value!r}: {error}") from None

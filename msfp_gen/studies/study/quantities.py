@@ -18,8 +18,8 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
-from msfp_gen.studies.bounding.measures import Measure, building_measures, measures
-from msfp_gen.studies.sweep import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
+from msfp_gen.studies.bounding.runs import Measure, building_measures, measures
+from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
 
 # Word in a formula -> what it takes of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {
@@ -97,7 +97,7 @@ class Keep:
     @property
     def known(self) -> dict[str, Source]:
         """Column -> where it comes from, of everything that can be kept."""
-        return catalogue(self.surfaces) if self.building is None else building_catalogue(self.building)
+        return catalogue(self.surfaces, self.building)
 
     @property
     def history(self) -> Collection[str]:
@@ -115,13 +115,13 @@ class Keep:
         """
         reader = _Reader(result, self)
         formulas = dict(self.formulas)
-        found = {
+        kept = {
             column.name: self._evaluated(column.name, formulas[column.name], reader, at)
             if column.name in formulas
             else reader.value(column.name)
             for column in self.columns()
         }
-        return found, reader.problem
+        return kept, reader.problem
 
     def _evaluated(self, name: str, text: str, reader: _Reader, at: Mapping[str, float]) -> float | None:
         tree, extremes = _tree(self, name, text)
@@ -140,18 +140,18 @@ class Keep:
 
 @lru_cache(maxsize=16)
 def _columns(keep: Keep) -> tuple[Column, ...]:
-    known, found = keep.known, []
+    known, columns = keep.known, []
     for name in keep.names:
         each = [key for key in known if key == name or re.fullmatch(rf"{re.escape(name)}_\d+", key)]
         if not each:
             words = sorted({re.sub(r"_\d+$", "", key) for key in known})
             hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
             raise InputError(f"keep: {name!r} is no quantity{hint}")
-        found += [Column(key, known[key].unit, key in TEXTS) for key in each]
+        columns += [Column(key, known[key].unit, key in TEXTS) for key in each]
     for name, text in keep.formulas:
         _tree(keep, name, text)
-        found.append(Column(name, ""))
-    return tuple(dict.fromkeys(found))
+        columns.append(Column(name, ""))
+    return tuple(dict.fromkeys(columns))
 
 
 @lru_cache(maxsize=64)
@@ -164,8 +164,8 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
         if column not in columns:
             hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
             raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
-        extremes[found := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
-        return found
+        extremes[replaced := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
+        return replaced
 
     plain = _EXTREME.sub(symbol, text)
     numbers = [key for key in keep.known if key not in TEXTS]
@@ -178,37 +178,25 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
 
 
 @lru_cache(maxsize=16)
-def catalogue(surfaces: int) -> dict[str, Source]:
-    """Column -> where it comes from, for bearings of up to so many surfaces; those of the summary come first."""
-    found: dict[str, Source] = {}
-    for name, (unit, path) in {**COLUMNS, **_MORE}.items():
-        key, each, _ = path.partition(".*")
-        if name in _LEFT_OUT:
-            continue
-        if not each:
-            found[name] = Source(unit, key)
-        for index in range(surfaces) if each else ():
-            found[f"{name}_{index + 1}"] = Source(unit, key, index)
-    for index in range(surfaces):
-        found[f"{CAPACITY_USED}_{index + 1}"] = Source("", CAPACITY_USED, index)
-    for name, measure in measures(surfaces).items():
-        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
-    return found
+def catalogue(surfaces: int, building: tuple[int, int, int] | None) -> dict[str, Source]:
+    """Column -> where it comes from, of a bearing or a building; those of the summary come first.
 
-
-@lru_cache(maxsize=16)
-def building_catalogue(counts: tuple[int, int, int]) -> dict[str, Source]:
-    """The same for a building of so many floors, storeys and bearings."""
-    rows = dict(zip(("floors", "storeys", "bearings"), counts, strict=True))
-    found: dict[str, Source] = {}
-    for name, (unit, path) in BUILDING_COLUMNS.items():
-        if name not in _LEFT_OUT:
-            several = rows.get(path.partition(".*")[0], 0) if ".*" in path else 0
-            each = {f"{name}_{index + 1}": Source(unit, path, index) for index in range(several)}
-            found |= each if ".*" in path else {name: Source(unit, path)}
-    for name, measure in building_measures().items():
-        found.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
-    return found
+    surfaces: the most of any bearing. building: numbers of floors, storeys and bearings.
+    """
+    counts = dict(zip(("floors", "storeys", "bearings"), building or (), strict=False))
+    sources: dict[str, Source] = {}
+    for name, (unit, path) in ({**COLUMNS, **_MORE} if building is None else BUILDING_COLUMNS).items():
+        head, several, _ = path.partition(".*")
+        if several:
+            numbers = range(counts.get(head, surfaces))
+            sources |= {f"{name}_{index + 1}": Source(unit, path, index) for index in numbers}
+        elif name not in _LEFT_OUT:
+            sources[name] = Source(unit, path)
+    if building is None:
+        sources |= {f"{CAPACITY_USED}_{k + 1}": Source("", CAPACITY_USED, k) for k in range(surfaces)}
+    for name, measure in (measures(surfaces) if building is None else building_measures()).items():
+        sources.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
+    return sources
 
 
 @lru_cache(maxsize=16)
@@ -216,14 +204,14 @@ def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Column of a history, named as in an exported file -> field of `History`, and index after time."""
     numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
     labels: dict[str, Any] = {**LABELS, **numbers}
-    found = {}
+    columns = {}
     for field, rows in quantities().items():
         several = len(rows.names) > 1
         for index in np.ndindex(*(len(labels[dim]) for dim in rows.dims)):
             name = rows.names[index[-1] if several else 0] if rows.names else field
             shown = list(zip(rows.dims, index, strict=True))[: -1 if several else None]
-            found["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
-    return found
+            columns["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
+    return columns
 
 
 def _finite(value: Any) -> float | None:
@@ -280,8 +268,8 @@ class _Reader:
         values = self.result.history.arrays().get(field)
         if values is None or any(place >= length for place, length in zip(index, values.shape[1:], strict=True)):
             return None
-        found: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
-        return found
+        column_values: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
+        return column_values
 
     def _capacity_used(self, surface: int) -> float | None:
         surfaces = self.result.scene.bearing.surfaces

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from msfp_gen.common.output import make_folder, write_bytes
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.studies.study.chunks import Chunks, chunks_in, parts_in
-from msfp_gen.studies.study.definition import Study, Task
-from msfp_gen.studies.study.engines import Engine, engine_from
+from msfp_gen.studies.batch import build_models
+from msfp_gen.studies.pool import Pool, pool_from
+from msfp_gen.studies.study.chunk_worker import Order, run_chunk
+from msfp_gen.studies.study.chunks import Chunks, chunks_in, failures, parts_in
+from msfp_gen.studies.study.definition import Study
 from msfp_gen.studies.study.loader import load_study
-from msfp_gen.studies.study.status import failures
-from msfp_gen.studies.study.worker import Order, build_models, run_chunk
 
 Progress = Callable[[int, int], None]
 
@@ -81,19 +81,19 @@ def study(
 
     """
     _check_shard(shard)
-    found = source if isinstance(source, Study) else load_study(source)
-    with engine_from(workers, threads, executor, dask, mpi) as engine:
-        return run_on(engine, found, Path(output), shard, progress)
+    definition = source if isinstance(source, Study) else load_study(source)
+    with pool_from(workers, threads, executor, dask, mpi) as pool:
+        return run_on(pool, definition, Path(output), shard, progress)
 
 
 def run_on(
-    engine: Engine, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
+    pool: Pool, study: Study, folder: Path, shard: tuple[int, int] = (1, 1), progress: Progress | None = None
 ) -> Outcome:
-    """Compute what is missing of a study on an engine. Arguments and errors are those of `study`."""
+    """Compute what is missing of a study on a pool. Arguments and errors are those of `study`."""
     make_folder(folder, "output")
     chunks = chunks_in(study, folder)
     chunks.open()
-    return _run(chunks, engine, shard, progress)
+    return _run(chunks, pool, shard, progress)
 
 
 def parsed_shard(text: str) -> tuple[int, int]:
@@ -113,25 +113,26 @@ def _check_shard(shard: tuple[int, int]) -> None:
         raise InputError(f"shard = {'/'.join(map(str, numbers)) or shard!r}: give i/n with i from 1 to n")
 
 
-def _run(chunks: Chunks, engine: Engine, shard: tuple[int, int], progress: Progress | None) -> Outcome:
+def _run(chunks: Chunks, pool: Pool, shard: tuple[int, int], progress: Progress | None) -> Outcome:
     study, present = chunks.study, set(parts_in(chunks.folder))
     numbers = range(shard[0] - 1, study.chunks, shard[1])
-    total = sum(_length(study, number) for number in numbers)
-    missing, before, failed = [], 0, 0
+    total, missing, before, failed = 0, [], 0, 0
     for task in map(study.task, numbers):
+        total += len(task)
         if (path := chunks.path(task)).name in present:
             before, failed = before + len(task), failed + failures(path)
         else:
             missing.append(task.number)
     _check_failures(study, failed, before, chunks.folder)
     if missing:
-        _build(study)
+        build_models([study.scene(1)])  # local workers find its model in the cache; other hosts build their own
         chunks.started()
     if progress is not None:
         progress(before, total)
     done = 0
     order = Order(chunks.identity, chunks.digest, study.recipe, study.files, study.keep, study.limits.run_seconds)
-    for task, (part, bad) in engine.results(run_chunk, _calls(study, missing, order)):
+    calls = ((task, (order, task)) for task in map(study.task, missing))
+    for task, (part, bad) in pool.results(run_chunk, calls):
         write_bytes(chunks.path(task), [part], tidy=False)
         done, failed = done + len(task), failed + bad
         if progress is not None:
@@ -148,18 +149,3 @@ def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
             f"{failed} of {done} runs failed, more than limits.failures = {limit}; see the column message in {folder}, "
             "where they are kept"
         )
-
-
-def _calls(study: Study, numbers: list[int], order: Order) -> Iterator[tuple[Task, tuple[Order, Task]]]:
-    for number in numbers:
-        task = study.task(number)
-        yield task, (order, task)
-
-
-def _length(study: Study, number: int) -> int:
-    return min(study.chunk, study.runs - number * study.chunk)
-
-
-def _build(study: Study) -> None:
-    """Build the model of the first run, so that local workers find it in the cache; other hosts build their own."""
-    build_models([study.scene(1)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,10 +13,12 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.elementary import exp
 from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.errors import InputError
+from msfp_gen.scene.file.catalogue import parsed
 
+WITHIN = (2.0**-53, 1 - 2.0**-53)  # shares that have a finite value
 MOST = 10_000_000  # samples; each takes 8 bytes a random axis, in the process that starts the study
 
-# Distribution -> its parameters, in the order of `_QUANTILES` and `_SHARES`.
+# Distribution -> its parameters.
 DISTRIBUTIONS: dict[str, tuple[str, ...]] = {
     "uniform": ("low", "high"),
     "triangular": ("low", "mode", "high"),
@@ -45,11 +48,11 @@ class Distribution:
     between: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        given = dict(zip(DISTRIBUTIONS[self.kind], self.parameters, strict=True))
+        parameters = dict(zip(DISTRIBUTIONS[self.kind], self.parameters, strict=True))
         for name in ("deviation", "dispersion", "median"):
-            if name in given and given[name] <= 0:
-                raise InputError(f"{name} = {given[name]:g}: give a number above 0")
-        values = [given[name] for name in ("low", "mode", "high") if name in given]
+            if name in parameters and parameters[name] <= 0:
+                raise InputError(f"{name} = {parameters[name]:g}: give a number above 0")
+        values = [parameters[name] for name in ("low", "mode", "high") if name in parameters]
         if values and (sorted(values) != values or values[0] == values[-1]):
             raise InputError(f"{', '.join(map(str, values))}: give {' < '.join(DISTRIBUTIONS[self.kind])}")
         if self.between is not None and not self.share(self.between[0]) < self.share(self.between[1]):
@@ -60,52 +63,30 @@ class Distribution:
         if self.between is not None:
             low, high = (self.share(bound) for bound in self.between)
             shares = low + shares * (high - low)
-        found = _QUANTILES[self.kind](shares, *self.parameters)
-        return found if self.between is None else np.clip(found, *self.between)
+        values = np.asarray(_frozen(self.kind, self.parameters).ppf(shares))
+        if self.kind == "lognormal":  # the exponential of NumPy depends on the processor
+            values = self.parameters[0] * exp(values)
+        return values if self.between is None else np.clip(values, *self.between)
 
     def share(self, value: float) -> float:
         """The share of the distribution, without its bounds, that lies below a value."""
-        return float(_SHARES[self.kind](value, *self.parameters))
+        if self.kind == "lognormal":
+            value = float(np.log(value / self.parameters[0])) if value > 0 else -np.inf
+        return float(_frozen(self.kind, self.parameters).cdf(value))
 
 
-def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
-    left = (mode - low) / (high - low)
-    rising = low + np.sqrt(u * (high - low) * (mode - low))
-    return np.where(u < left, rising, high - np.sqrt((1 - u) * (high - low) * (high - mode)))
+@lru_cache(maxsize=64)
+def _frozen(kind: str, parameters: tuple[float, ...]) -> Any:
+    """The distribution of `scipy.stats`, of a lognormal one that of the logarithm over the median."""
+    from scipy import stats
 
-
-def _triangular_share(x: float, low: float, mode: float, high: float) -> float:
-    x = min(max(x, low), high)
-    if x < mode:
-        return (x - low) ** 2 / ((high - low) * (mode - low))
-    return 1.0 - (high - x) ** 2 / ((high - low) * (high - mode)) if x < high else 1.0
-
-
-def _normal(u: Array, mean: float, deviation: float) -> Array:
-    from scipy.special import ndtri
-
-    found: Array = mean + deviation * ndtri(u)
-    return found
-
-
-def _normal_share(x: float, mean: float, deviation: float) -> float:
-    from scipy.special import ndtr
-
-    return float(ndtr((x - mean) / deviation))
-
-
-_QUANTILES: dict[str, Callable[..., Array]] = {
-    "uniform": lambda u, low, high: low + u * (high - low),
-    "triangular": _triangular,
-    "normal": _normal,
-    "lognormal": lambda u, median, dispersion: median * exp(_normal(u, 0.0, dispersion)),
-}
-_SHARES: dict[str, Callable[..., float]] = {
-    "uniform": lambda x, low, high: min(max((x - low) / (high - low), 0.0), 1.0),
-    "triangular": _triangular_share,
-    "normal": _normal_share,
-    "lognormal": lambda x, median, dispersion: _normal_share(np.log(x / median), 0.0, dispersion) if x > 0 else 0.0,
-}
+    if kind == "triangular":
+        low, mode, high = parameters
+        return stats.triang((mode - low) / (high - low), low, high - low)
+    first, second = parameters
+    if kind == "uniform":
+        return stats.uniform(first, second - first)
+    return stats.norm(first if kind == "normal" else 0.0, second)
 
 
 @dataclass(frozen=True)
@@ -144,15 +125,19 @@ class Sampling:
                     f"sampling.values: give {count} values in each row, one for each axis with a distribution"
                 )
             return np.array(self.values)
-        shares = self.shares(count)
-        return np.column_stack([each.values(shares[:, index]) for index, each in enumerate(distributions)])
+        return values_at(self.shares(count), distributions)
 
     def shares(self, axes: int) -> Array:
         """Shares of the distributions, ndarray, shape (samples, axes), in (0, 1); equal for equal seeds."""
         if not axes:
             return np.zeros((1, 0))
-        drawn = _DRAWS[self.method](self, axes)
-        return np.clip(drawn, 2.0**-53, 1 - 2.0**-53)
+        return np.clip(_DRAWS[self.method](self, axes), *WITHIN)
+
+
+def values_at(shares: Array, distributions: Sequence[Distribution]) -> Array:
+    """The values below which these shares of the distributions lie, ndarrays, shape (samples, axes)."""
+    inside = np.clip(shares, *WITHIN)
+    return np.column_stack([one.values(inside[:, index]) for index, one in enumerate(distributions)])
 
 
 def _latin_hypercube(plan: Sampling, axes: int) -> Array:
@@ -217,10 +202,7 @@ def distribution_from(table: Mapping[str, Any]) -> tuple[Distribution, set[str]]
     numbers = {name: number_of(table, name) for name in names}
     between = table.get("between")
     if between is not None:
-        try:
-            between = Quantity("", shape=(2,)).parse(between)
-        except ValueError as error:
-            raise InputError(f"between = {between!r}: {error}") from None
+        between = parsed(Quantity("", shape=(2,)), between, "between")
     return Distribution(kind, tuple(numbers.values()), between), {"distribution", "between", *names}
 
 

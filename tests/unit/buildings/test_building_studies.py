@@ -14,8 +14,7 @@ from msfp_gen import BuildingScene, InputError, bound, changed_scene, simulate, 
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.bounding.figure import plot_bounds
-from msfp_gen.studies.bounding.tables import bounding_tables, write_quantities
+from msfp_gen.studies.bounding.output import bounding_tables, plot_bounds, write_quantities
 from msfp_gen.studies.study.loader import load_study
 
 TEXT = """

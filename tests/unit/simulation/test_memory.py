@@ -58,7 +58,7 @@ def test_the_rows_of_a_batch_count_together(monkeypatch: pytest.MonkeyPatch) -> 
     scene = scene_of("fenz-test2", output_step=0.01)
     with_memory(monkeypatch, 3.5 * memory._needed(scene))
     memory.require_memory([scene] * 3)
-    monkeypatch.setattr("msfp_gen.simulation.batch.build_model", None)
+    monkeypatch.setattr("msfp_gen.studies.batch.build_model", None)
     with pytest.raises(InputError, match=r"output_step = 0\.01: 4 runs need .* GB of memory"):
         simulate_batch([scene] * 4)
 

@@ -24,7 +24,6 @@ from msfp_gen import (
     InputError,
     Layout,
     Motion,
-    RunError,
     Scene,
     Solver,
     Surface,
@@ -33,7 +32,7 @@ from msfp_gen import (
 )
 from msfp_gen.cli import main
 from msfp_gen.studies.bounding import Bounds, bound, bounded_scenes, factor_tables, load_factors
-from msfp_gen.studies.bounding.figure import plot_bounds
+from msfp_gen.studies.bounding.output import plot_bounds
 from msfp_gen.studies.bounding.runs import _scaled
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
@@ -233,8 +232,8 @@ def test_bounds_of_a_single_pendulum_in_closed_form() -> None:
 
 def test_the_nominal_case_is_the_scene_itself() -> None:
     nominal = single().cases[1]
-    assert nominal.name == "nominal" and nominal.result is not None and nominal.found is not None
-    assert nominal.found.as_dict() == nominal.result.characterise().as_dict()
+    assert nominal.name == "nominal" and nominal.result is not None and nominal.characterisation is not None
+    assert nominal.characterisation.as_dict() == nominal.result.characterise().as_dict()
     assert nominal.scene.bearing.surfaces[0].friction == 0.05
 
 
@@ -256,14 +255,14 @@ def test_figure_overlays_the_three_loops(tmp_path: Path) -> None:
 
 @pytest.fixture
 def upper_fails(monkeypatch: Any) -> None:
-    def simulate(scene: Scene, *, progress: Any = None) -> Any:
+    def run_to_end(scene: Scene, *_: Any) -> Any:
         run = dataclasses.replace(loops(), scene=scene)
         if scene.name.endswith("upper"):
-            run = dataclasses.replace(run, status="newton", message="t = 3 s")
-            raise RunError("stopped at t = 3 s: jammed", status="newton", result=run)
+            return dataclasses.replace(run, status="newton", message="stopped at t = 3 s: jammed")
         return run
 
-    monkeypatch.setattr("msfp_gen.studies.bounding.runs.simulate", simulate)
+    monkeypatch.setattr("msfp_gen.studies.batch.run_to_end", run_to_end)
+    monkeypatch.setattr("msfp_gen.studies.batch.build_models", lambda _: None)
     monkeypatch.setattr("msfp_gen.model.model.build_model", lambda *_, **__: None)
 
 
@@ -286,11 +285,11 @@ def test_a_bound_that_fails_leaves_the_others(upper_fails: None, tmp_path: Path,
 
 
 def test_an_interruption_stops_all_runs(monkeypatch: Any) -> None:
-    def simulate(scene: Scene, **_: Any) -> Any:
-        raise RunError("interrupted", status="interrupted")
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr("msfp_gen.studies.bounding.runs.simulate", simulate)
-    with pytest.raises(RunError, match="interrupted"):
+    monkeypatch.setattr("msfp_gen.studies.pool.wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
         bound(load_scene("fenz-test2"), load_factors("asce7"))
 
 

@@ -220,7 +220,7 @@ def test_what_a_run_does_not_have_is_none() -> None:
     found, _ = keep.values(simulate(load_scene("fenz-test1")), {})
     assert found["peak_sliding_4"] is not None and found["peak_sliding_5"] is None
     assert found["peak_temperature_1"] is None and found["one"] is None
-    assert len(catalogue(6)) > len(catalogue(4))
+    assert len(catalogue(6, None)) > len(catalogue(4, None))
 
 
 def test_chunks_are_of_a_size_that_suits_the_number_of_runs() -> None:

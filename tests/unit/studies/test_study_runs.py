@@ -20,8 +20,8 @@ from support.study_tables import cheap_study, rows_of
 import msfp_gen
 from msfp_gen import InputError, RunError, simulate
 from msfp_gen.studies import load_study, read_study, study_status
+from msfp_gen.studies.study import chunk_worker
 from msfp_gen.studies.study import run as running
-from msfp_gen.studies.study import worker
 
 LONG = {  # a run of about a minute
     "bearing": "fenz-tfp",
@@ -59,7 +59,7 @@ def test_what_is_missing_is_computed_and_nothing_else(tmp_path: Path, monkeypatc
     (tmp_path / lost).unlink()
     asked = []
     monkeypatch.setattr(
-        running, "run_chunk", lambda order, task: asked.append(task.number) or worker.run_chunk(order, task)
+        running, "run_chunk", lambda order, task: asked.append(task.number) or chunk_worker.run_chunk(order, task)
     )
     assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 8, 4, 0)
     assert asked == [1] and contents(tmp_path) == whole

@@ -13,7 +13,7 @@ from msfp_gen.motions.records import Record, ScaleTo, response_spectrum, scaled_
 from msfp_gen.motions.records.record import G
 from msfp_gen.result import Result
 from msfp_gen.scene.file.suite import load_suite
-from msfp_gen.studies.sweep.variations import variations, varied_field
+from msfp_gen.studies.sweep import variations, varied_field
 
 STEP = 0.02
 

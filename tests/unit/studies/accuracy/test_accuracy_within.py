@@ -29,8 +29,7 @@ from msfp_gen.cli import main
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.studies.accuracy import error_target, simulate_within, timed_run
-from msfp_gen.studies.accuracy.effects import with_all_effects
-from msfp_gen.studies.accuracy.error_target import CANDIDATE_TOLERANCES, largest_error
+from msfp_gen.studies.accuracy.error_target import CANDIDATE_TOLERANCES, largest_error, with_all_effects
 from msfp_gen.studies.accuracy.timed_run import CUT_OFF, errors, run_native
 
 

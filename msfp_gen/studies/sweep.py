@@ -1,67 +1,109 @@
-"""The table of a sweep: one row for each run, with the varied fields and the peaks, as CSV, Parquet or text."""
+"""Parameter sweeps: a scene in every combination of the values of some fields, and the table of the runs."""
 
 from __future__ import annotations
 
-import csv
-import json
+import tomllib
 from collections.abc import Mapping, Sequence
-from io import BytesIO, StringIO
+from dataclasses import replace
+from itertools import product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.common.output import check_output, write_bytes
-from msfp_gen.common.tables import Table
+from msfp_gen.buildings.load import AnyScene, with_absolute_paths
+from msfp_gen.common.tables import Table, write_columns
+from msfp_gen.errors import InputError
+from msfp_gen.scene.file.changes import keys_of
+from msfp_gen.scene.file.loader import scene_table
+from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, of_building, plain_cell, summary_value
+from msfp_gen.studies.study.axes import Axis, located
+from msfp_gen.studies.study.scene_factory import Recipe, SceneFactory, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
-    from msfp_gen.studies.sweep.variations import Variation
+    from msfp_gen.scene.file.suite import SuiteRecord
 
-TABLE_SUFFIXES = (".csv", ".parquet")
+MAX_SCENES = 100_000  # of one sweep; more are taken to be a typing error
 WIDTH = 80  # columns of a terminal
 LONGEST = 16  # characters of a varied value, or of the name of a scene, in a terminal
 
-# Column -> (unit, path in the summary). A path that ends in * gives one column for each surface, bottom first.
-COLUMNS = {
-    "status": ("", "status"),
-    "message": ("", "message"),
-    "duration": ("s", "duration"),
-    "peak_displacement": ("m", "peak_displacement.radial"),
-    "peak_top_force": ("N", "peak_top_force.radial"),
-    "peak_force_ratio": ("", "peak_force_ratio"),
-    "peak_sliding": ("m", "peak_sliding.*"),
-    "minimum_gap": ("m", "minimum_gap.*"),
-    "minimum_normal_force": ("N", "minimum_normal_force.*"),
-    "maximum_normal_force": ("N", "maximum_normal_force.*"),
-    "rims_met": ("", "rims_met"),
-    "peak_input_energy": ("J", "energy.peak_input"),
-    "closure_error": ("", "energy.closure_error"),
-    "steps": ("", "counters.steps"),
-    "wall_time": ("s", "wall_time"),
-}
-# The same of a building; `.*.` stands for each floor, storey or bearing, from below or in the order of the file.
-BUILDING_COLUMNS = {
-    "status": ("", "status"),
-    "message": ("", "message"),
-    "duration": ("s", "duration"),
-    "peak_displacement": ("m", "peak_displacement.radial"),
-    "peak_base_shear": ("N", "peak_base_shear.radial"),
-    "base_shear_ratio": ("", "base_shear_ratio"),
-    "peak_base_torsion": ("N m", "peak_base_torsion"),
-    "peak_floor_acceleration": ("m/s^2", "peak_floor_acceleration.radial"),
-    "peak_vertical_acceleration": ("m/s^2", "peak_floor_acceleration.E3"),
-    "peak_drift_ratio": ("", "peak_drift_ratio"),
-    "minimum_load_ratio": ("", "minimum_load_ratio"),
-    "maximum_load_ratio": ("", "maximum_load_ratio"),
-    "rims_met": ("", "rims_met"),
-    "floor_acceleration": ("m/s^2", "floors.*.peak_acceleration.radial"),
-    "storey_drift_ratio": ("", "storeys.*.peak_drift_ratio"),
-    "storey_shear": ("N", "storeys.*.peak_shear.radial"),
-    "bearing_displacement": ("m", "bearings.*.peak_displacement.radial"),
-    "bearing_load_ratio": ("", "bearings.*.minimum_load_ratio"),
-    "closure_error": ("", "energy.closure_error"),
-    "wall_time": ("s", "wall_time"),
-}
+
+class Variation(NamedTuple):
+    """A scene of a sweep: the file or preset that it comes from, and the varied fields by their paths."""
+
+    source: str
+    varied: Mapping[str, Any]
+    scene: AnyScene
+
+
+def varied_field(text: str) -> tuple[str, list[Any]]:
+    """Path and values of a field from a text such as `motion.scale=0.5,1,2`; values as in TOML. Raises InputError."""
+    path, equals, values = text.partition("=")
+    path = path.strip()
+    try:
+        keys = keys_of(path) if equals else []
+    except InputError:
+        keys = []
+    if not keys:
+        raise InputError(f"--vary = {text!r}: give a field of the scene and its values: motion.scale=0.5,1,2")
+    try:
+        listed = tomllib.loads(f"values = [{values}]")["values"]
+    except (ValueError, RecursionError):
+        raise InputError(
+            f"--vary = {text!r}: the values are no TOML; texts need quotes, numbers do not: top.kind='rig','mass'"
+        ) from None
+    if not listed:
+        raise InputError(f"--vary = {text!r}: there are no values; give some: motion.scale=0.5,1,2")
+    return path, listed
+
+
+def variations(
+    source: str | Path, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord] = ()
+) -> list[Variation]:
+    """The scenes of all combinations of values, the last field varying fastest; their names state the values.
+
+    source: scene file or preset. fields: path and values of each. records: of a suite, in place of the motion of the
+    scene; they vary slowest, as the field "record". Raises InputError: a field is given twice, does not exist, or does
+    not accept a value.
+    """
+    paths = [path for path, _ in fields]
+    if records and (motion := [path for path in paths if path.partition(".")[0] == "motion"]):
+        raise InputError(f"--vary {motion[0]}: --suite gives the motion; change its records there")
+    if repeated := [path for path in paths if paths.count(path) > 1]:
+        raise InputError(f"--vary {repeated[0]}: given twice; give all its values at once")
+    lists = [*([[record.name for record in records]] if records else []), *(values for _, values in fields)]
+    if prod(map(len, lists)) > MAX_SCENES:
+        raise InputError(f"--vary: {prod(map(len, lists))} scenes; give at most {MAX_SCENES} in all")
+    names = [*(["record"] if records else []), *paths]
+    table, path = scene_table(source)
+    try:
+        factory, axes = _factory(table, None if path is None else path.parent, fields, records)
+        return [
+            _variation(source, dict(zip(names, shown, strict=True)), factory.scene(values))
+            for shown, values in zip(product(*lists), product(*axes), strict=True)
+        ]
+    except InputError as error:
+        if path is None:
+            raise
+        raise InputError(f"{path}: {error}") from None
+
+
+def _factory(
+    table: dict[str, Any], folder: Path | None, fields: Sequence[tuple[str, list[Any]]], records: Sequence[SuiteRecord]
+) -> tuple[SceneFactory, list[tuple[Any, ...]]]:
+    """What makes the scenes, and the values of its axes."""
+    tables = {record.name: record.table for record in records}
+    axes = [Axis("record", "record", values=tuple(tables))] if records else []
+    axes += [located(Axis(path, "sets", (path,), values=tuple(values)), folder) for path, values in fields]
+    scene = with_absolute_paths(table if not records else {**table, "motion": motion_of(records[0].table)}, folder)
+    return SceneFactory(Recipe(scene, tuple(axes), tables, {}, {})), [axis.values or () for axis in axes]
+
+
+def _variation(source: str | Path, varied: dict[str, Any], scene: AnyScene) -> Variation:
+    values = ", ".join(f"{path} = {value}" for path, value in varied.items())
+    name = scene.name or Path(source).stem
+    return Variation(str(source), varied, replace(scene, name=f"{name}, {values}" if values else name))
 
 
 class Row(NamedTuple):
@@ -85,16 +127,8 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult, f
 
 
 def write_table(rows: Sequence[Row], path: str | Path, name: str = "output") -> Path:
-    """Write the rows, sorted by their number, as CSV or Parquet by the suffix; completely or not at all.
-
-    Names carry units in CSV (`peak_displacement [m]`); in Parquet units are metadata of the columns. Raises InputError
-    for an invalid path.
-    """
-    target = check_output(path, TABLE_SUFFIXES, name)
-    table = _columns(sorted(rows))
-    content = _csv(table) if target.suffix.lower() == ".csv" else _parquet(table)
-    write_bytes(target, [content])
-    return target
+    """Write the rows, sorted by their number, as CSV or Parquet; arguments and errors are those of `write_columns`."""
+    return write_columns(path, _columns(sorted(rows)), name)
 
 
 def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
@@ -115,62 +149,10 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
     return {**table, ("file", ""): [row.file for row in rows]}
 
 
-def of_building(summary: Mapping[str, Any]) -> bool:
-    """Whether this is the summary of a building."""
-    return "bearings" in summary
-
-
 def _known(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
     """The columns that some of the rows have."""
     kinds = {of_building(row.summary) for row in rows}
     return {**(COLUMNS if False in kinds else {}), **(BUILDING_COLUMNS if True in kinds else {})}
-
-
-def summary_value(summary: Mapping[str, Any], path: str) -> Any:
-    """The value of a summary at a dotted path, None where it has none; `*` gives a list of the values of all rows."""
-    value: Any = summary
-    head, each, rest = path.partition(".*")
-    for part in head.split("."):
-        value = value.get(part) if isinstance(value, Mapping) else None
-    if not each or value is None:
-        return value
-    return [summary_value(row, rest.lstrip(".")) for row in value] if rest else value
-
-
-def plain_cell(value: Any) -> Any:
-    """A value of a cell: lists of whole numbers separated by spaces (`rims_met`), other lists and tables as JSON."""
-    if isinstance(value, list) and all(type(item) is int for item in value):
-        return " ".join(map(str, value))
-    return json.dumps(value, default=str) if isinstance(value, list | tuple | dict) else value
-
-
-def _csv(table: Mapping[tuple[str, str], list[Any]]) -> bytes:
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit in table])
-    writer.writerows(zip(*table.values(), strict=True))
-    return text.getvalue().encode()
-
-
-def _parquet(table: Mapping[tuple[str, str], list[Any]]) -> memoryview:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    arrays = [pa.array(_one_type(values)) for values in table.values()]
-    fields = [
-        pa.field(name, array.type, metadata={"units": unit}) for (name, unit), array in zip(table, arrays, strict=True)
-    ]
-    content = BytesIO()
-    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), content)
-    return content.getbuffer()
-
-
-def _one_type(values: list[Any]) -> list[Any]:
-    """Values of one type for a column: numbers stay numbers; where texts occur, all are texts."""
-    kinds = {type(value) for value in values if value is not None}
-    if kinds == {int, float}:
-        return [None if value is None else float(value) for value in values]
-    return values if len(kinds) <= 1 else [None if value is None else str(value) for value in values]
 
 
 def sweep_table(rows: Sequence[Row]) -> Table:

@@ -1,6 +1,6 @@
 """What a worker needs to make the scene of a run: the base scene as a table, and what the axes change in it.
 
-Only this module knows what the base of a study is; parts, engines and evaluations know rows.
+Only this module knows what the base of a study is; parts, pools and evaluations know rows.
 """
 
 from __future__ import annotations
@@ -47,7 +47,12 @@ class Recipe:
         return {INTENSITY: self.intensities[at["record"]] * at.get("scale", 1.0)}
 
 
-class SceneMaker:
+def motion_of(record: Table) -> Table:
+    """The `[motion]` table of a scene, of a record."""
+    return {"kind": RecordMotion.kind, **record}
+
+
+class SceneFactory:
     """Makes the scenes of a study: each is what the reader of scene files makes of the table of the run.
 
     A motion that no axis changes is resolved once; what is made of other motions and of the frame of a building is kept
@@ -76,15 +81,15 @@ class SceneMaker:
         axes, table = self.recipe.axes, self._table
         for _, index, path in self._setting:
             table = changed_table(table, {path: values[index]}, axes[index].surfaces)
-        given = list(zip(axes, values, strict=True))
-        for axis, value in given:
+        chosen = list(zip(axes, values, strict=True))
+        for axis, value in chosen:
             if axis.change == "record":
-                scale = next((each for axis, each in given if axis.change == "scale"), 1.0)
-                table = {**table, "motion": {"kind": RecordMotion.kind, **self._scaled(value, scale)}}
+                scale = next((each for axis, each in chosen if axis.change == "scale"), 1.0)
+                table = {**table, "motion": motion_of(self._scaled(value, scale))}
             for path in axis.paths if axis.change == "multiplies" else ():
                 table = multiplied_table(table, path, value, axis.surfaces)
         scene = scene_of(table, **self._given)
-        for axis, value in given:
+        for axis, value in chosen:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
         return scene

@@ -1,27 +1,37 @@
-"""Random studies one after the other on the same workers, against their runs one by one.
+"""Studies on every pool: rows are those of runs one by one, on threads, processes, Dask and MPI.
 
-Their files have the same names and other contents in every study, in one folder or in several.
+Random studies run one after the other on the same workers: their files have the same names and other contents in every
+study, in one folder or in several.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
-from support.study_tables import rows_of, write_record
+from support.study_tables import cheap_study, rows_of, write_record
 
 import msfp_gen
-from msfp_gen import simulate
+from msfp_gen import InputError, simulate
 from msfp_gen.scene.file.catalogue import scene_table
 from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.studies import load_study
 
+LAUNCHER = shutil.which("mpiexec")
 Table = dict[str, Any]
 AXES: tuple[Table, ...] = (
     {"sets": "bearing.friction", "values": [[0.05, 0.02, 0.02, 0.09], 0.06]},
@@ -101,3 +111,74 @@ def test_studies_on_the_same_threads_are_their_runs(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["threads", "processes", "dask"])
 def test_many_studies_on_the_same_workers_are_their_runs(name: str, tmp_path: Path) -> None:
     check(name, range(3, 11), tmp_path)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """The rows of the study without Dask."""
+    folder = tmp_path_factory.mktemp("whole")
+    msfp_gen.study(many(), folder, threads=True)
+    return rows_of(folder)
+
+
+def many() -> dict[str, Any]:
+    return cheap_study(sampling={"samples": 50, "seed": 3}, chunk=2)
+
+
+def test_rows_of_dask_are_those_of_threads(cluster: Any, whole: pd.DataFrame, tmp_path: Path) -> None:
+    assert msfp_gen.study(many(), tmp_path, dask=cluster.scheduler_address) == (100, 0, 100, 0)
+    pd.testing.assert_frame_equal(rows_of(tmp_path), whole)
+
+
+def test_a_killed_worker_costs_nothing_but_time(cluster: Any, whole: pd.DataFrame, tmp_path: Path) -> None:
+    """Its chunks go to the other worker, and its nanny starts it again."""
+    victim = next(iter(cluster.workers.values())).pid
+
+    def kill() -> None:
+        while len(list(tmp_path.glob("part-*.parquet"))) < 5:
+            time.sleep(0.002)
+        os.kill(victim, signal.SIGKILL)
+
+    killer = Thread(target=kill)
+    killer.start()
+    done = msfp_gen.study(many(), tmp_path, dask=cluster.scheduler_address)
+    killer.join()
+    assert done == (100, 0, 100, 0)
+    pd.testing.assert_frame_equal(rows_of(tmp_path), whole)
+
+
+def test_no_scheduler_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("msfp_gen.studies.pool.CONNECT", "1s")
+    with pytest.raises(InputError, match=r"--dask = 'tcp://127.0.0.1:9': no scheduler answers there") as caught:
+        msfp_gen.study(many(), tmp_path / "out", dask="tcp://127.0.0.1:9")
+    assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(LAUNCHER is None, reason="needs an MPI library and its mpiexec")
+def test_rows_of_mpi_are_those_of_threads(tmp_path: Path) -> None:
+    pytest.importorskip("mpi4py")
+    file, out, whole = tmp_path / "study.toml", tmp_path / "out", tmp_path / "whole"
+    file.write_text(dumps(cheap_study()), encoding="utf-8")
+    command = [str(LAUNCHER), "-n", "3", sys.executable, "-m", "mpi4py.futures", "-m", "msfp_gen"]
+    command += ["study", str(file), "-o", str(out), "--mpi"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert run.returncode == 0 and "12 of 12 runs" in run.stdout, run.stderr
+    msfp_gen.study(file, whole, threads=True)
+    pd.testing.assert_frame_equal(rows_of(out), rows_of(whole))
+
+
+def test_one_process_or_no_library_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("mpi4py")
+    with pytest.raises(InputError, match=r"--mpi: (this is one process; start it as mpiexec|.*install an MPI library)"):
+        msfp_gen.study(cheap_study(), tmp_path / "out", mpi=True)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,340 @@
+"""Commands for studies of many runs: study, with the subcommands that run, watch, evaluate and search."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from msfp_gen.cli.console import AsJson, Progress, Workers, note, number, numbers, say, show
+from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
+from msfp_gen.common.tables import TABLE_SUFFIXES
+from msfp_gen.errors import InputError
+
+if TYPE_CHECKING:
+    from msfp_gen.common.tables import Table
+    from msfp_gen.studies.study.run import Outcome
+
+app = typer.Typer()
+
+
+class _StudyGroup(TyperGroup):
+    """A group whose first word is a subcommand, or else the file of a study to run."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        own = {name for parameter in self.params for name in parameter.opts} | {"--help"}
+        if args and args[0] not in self.commands and args[0] not in own:
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+group = typer.Typer(cls=_StudyGroup, no_args_is_help=True)
+app.add_typer(
+    group,
+    name="study",
+    help="Run a study of many runs: `msfp-gen study FILE -o DIR`; the same command continues it. Its options: "
+    "`msfp-gen study run --help`.",
+    epilog="Examples:\n\n\b\n"
+    "  msfp-gen study --example > study.toml\n  msfp-gen study study.toml -o out\n"
+    "  msfp-gen study status out",
+)
+
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study.")]
+Measure = Annotated[str, typer.Option(metavar="COLUMN", help="The intensity measure.")]
+Demand = Annotated[str, typer.Option(metavar="COLUMN", help="The demand.")]
+Quantity = Annotated[str, typer.Option(metavar="COLUMN", help="The quantity.")]
+Statistic = Annotated[str, typer.Option(metavar="median|mean|max|min", help="Over the runs of one sample.")]
+Level = Annotated[float, typer.Option(parser=number, metavar="SHARE", help="Confidence of intervals and bands.")]
+Where = Annotated[
+    list[str] | None,
+    typer.Option(metavar="COLUMN=VALUE", help="Only the runs with this value, such as bounds=upper; may be repeated."),
+]
+Plot = Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the figure: .png, .svg or .pdf.")]
+Output = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the numbers: .csv or .parquet.")
+]
+Dask = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: its scheduler, or a scheduler file.")
+]
+Threads = Annotated[bool, typer.Option("--threads", help="Threads in place of processes.")]
+
+
+@group.command(
+    epilog="Examples:\n\n\b\n  msfp-gen study study.toml -o out --workers 8\n"
+    "  msfp-gen study study.toml -o out --shard $SLURM_ARRAY_TASK_ID/16\n"
+    "  msfp-gen study study.toml -o out --dask tcp://10.0.0.1:8786"
+)
+def run(
+    source: Annotated[Path | None, typer.Argument(metavar="FILE", help="A study file (TOML).")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the study: part-*.parquet.")
+    ] = None,
+    workers: Workers = None,
+    threads: Threads = False,
+    dask: Dask = None,
+    mpi: Annotated[
+        bool, typer.Option("--mpi", help="Run on MPI processes: mpiexec -n N python -m mpi4py.futures -m msfp_gen ...")
+    ] = False,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
+    ] = None,
+    example: Annotated[bool, typer.Option("--example", help="Print a small study file, to start from.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run what is missing of a study. Ctrl-C at any time: the same command continues."""
+    from msfp_gen.studies.study.loader import example_text, load_study
+    from msfp_gen.studies.study.run import parsed_shard
+    from msfp_gen.studies.study.run import study as run_study
+
+    if example:
+        say(example_text().rstrip("\n"))
+        return
+    if source is None:
+        raise InputError("study: no FILE is given; `msfp-gen study --example` prints one to start from")
+    if output is None:
+        raise InputError("--output is missing: give the folder of the study, such as -o out")
+    part = (1, 1) if shard is None else parsed_shard(shard)
+    with Progress("records") as progress:
+        definition = load_study(source, progress)
+    try:
+        with Progress(f"{definition.runs} runs") as progress:
+            done = run_study(
+                definition, output, workers=workers, threads=threads, dask=dask, mpi=mpi, shard=part, progress=progress
+            )
+    except KeyboardInterrupt:
+        note(f"what is done is kept in {output}; the same command continues")
+        raise
+    _report(done, output, as_json)
+
+
+def _report(done: Outcome, output: Path, as_json: bool) -> None:
+    if as_json:
+        say(json.dumps(done._asdict(), indent=2))
+        return
+    before = f", {done.before} of them before" if done.before else ""
+    say(f"{done.before + done.done} of {done.runs} runs are in {output}{before}; {done.failed} failed")
+    if done.failed:
+        note("runs that failed are rows with their status and message")
+
+
+@group.command(epilog="Examples:\n\n\b\n  msfp-gen study status out\n  msfp-gen study status out --json")
+def status(folder: Folder, as_json: AsJson = False) -> None:
+    """How far a study has come, how fast it is, and how long it will still take."""
+    from msfp_gen.studies.study.chunks import status_table, study_status
+
+    progress = study_status(folder)
+    if as_json:
+        say(json.dumps(progress.as_dict(), indent=2))
+    else:
+        show([status_table(progress)])
+
+
+@group.command(epilog="Examples:\n\n\b\n  msfp-gen study ida out --demand peak_displacement --plot ida.png")
+def ida(
+    folder: Folder,
+    demand: Demand,
+    measure: Measure = "scale",
+    fractiles: Annotated[
+        Any, typer.Option(parser=numbers, metavar="SHARES", help="Shares of the runs.")
+    ] = "0.16,0.5,0.84",
+    where: Where = None,
+    plot: Plot = None,
+    output: Output = None,
+    as_json: AsJson = False,
+) -> None:
+    """Curves of demand over intensity, one for each record, and their fractiles."""
+    from msfp_gen.studies.assessment.figures import plot_ida
+    from msfp_gen.studies.assessment.ida import ida as analyse
+    from msfp_gen.studies.assessment.ida import ida_table
+    from msfp_gen.studies.assessment.rows import chosen_rows, read_study
+
+    _check(plot, output)
+    result = analyse(chosen_rows(read_study(folder), where or ()), measure, demand, fractiles)
+    plain = result.fractiles.replace(float("inf"), None).to_dict("records")
+    content = {"measure": measure, "demand": demand, "unit": result.unit, "fractiles": plain}
+    _finish(content, ida_table(result), result.fractiles, partial(plot_ida, result), (plot, output, as_json))
+
+
+@group.command(
+    epilog="Examples:\n\n\b\n"
+    "  msfp-gen study fragility out --demand peak_displacement --thresholds 0.15,0.22 --plot fragility.png\n"
+    "  msfp-gen study fragility out --demand peak_sliding_1 --thresholds 0.13 --bootstrap 1000 --by bounds"
+)
+def fragility(
+    folder: Folder,
+    demand: Demand,
+    thresholds: Annotated[
+        Any,
+        typer.Option(parser=numbers, metavar="VALUES", help="Damage states: values of the demand."),
+    ],
+    measure: Measure = "scale",
+    early: Annotated[
+        str,
+        typer.Option(metavar="leave-out|exceed|refuse", help="Runs that ended early below a threshold."),
+    ] = "leave-out",
+    level: Level = 0.95,
+    bootstrap: Annotated[
+        int,
+        typer.Option(metavar="NUMBER", help="Bands from so many bootstrap samples of whole clusters; 0: likelihood."),
+    ] = 0,
+    cluster: Annotated[str, typer.Option(metavar="COLUMN", help="What the bootstrap draws as a whole.")] = "record",
+    by: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="Curves for each value of a column, such as bounds.")
+    ] = None,
+    where: Where = None,
+    plot: Plot = None,
+    output: Output = None,
+    as_json: AsJson = False,
+) -> None:
+    """Lognormal fragility curves by maximum likelihood, with confidence bands, one for each threshold."""
+    from msfp_gen.studies.assessment.figures import plot_fragility
+    from msfp_gen.studies.assessment.fragility import fragility as analyse
+    from msfp_gen.studies.assessment.fragility import fragility_frame, fragility_table
+    from msfp_gen.studies.assessment.rows import chosen_rows, read_study
+
+    _check(plot, output)
+    rows = chosen_rows(read_study(folder), where or ())
+    result = analyse(
+        rows, measure, demand, thresholds, early=early, level=level, bootstrap=bootstrap, cluster=cluster, by=by
+    )  # fmt: skip
+    table, frame = fragility_table(result), fragility_frame(result)
+    _finish(result.as_dict(), table, frame, partial(plot_fragility, result), (plot, output, as_json))
+
+
+@group.command(epilog="Examples:\n\n\b\n  msfp-gen study tornado out --quantity peak_displacement --plot tornado.png")
+def tornado(
+    folder: Folder,
+    quantity: Quantity,
+    statistic: Statistic = "median",
+    plot: Plot = None,
+    output: Output = None,
+    as_json: AsJson = False,
+) -> None:
+    """The change of a quantity with each random axis alone; for `sampling.method = "one-at-a-time"`."""
+    from msfp_gen.studies.assessment.figures import plot_tornado
+    from msfp_gen.studies.assessment.sensitivity import tornado as analyse
+    from msfp_gen.studies.assessment.sensitivity import tornado_table
+
+    _check(plot, output)
+    result = analyse(folder, quantity, statistic)
+    rows = [vars(bar) for bar in result.bars]
+    _finish(asdict(result), tornado_table(result), rows, partial(plot_tornado, result), (plot, output, as_json))
+
+
+@group.command(epilog="Examples:\n\n\b\n  msfp-gen study sobol out --quantity peak_displacement --plot sobol.png")
+def sobol(
+    folder: Folder,
+    quantity: Quantity,
+    statistic: Statistic = "median",
+    level: Level = 0.95,
+    plot: Plot = None,
+    output: Output = None,
+    as_json: AsJson = False,
+) -> None:
+    """First-order and total Sobol' indices of a quantity; for `sampling.method = "sobol-indices"`, with SALib."""
+    from msfp_gen.studies.assessment.figures import plot_sobol
+    from msfp_gen.studies.assessment.sensitivity import sobol as analyse
+    from msfp_gen.studies.assessment.sensitivity import sobol_table
+
+    _check(plot, output)
+    result = analyse(folder, quantity, statistic, level)
+    columns = ("axes", "first", "first_interval", "total", "total_interval")
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(getattr(result, c) for c in columns), strict=True)]
+    _finish(asdict(result), sobol_table(result), rows, partial(plot_sobol, result), (plot, output, as_json))
+
+
+def _check(plot: Path | None, output: Path | None) -> None:
+    """Refuse paths that cannot be written before anything is read."""
+    if plot is not None:
+        check_output(plot, FIGURE_SUFFIXES, "--plot")
+    if output is not None:
+        check_output(output, TABLE_SUFFIXES, "--output")
+
+
+def _finish(
+    content: dict[str, Any],
+    table: Table,
+    rows: Any,
+    draw: Callable[[Path], Any],
+    options: tuple[Path | None, Path | None, bool],
+) -> None:
+    """Print an evaluation, write its rows and draw its figure. options: --plot, --output and --json."""
+    import pandas as pd
+
+    from msfp_gen.studies.assessment.rows import write_frame
+
+    plot, output, as_json = options
+    if as_json:
+        say(json.dumps(content, indent=2, allow_nan=False))
+    else:
+        show([table])
+    if output is not None:
+        note(f"wrote {write_frame(pd.DataFrame(rows), output, '--output')}")
+    if plot is not None:
+        draw(plot)
+        note(f"wrote {plot}")
+
+
+@group.command(
+    epilog="Examples:\n\n\b\n  msfp-gen study pareto study.toml -o search --minimise peak_displacement "
+    "--minimise peak_force_ratio\n"
+    "  msfp-gen study pareto study.toml -o search --minimise peak_force_ratio --maximise effective_damping "
+    "--at-most peak_sliding_1=0.12 --plot front.png"
+)
+def pareto(
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="A study file (TOML); random axes are the variables.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the search: designs.parquet, and all runs.")
+    ],
+    minimise: Annotated[list[str] | None, typer.Option(metavar="COLUMN", help="An objective; may be repeated.")] = None,
+    maximise: Annotated[list[str] | None, typer.Option(metavar="COLUMN", help="An objective; may be repeated.")] = None,
+    at_most: Annotated[
+        list[str] | None, typer.Option(metavar="COLUMN=VALUE", help="A limit of feasible designs; may be repeated.")
+    ] = None,
+    population: Annotated[int, typer.Option(metavar="NUMBER", help="Designs of a generation.")] = 32,
+    generations: Annotated[int, typer.Option(metavar="NUMBER", help="Generations, the first included.")] = 20,
+    seed: Annotated[int, typer.Option(metavar="NUMBER", help="Of the search.")] = 0,
+    statistic: Statistic = "max",
+    workers: Workers = None,
+    threads: Threads = False,
+    dask: Dask = None,
+    plot: Plot = None,
+    as_json: AsJson = False,
+) -> None:
+    """Search the random axes of a study for the Pareto front of its quantities, by NSGA-II of pymoo."""
+    from msfp_gen.studies.assessment.figures import plot_pareto
+    from msfp_gen.studies.assessment.pareto import DESIGNS, Goals, front_table
+    from msfp_gen.studies.assessment.pareto import pareto as search
+
+    if plot is not None:
+        check_output(plot, FIGURE_SUFFIXES, "--plot")
+    goals = Goals(tuple(minimise or ()), tuple(maximise or ()), dict(map(_limit, at_most or ())), statistic)
+    with Progress(f"{generations} generations") as progress:
+        front = search(
+            source, output, goals, population=population, generations=generations, seed=seed, progress=progress,
+            workers=workers, threads=threads, dask=dask,
+        )  # fmt: skip
+    if as_json:
+        say(json.dumps(front.designs[front.designs.front].to_dict("records"), indent=2, allow_nan=False))
+    else:
+        show([front_table(front)])
+    note(f"wrote {output / DESIGNS}")
+    if plot is not None:
+        plot_pareto(front, plot)
+        note(f"wrote {plot}")
+
+
+def _limit(text: str) -> tuple[str, float]:
+    """Column and value of COLUMN=VALUE. Raises InputError."""
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise InputError(f"--at-most = {text!r}: give a column and a number, such as peak_sliding_1=0.12") from None

@@ -1,0 +1,199 @@
+"""Batches: many scenes at the same time, each run as by `simulate`, in threads or processes (docs/batch.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from msfp_gen.buildings.load import AnyScene
+from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.common.cores import usable_cores
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.model.model import build_model
+from msfp_gen.scene.effect_switching import check
+from msfp_gen.scene.scene import Scene
+from msfp_gen.simulation.memory import require_memory
+from msfp_gen.simulation.run_any import simulate
+from msfp_gen.simulation.settling import needs_settling
+from msfp_gen.simulation.simulate import RunSequence, settle
+from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
+
+if TYPE_CHECKING:
+    from msfp_gen.specification.layout import ModelSpec
+
+Proceed = Callable[[float, float], None]
+ENDED = ("ok", "stopped")  # statuses of runs that did not fail
+
+
+def simulate_batch(
+    scenes: Iterable[AnyScene],
+    *,
+    workers: int | None = None,
+    processes: bool = False,
+    strict: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Any]:
+    """Integrate many scenes at the same time; every result is bit by bit that of `simulate`.
+
+    All models are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
+
+    Parameters
+    ----------
+    scenes
+        The scenes; all of their fields may differ.
+    workers
+        Number of runs at the same time; None: the number of cores that this process may use.
+    processes
+        Use processes instead of threads: faster for short runs, where assembling the result in Python takes longer than
+        the integration in C. A script must then make this call under `if __name__ == "__main__":`.
+    strict
+        As in `simulate`.
+    progress
+        Called in the thread of the caller with the number of completed scenes, and of all scenes.
+
+    Returns
+    -------
+    list of Result, or of BuildingResult for buildings
+        In the order of the scenes. A run that fails raises no error: its `status` and `message` describe the failure,
+        and its history has the rows until then.
+
+    Raises
+    ------
+    InputError
+        An entry is no scene, or its method does not support its effects; the message starts with its index, as in
+        `scenes[3]`; or the rows of all do not fit into memory. No scene is run.
+    RunError
+        A scene failed at its start, so that it has no rows, or a worker process died. The other runs are ended.
+
+    """
+    if isinstance(scenes, Scene | BuildingScene):
+        raise InputError("scenes: this is one scene; give a list of them")
+    scenes = list(scenes)
+    labels = [f"scenes[{index}]" for index in range(len(scenes))]
+    for label, scene in zip(labels, scenes, strict=True):
+        if not isinstance(scene, Scene | BuildingScene):
+            raise InputError(f"{label}: a {type(scene).__name__} is no scene; give what load_scene returns")
+    runs = completed_runs(scenes, workers, processes=processes, strict=strict, labels=labels)
+    require_memory([scene for scene in scenes if isinstance(scene, Scene)])
+    results: dict[int, Any] = {}
+    with closing(runs):
+        for index, result in runs:
+            results[index] = result
+            if progress is not None:
+                progress(len(results), len(scenes))
+    return [results[index] for index in range(len(scenes))]
+
+
+def completed_runs(
+    scenes: Sequence[AnyScene],
+    workers: int | None = None,
+    *,
+    processes: bool = False,
+    strict: bool = False,
+    labels: Sequence[str] | None = None,
+    progress: Proceed | None = None,
+) -> Generator[tuple[int, Any], None, None]:
+    """Run scenes at the same time; yields (index, result) in the order in which the runs end.
+
+    Arguments, results and RunError are those of `simulate_batch`, but no result is kept, so that the rows of all need
+    not fit into memory. Closing the iterator, or an exception in its consumer (use `contextlib.closing`), ends the
+    other runs. Raises InputError before the first run.
+
+    labels: of the scenes in messages; None: their names. progress: of all runs, called in their threads with the share
+    that is done, and 1; not with processes.
+    """
+    count = worker_count(workers)
+    labels = [scene.name for scene in scenes] if labels is None else labels
+    for label, scene in zip(labels, scenes, strict=True):
+        with _located(label):
+            check_method(scene)
+    return _completed(scenes, count, processes, strict, labels, progress)
+
+
+def _completed(
+    scenes: Sequence[AnyScene],
+    workers: int,
+    processes: bool,
+    strict: bool,
+    labels: Sequence[str],
+    progress: Proceed | None,
+) -> Generator[tuple[int, Any], None, None]:
+    shared = None if progress is None else SharedProgress(len(scenes), progress)
+    threads = max(1, usable_cores() // max(1, min(workers, len(scenes))))
+    with local_pool(workers, processes) as pool:
+        settled = dict(enumerate(scenes))
+        tilted = [i for i, scene in settled.items() if isinstance(scene, Scene) and needs_settling(scene)]
+        settled |= pool.results(_settled, ((i, (labels[i], scenes[i])) for i in tilted))
+        build_models(settled.values())
+        # Long runs start first, so that all workers end at about the same time.
+        order = sorted(settled, key=lambda index: -settled[index].end)
+        calls = (
+            (i, (labels[i], scenes[i], settled[i], strict, None if shared is None else shared.of(i), threads))
+            for i in order
+        )
+        for index, result in pool.results(_run, calls):
+            yield index, replace(result, scene=scenes[index])
+            del result
+
+
+def check_method(scene: AnyScene) -> None:
+    """Raise InputError where the method of a scene does not support its effects; that of a building always does."""
+    if isinstance(scene, Scene):
+        check(scene, scene.modelled)
+
+
+def specs_of(scene: AnyScene) -> tuple[ModelSpec, ...]:
+    """The models with which a run starts: one, or those of the bearings of a building."""
+    return (scene.spec,) if isinstance(scene, Scene) else scene.specs
+
+
+def build_models(scenes: Iterable[AnyScene]) -> None:
+    """Build the models with which these scenes start, unless the cache of this host has them."""
+    for spec in dict.fromkeys(spec for scene in scenes for spec in specs_of(scene)):
+        build_model(spec.layout, spec.effects)
+
+
+def run_to_end(
+    scene: AnyScene, settled: AnyScene, strict: bool = False, proceed: Proceed = raise_if_stopped, threads: int = 1
+) -> Any:
+    """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run.
+
+    settled: the scene after `settle`. threads: for the bearings of a building; other runs have the other cores.
+    """
+    if isinstance(settled, Scene):
+        assert isinstance(scene, Scene)
+        sequence = RunSequence.of(scene, strict, settled)
+        while sequence.effects is not None:
+            sequence.run_segment(proceed)
+        return sequence.result(with_initial_row=True)
+    try:
+        return simulate(settled, progress=proceed, threads=threads)
+    except RunError as error:
+        if error.result is None:
+            raise
+        return error.result
+
+
+@contextmanager
+def _located(label: str) -> Iterator[None]:
+    """Start the messages of errors of a scene with its label."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{label}: {error}") from error
+    except RunError as error:
+        raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
+
+
+def _settled(label: str, scene: Scene) -> AnyScene:
+    """A scene of a batch after settling, in a worker."""
+    with _located(label):
+        return settle(scene)
+
+
+def _run(label: str, scene: AnyScene, settled: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
+    """One run of a batch, in a worker."""
+    with _located(label):
+        return run_to_end(scene, settled, strict, proceed or raise_if_stopped, threads)
