@@ -406,6 +406,10 @@ class BearingResult(ResultFiles):
         """It has none of its own: the file of the building is read."""
         raise InputError(f"this is the result of {KINDS[cls.source]}")
 
+    def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
+        """Its file has only the dataset, for other programs."""
+        return (), {}
+
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Its rows as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""

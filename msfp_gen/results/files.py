@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from hashlib import sha256
@@ -88,6 +88,10 @@ class ResultFiles(ABC):
         """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
         return self.storage().to_dataset(self)
 
+    def derived_and_groups(self) -> tuple[Collection[str], dict[str, xr.Dataset]]:
+        """Variables of the dataset that follow from the others, and the groups of the netCDF-4 file beside it."""
+        return self.storage().DERIVED, self.storage().groups_of(self)
+
     if TYPE_CHECKING:  # fields of the subclasses, or properties
 
         @property
@@ -121,9 +125,8 @@ class ResultFiles(ABC):
         Raises InputError where the suffix is not .nc or the folder does not exist.
         """
         path = check_output(path, DATASET_SUFFIXES)
-        storage = self.storage()
-        groups = storage.groups_of(self)
-        value = digest_of_dataset(self.dataset.drop_vars(storage.DERIVED, errors="ignore"), groups)
+        derived, groups = self.derived_and_groups()
+        value = digest_of_dataset(self.dataset.drop_vars(derived, errors="ignore"), groups)
         write_groups(path, self.dataset.assign_attrs({DIGEST: value}), groups)
         return path
 

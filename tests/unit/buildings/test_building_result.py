@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from support.buildings import MOTION, PLACES, frame, scene
 from support.synthetic import loops as loops_of_one
+from support.synthetic import opened
 
 from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
 from msfp_gen.analysis.characterise import loops
@@ -102,8 +103,10 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     assert all(table.text for table in characterisation_tables(found)) and csv_rows(found)
     path = one.save(tmp_path / "one.csv")
     assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top") and plot_loops(one)
+    file = one.save(tmp_path / "one.nc")
+    assert opened(file).identical(one.dataset.assign_attrs(digest=opened(file).attrs["digest"]))
     with pytest.raises(InputError, match="one bearing of a building; read the file of the building"):
-        BuildingResult.from_netcdf(one.save(tmp_path / "one.nc"))
+        BuildingResult.from_netcdf(file)
 
 
 def test_columns_of_a_scene_are_those_of_its_result():
