@@ -15,7 +15,7 @@ import numpy as np
 from quick import parser, pick
 
 from msfp_gen import Scene, simulate, simulate_batch
-from msfp_gen.buildings.opening import changed_scene
+from msfp_gen.buildings.load import changed_scene
 from msfp_gen.common.cores import usable_cores
 
 STUDIES = {

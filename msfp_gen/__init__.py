@@ -13,7 +13,7 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building
     from msfp_gen.buildings.characterise import characterise
-    from msfp_gen.buildings.opening import changed_scene, load_scene
+    from msfp_gen.buildings.load import changed_scene, load_scene
     from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
     from msfp_gen.buildings.soil import Soil
     from msfp_gen.buildings.storey import BaseSlab, Storey
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
-    from msfp_gen.simulation.either import simulate
+    from msfp_gen.simulation.run_any import simulate
     from msfp_gen.specification.layout import Auto, Effects, Layout
     from msfp_gen.studies.batch import simulate_batch
     from msfp_gen.studies.bounding import bound
@@ -67,12 +67,12 @@ _MODULES = {
     "TwoPort": "coupling.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
-    "changed_scene": "buildings.opening",
+    "changed_scene": "buildings.load",
     "characterise": "buildings.characterise",
     "fit": "studies.calibration",
-    "load_scene": "buildings.opening",
+    "load_scene": "buildings.load",
     "presets": "scene.file.presets",
-    "simulate": "simulation.either",
+    "simulate": "simulation.run_any",
     "simulate_batch": "studies.batch",
     "study": "studies.study.run",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,16 +25,21 @@ def brief_rows(result: RunData) -> list[tuple[str, str]]:
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
     extremes = result.extremes
     rows = [
-        ("status", result.status + (f": {result.message}" if result.message else "")),
         ("time", f"{history.time[-1]:.6g} s in {summary['counters']['steps']} steps, {summary['wall_time']:.3g} s"),
         ("peak displacement", f"{1e3 * displacement:.4g} mm"),
         ("peak force", f"{1e-3 * force:.4g} kN{ratio}"),
         ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in extremes.sliding) + " mm, bottom first"),
         ("normal force", f"{1e-3 * extremes.least_normal.min():.4g} to {1e-3 * extremes.most_normal.max():.4g} kN"),
     ]
+    return with_status(result, rows)
+
+
+def with_status(result: Any, rows: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Label and value of the main results of a run, of one bearing or of a building, after its status, with notes."""
+    status = result.status + (f": {result.message}" if result.message else "")
     notes = [note.line for note in result.notes]
     more = f"; {len(notes) - MAX_NOTES} more in .notes" if len(notes) > MAX_NOTES else ""
-    return [*rows, *([("notes", "; ".join(notes[:MAX_NOTES]) + more)] if notes else [])]
+    return [("status", status), *rows, *([("notes", "; ".join(notes[:MAX_NOTES]) + more)] if notes else [])]
 
 
 def brief_text(result: RunData) -> str:
@@ -49,7 +54,8 @@ def text_of(title: str, rows: list[tuple[str, str]]) -> str:
 
 def brief_html(result: RunData) -> str:
     """The main results as a table, beside the horizontal force over the displacement."""
-    return html_of(result.scene.name, brief_rows(result), *_loop(result), "force over displacement")
+    force = result.history.top_force[:, :2] @ result.history.direction
+    return html_of(result.scene.name, brief_rows(result), result.history.path[0], force, "force over displacement")
 
 
 def html_of(name: str, rows: list[tuple[str, str]], x: Array, y: Array, caption: str) -> str:
@@ -59,15 +65,6 @@ def html_of(name: str, rows: list[tuple[str, str]], x: Array, y: Array, caption:
         f"<div><b>{escape(name or 'unnamed scene')}</b><div style='display:flex;gap:1em'><table>{cells}</table>"
         f"<figure style='margin:0'>{_curve(x, y)}<figcaption>{escape(caption)}</figcaption></figure></div></div>"
     )
-
-
-def _loop(result: RunData) -> tuple[Array, Array]:
-    """Displacement and force along the direction of the largest displacement."""
-    history = result.history
-    peak = history.displacement[history.peak_row, :2]
-    size = float(np.hypot(*peak))
-    direction = peak / size if size else np.array([1.0, 0.0])
-    return history.displacement[:, :2] @ direction, history.top_force[:, :2] @ direction
 
 
 def _curve(x: Array, y: Array) -> str:

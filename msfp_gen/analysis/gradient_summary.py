@@ -9,8 +9,8 @@ import numpy as np
 from msfp_gen.analysis.summary import axial_load
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.results.dataset import gradients_of
 from msfp_gen.results.gradient import ENERGIES, gradients_of_extremes
-from msfp_gen.results.gradient_dataset import gradients_of
 from msfp_gen.results.history import LABELS
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.analysis.transitions import is_monotonic, transitions
-from msfp_gen.common.arrays import Array
-from msfp_gen.results.history import LABELS, History
+from msfp_gen.results.extremes import by_axis
+from msfp_gen.results.history import History
 
 if TYPE_CHECKING:
     from msfp_gen.results.run_data import RunData
@@ -43,14 +43,14 @@ def summarise(result: RunData) -> dict[str, Any]:
     wall_time = counters.pop("wall_time")
     load = axial_load(result)
     extremes = result.extremes
-    force = _peaks(extremes.top_force)
+    force = by_axis(extremes.top_force)
     summary: dict[str, Any] = {
         "name": result.scene.name,
         "status": result.status,
         "message": result.message,
         "notes": [note.line for note in result.notes],
         "duration": duration,
-        "peak_displacement": _peaks(extremes.displacement),
+        "peak_displacement": by_axis(extremes.displacement),
         "peak_top_force": force,
         "axial_load": load,
         "peak_force_ratio": force["radial"] / load if load else None,
@@ -116,8 +116,3 @@ def axial_load(result: RunData) -> float | None:
             return None
         load -= float(vertical[0, 0])
     return load if load > 0 else None
-
-
-def _peaks(largest: Array) -> dict[str, float]:
-    """Largest magnitudes by axis and in the horizontal plane, shape (4,), by name."""
-    return dict(zip((*LABELS["axis"], "radial"), largest.tolist(), strict=True))

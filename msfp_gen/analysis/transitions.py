@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
 from msfp_gen.results.history import History
 from msfp_gen.results.sliding import SHARE, slip_shares
 
@@ -28,7 +27,7 @@ def is_monotonic(result: RunData) -> bool:
     """Whether the run is a monotonic push: its motion is a ramp, or the displacement has no reversal."""
     if result.scene.motion.metadata.get("source") == "ramp":
         return True
-    along, transverse = _path(result.history)
+    along, transverse = result.history.path
     peak = along.max(initial=0.0)
     reverse = (np.maximum.accumulate(along) - along).max(initial=0.0)
     return bool(peak > WINDOW and max(reverse, np.abs(transverse).max()) <= MONOTONIC * peak)
@@ -62,7 +61,7 @@ def stopping_displacement(history: History, surface: int, window: float = WINDOW
     It stops where its share of all sliding, taken over a centred `window` of displacement [m], falls below `SHARE` and
     stays below over one more window, so that a short vibration does not count.
     """
-    along, _ = _path(history)
+    along, _ = history.path
     rows = np.flatnonzero(np.diff(np.maximum.accumulate(along), prepend=-1.0) > 0)  # new maxima: strictly increasing
     u, sliding = along[rows], history.sliding[rows]
     if len(u) < 2 or u[-1] - u[0] <= window:
@@ -82,29 +81,14 @@ def stopping_displacement(history: History, surface: int, window: float = WINDOW
 
 def _spacing(history: History, displacement: float) -> float:
     """Difference of displacement [m] between the rows on either side of `displacement` [m]."""
-    maxima = np.maximum.accumulate(_path(history)[0])
+    maxima = np.maximum.accumulate(history.path[0])
     row = int(np.searchsorted(maxima, displacement))
     return float(maxima[row] - maxima[row - 1])
 
 
-def _path(history: History) -> tuple[Array, Array]:
-    """Horizontal displacement along and transverse to the direction of its largest value, each shape (T,) [m]."""
-    horizontal = history.displacement[:, :2]
-    e1, e2 = _direction(history)
-    along: Array = horizontal @ np.array([e1, e2])
-    return along, horizontal @ np.array([-e2, e1])
-
-
-def _direction(history: History) -> Array:
-    """Unit vector of the largest horizontal displacement; E1 if the bearing did not move."""
-    peak: Array = history.displacement[history.peak_row, :2]
-    magnitude = float(np.hypot(*peak))
-    return np.asarray(peak / magnitude) if magnitude else np.array([1.0, 0.0])
-
-
 def _first_contact(result: RunData, surface: int) -> tuple[float, float] | tuple[None, None]:
     """Displacement [m] and force [N] along the direction of the run at the first contact with the rim of `surface`."""
-    direction = _direction(result.history)
+    direction = result.history.direction
     for event in result.events:
         if event.kind == "rim_contact" and event.surface == surface:
             return float(event.displacement[:2] @ direction), float(event.top_force[:2] @ direction)

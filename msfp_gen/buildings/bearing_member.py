@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 from msfp_gen.coupling.two_port import compiled_port, scene_at_rest
 from msfp_gen.errors import InputError
 from msfp_gen.model.model import Model, build_model
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from msfp_gen.model.compiled import Port
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
-
-BearingNotes = tuple[tuple[int, Note], ...]
-"""Notes of monitors, each with the bearing that it is about, from 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +105,12 @@ class Member:
         return [(name, tuple(shape)) for name, shape in self.model.extension.ROW if name in KEPT]
 
     @property
-    def slices(self) -> dict[str, slice]:
-        """Where they lie among each other; "all": the whole."""
-        found, begin = {}, 0
-        for name, shape in self.shapes:
-            found[name] = slice(begin, begin + int(np.prod(shape, dtype=int)))
-            begin = found[name].stop
-        return {**found, "all": slice(0, begin)}
-
-    @property
     def entries(self) -> Array:
         """Indices into the row of its model of the numbers that are kept."""
-        found, begin = [], 0
-        for name, shape in self.model.extension.ROW:
-            count = int(np.prod(shape, dtype=int))
-            if name in KEPT:
-                found.append(np.arange(begin, begin + count))
-            begin += count
-        return np.concatenate(found)
+        row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
+        size = sum(int(np.prod(shape, dtype=int)) for _, shape in row)
+        indices = parts(np.arange(size), row)
+        return np.concatenate([indices[name].ravel() for name, _ in self.shapes])
 
     @property
     def work(self) -> Array:

@@ -9,8 +9,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.damping import FixedBase, fixed_base, modal_damping, rayleigh_damping
-from msfp_gen.buildings.matrices import Matrix, boundary_of, check_free, check_semidefinite, matrix_of, rigid_motions
+from msfp_gen.buildings.matrices import (
+    FixedBase,
+    Matrix,
+    boundary_of,
+    check_free,
+    check_semidefinite,
+    fixed_base,
+    matrix_of,
+    modal_damping,
+    rayleigh_damping,
+    rigid_motions,
+)
 from msfp_gen.buildings.storey import FREEDOMS, BaseSlab, Columns, Node, Storey, frame
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import require_type

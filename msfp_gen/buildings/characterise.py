@@ -8,25 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.analysis.characterise.loops import (
-    REVERSAL,
-    Loop,
-    closed_cycles,
-    effective_properties,
-    turning_points,
-)
+from msfp_gen.analysis.characterise import tables
+from msfp_gen.analysis.characterise.loops import Loop, Path
 from msfp_gen.analysis.characterise.report import Characterisation
 from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
-from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
-from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.data import BearingResult, BuildingData
 from msfp_gen.buildings.summary import floor_rows, storey_rows
-from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
 from msfp_gen.results.run_data import RunData
 
-STRAIGHT = 1e-3  # transverse displacement over the largest, up to which a motion is in one direction
-REST_SHARE, REST_MOVEMENT = 0.02, 0.01  # last part of a run, and movement in it over the peak, of a building at rest
 NO_CYCLES = "no cycle closes in one direction: no effective stiffness and damping; the secant ones are at the peak"
 
 
@@ -94,61 +85,46 @@ class BuildingCharacterisation:
         return asdict(self)
 
 
-def characterise(result: RunData | BuildingData) -> Characterisation | BuildingCharacterisation:
+def characterise(result: RunData | BuildingData | BearingResult) -> Characterisation | BuildingCharacterisation:
     """Characterise a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
 
     Raises InputError where nothing moved.
     """
-    if not isinstance(result, RunData | BuildingData):
-        raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
-    return characterise_building(result) if isinstance(result, BuildingData) else characterise_bearing(result)
+    if isinstance(result, BearingResult):
+        return result.characterise()
+    if isinstance(result, BuildingData):
+        return characterise_building(result)
+    if isinstance(result, RunData):
+        return characterise_bearing(result)
+    raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
 
 
 def characterise_building(result: BuildingData) -> BuildingCharacterisation:
     """Characterise the run of a building. Raises InputError if its bearings did not move."""
-    u = np.mean([each.displacement for each in bearings_of(result)], axis=0)[:, :2]
-    size = np.hypot(*u.T)
-    if not (peak := float(size.max())):
-        raise InputError("characterise: the bearings did not move in this run; give a motion, or a longer duration")
-    row = int(size.argmax())
-    direction, force = u[row] / peak, result.base_reaction[:, :2]
-    stiffness = float(force[row] @ direction) / peak
-    cycles = cycles_of(u, force, direction)
-    rest = bool(np.hypot(*np.ptp(u[result.time >= (1 - REST_SHARE) * result.time[-1]], axis=0)) <= REST_MOVEMENT * peak)
+    mean = np.mean([one.displacement for one in result.bearings], axis=0)
+    path = Path.of(result.time, mean, result.base_reaction, "the bearings")
+    cycles, stiffness = tuple(loop for *_, loop in path.cycles()), path.secant_stiffness
     gravity, weight = result.scene.gravity, result.scene.weight
     notes = [] if cycles else [NO_CYCLES]
-    if not rest:
+    if not path.at_rest:
         notes.append("the building still moves when the run ends, so that its last displacement is no residual one")
     return BuildingCharacterisation(
         name=result.scene.name,
         status=result.status,
-        direction=(float(direction[0]), float(direction[1])),
+        direction=(float(path.direction[0]), float(path.direction[1])),
         weight=weight,
         peak_displacement=float(result.peaks.mean_displacement[3]),
         peak_force=float(result.peaks.base_reaction[3]),
         secant_stiffness=stiffness,
         secant_period=2 * pi * sqrt(weight / (gravity * stiffness)) if stiffness > 0 and gravity else None,
         cycles=cycles,
-        residual_displacement=float(size[-1]),
-        at_rest=rest,
+        residual_displacement=path.residual,
+        at_rest=path.at_rest,
         energy_dissipated=float(result.dissipated[-1].sum()),
-        peak_floor_acceleration=max(each["peak_acceleration"]["radial"] for each in floor_rows(result)),
-        peak_drift_ratio=max((each["peak_drift_ratio"] for each in storey_rows(result)), default=None),
-        bearings=tuple(map(_demand, bearings_of(result))),
+        peak_floor_acceleration=max(floor["peak_acceleration"]["radial"] for floor in floor_rows(result)),
+        peak_drift_ratio=max((storey["peak_drift_ratio"] for storey in storey_rows(result)), default=None),
+        bearings=tuple(map(_demand, result.bearings)),
         notes=tuple(notes),
-    )
-
-
-def cycles_of(u: Array, force: Array, direction: Array) -> tuple[Loop, ...]:
-    """Closed cycles of a motion in one direction, none of any other."""
-    along, across = u @ direction, u @ np.array([-direction[1], direction[0]])
-    if np.abs(across).max() > STRAIGHT * np.abs(along).max():
-        return ()
-    shear = force @ direction
-    found = closed_cycles(along, turning_points(along, REVERSAL * float(np.ptp(along))))
-    return tuple(
-        effective_properties(along[start : end + 1], shear[start : end + 1], middle - start)
-        for start, middle, end in found
     )
 
 
@@ -158,7 +134,7 @@ def _demand(one: BearingResult) -> BearingDemand:
         s["number"],
         s["name"],
         s["peak_displacement"]["radial"],
-        min(s["capacity_left"]),
+        min(s["minimum_gap"]),
         s["minimum_load_ratio"],
         s["maximum_load_ratio"],
         float(np.hypot(*one.displacement[-1, :2])),
@@ -166,39 +142,47 @@ def _demand(one: BearingResult) -> BearingDemand:
     )
 
 
-def _rows(found: BuildingCharacterisation) -> list[tuple[str, str]]:
-    period = "" if found.secant_period is None else f", period {found.secant_period:.3g} s"
-    cycles = [loop for loop in found.cycles if loop.effective_damping is not None]
+def _rows(system: BuildingCharacterisation) -> list[tuple[str, str]]:
+    period = "" if system.secant_period is None else f", period {system.secant_period:.3g} s"
+    cycles = [loop for loop in system.cycles if loop.effective_damping is not None]
     effective = [
         ("effective", f"stiffness {1e-6 * np.mean([x.effective_stiffness for x in cycles]):.4g} kN/mm, damping "
          f"{100 * np.mean([x.effective_damping for x in cycles]):.3g} % of {len(cycles)} cycles")
     ] if cycles else []  # fmt: skip
     return [
-        ("peak displacement", f"{1e3 * found.peak_displacement:.4g} mm, mean of the bearings"),
-        ("peak base shear", f"{1e-6 * found.peak_force:.4g} MN ({found.peak_force / found.weight:.3f} of the weight)"),
-        ("at the peak", f"secant stiffness {1e-6 * found.secant_stiffness:.4g} kN/mm{period}"),
+        ("peak displacement", f"{1e3 * system.peak_displacement:.4g} mm, mean of the bearings"),
+        (
+            "peak base shear",
+            f"{1e-6 * system.peak_force:.4g} MN ({system.peak_force / system.weight:.3f} of the weight)",
+        ),
+        ("at the peak", f"secant stiffness {1e-6 * system.secant_stiffness:.4g} kN/mm{period}"),
         *effective,
-        ("residual", f"{1e3 * found.residual_displacement:.4g} mm" + ("" if found.at_rest else ", still moving")),
-        ("dissipated", f"{1e-3 * found.energy_dissipated:.4g} kJ in the bearings"),
-        *([("not defined", "; ".join(found.notes))] if found.notes else []),
+        (
+            "residual",
+            f"{1e3 * system.residual_displacement:.4g} mm" + ("" if system.at_rest else ", still moving"),
+        ),
+        ("dissipated", f"{1e-3 * system.energy_dissipated:.4g} kJ in the bearings"),
+        *([("not defined", "; ".join(system.notes))] if system.notes else []),
     ]
 
 
-def building_tables(found: BuildingCharacterisation) -> list[Table]:
-    """Tables of the isolation system and of the demands on its bearings."""
+def characterisation_tables(system: BuildingCharacterisation | Characterisation) -> list[Table]:
+    """Tables of a characterisation: of one bearing, or of an isolation system and the demands on its bearings."""
+    if isinstance(system, Characterisation):
+        return tables.characterisation_tables(system)
     rows = [
         (
-            str(each.number),
-            each.name or "-",
-            f"{1e3 * each.peak_displacement:.1f}",
-            f"{1e3 * each.capacity_left:.1f}",
-            yes(each.capacity_left <= 0),
-            f"{each.minimum_load_ratio:.2f} ... {each.maximum_load_ratio:.2f}",
-            f"{1e3 * each.residual_displacement:.2f}",
-            f"{1e-3 * each.dissipated:.1f}",
+            str(demand.number),
+            demand.name or "-",
+            f"{1e3 * demand.peak_displacement:.1f}",
+            f"{1e3 * demand.capacity_left:.1f}",
+            yes(demand.capacity_left <= 0),
+            f"{demand.minimum_load_ratio:.2f} ... {demand.maximum_load_ratio:.2f}",
+            f"{1e3 * demand.residual_displacement:.2f}",
+            f"{1e-3 * demand.dissipated:.1f}",
         )
-        for each in found.bearings
+        for demand in system.bearings
     ]
     columns = ("no.", "name", "u [mm]", "left [mm]", "rim", "N / N at rest", "residual [mm]", "dissipated [kJ]")
-    system = Table(f"isolation system of {found.name or 'the building'}", (), _rows(found))
-    return [system, Table("bearings; left: least capacity less sliding", columns, rows)]
+    whole = Table(f"isolation system of {system.name or 'the building'}", (), _rows(system))
+    return [whole, Table("bearings; left: least capacity less sliding", columns, rows)]

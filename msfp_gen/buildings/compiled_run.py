@@ -1,56 +1,43 @@
-"""The compiled run of a building: what it is given, and where its rows hold what."""
+"""The compiled run of a building: its input, changes of the models of its bearings, and what its rows hold."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from dataclasses import dataclass, field, fields, replace
+from functools import reduce
+from typing import Protocol
 
 import numpy as np
 
 from msfp_gen.buildings.bearing_member import Change, Member, earlier_work
 from msfp_gen.buildings.peaks import Peaks, vectors
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError
 from msfp_gen.jit.driver import load_driver
-from msfp_gen.model.compiled import Port
+from msfp_gen.model.compiled import AnyRun, Port
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.results.note import Note, joined_notes, monitor_notes
+from msfp_gen.scene.effect_switching import next_effects
 
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 ENERGIES = ("damped", "received", "input")
 
 
-class Run(Protocol):
+class Run(AnyRun, Protocol):
     """`Run` of `compiled/msfp_building.pyx`."""
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
 
     @property
     def status(self) -> tuple[str, int, int, float]:
         """Name; bearing from 1, 0: the building; surface from 1, 0: none; value."""
 
     @property
-    def rows(self) -> Array:
-        """Rows until now, shape (T, size)."""
-
-    @property
-    def row_count(self) -> int:
-        """How many they are."""
-
-    @property
     def peaks(self) -> Array:
         """Peaks over all steps, one number after the other."""
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Counters."""
 
     def ends(self, bearing: int) -> Array:
         """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6)."""
@@ -63,9 +50,6 @@ class Run(Protocol):
 
     def snapshot(self) -> bytes:
         """State with all rows."""
-
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
 
 @dataclass(eq=False)
@@ -93,7 +77,7 @@ class BuildingRun:
     @property
     def peaks(self) -> Peaks:
         """Peaks over all steps."""
-        return Peaks.of_run(self.scene, self.run.peaks, [member.slices for member in self.members])
+        return Peaks.of_run(self.scene, self.run.peaks, [member.shapes for member in self.members])
 
     def snapshot(self) -> bytes:
         """State with all rows and all changes of models."""
@@ -111,6 +95,43 @@ class BuildingRun:
         self.members[change.bearing] = member
         self.changes.append(change)
         self.run.replace(change.bearing, member.port, member.entries)
+
+    def switch(self) -> bool:
+        """Continue with other models of bearings, where the run has ended and their effects permit it.
+
+        False: it has not (docs/effects.md).
+        """
+        status, failed, surface, value = self.run.status
+        if status == "ok" or not self.run.row_count:
+            return False
+        own = range(len(self.members)) if status == "guard" else [failed - 1] if failed else []
+        changed = False
+        for index in own:
+            member = self.members[index]
+            ending = member.ending(status, surface, value)
+            after = next_effects(member.asked, ending)
+            if after is None or after == member.effects:
+                continue
+            values = {f.name: (getattr(member.effects, f.name), getattr(after, f.name)) for f in fields(after)}
+            effects = {name: now for name, (before, now) in values.items() if now != before}
+            rows, work = self.run.row_count, member.work
+            work = work + earlier_work(self.changes, index, (rows + 1, len(work)))[-1]
+            new = Member.of(self.scene, index, after)
+            new.continue_from(member, self.run.ends(index))
+            notes = tuple(monitor_notes(ending, after))
+            self.replace(new, Change(index, effects, rows, work.tolist(), new.model.info.key, notes))
+            changed = True
+        return changed
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """The notes of the monitors of all bearings until now, each with the number of its bearing."""
+        notes: list[Note] = []
+        for index, member in enumerate(self.members):
+            parts = [change.notes for change in self.changes if change.bearing == index]
+            own = reduce(joined_notes, [*parts, monitor_notes(member.ending("ok"), None)], list[Note]())
+            notes += [replace(note, bearing=index + 1) for note in own]
+        return tuple(notes)
 
     def _repeat(self, change: Change) -> None:
         """Make a change of an earlier process again, before its state is restored. Raises ValueError."""
@@ -171,29 +192,25 @@ def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:
     return TimeGrid.of([each.resolution for each in grounds], jumps, scene.end, longest)
 
 
-def columns(run: BuildingRun) -> Iterator[tuple[str, int, Any]]:
-    """Parts of a row in order: what it is, how many numbers, and their shape."""
+def columns(run: BuildingRun) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """Parts of a row in order: names and shapes."""
     n = len(run.scene.building.mass)
-    yield "time", 1, ()
-    for name in ("displacement", "velocity", "acceleration"):
-        yield name, n, (n,)
-    yield "ground", 9 * len(run.grounds), (len(run.grounds), 3, 3)
-    yield from ((name, 1, ()) for name in ENERGIES)
+    yield "time", ()
+    yield from ((name, (n,)) for name in ("displacement", "velocity", "acceleration"))
+    yield "ground", (len(run.grounds), 3, 3)
+    yield from ((name, ()) for name in ENERGIES)
     for index, member in enumerate(run.members):
-        yield f"wrench {index}", 12, (2, 6)
-        for name, shape in member.shapes:
-            yield f"{name} {index}", int(np.prod(shape)), shape
+        yield f"wrench {index}", (2, 6)
+        yield from ((f"{name} {index}", shape) for name, shape in member.shapes)
 
 
 def unpacked(run: BuildingRun) -> dict[str, Array]:
     """The rows until now by name, those of bearings with their index; each of shape (k, ...)."""
-    rows, found, begin = run.run.rows, {}, 0
-    for name, count, shape in columns(run):
-        found[name] = rows[:, begin : begin + count].reshape(len(rows), *shape)
-        begin += count
+    rows: dict[str, Array] = parts(run.run.rows, columns(run))
     for index in {change.bearing for change in run.changes}:  # the integrals of their models begin anew
-        found[f"work {index}"] = found[f"work {index}"] + earlier_work(run.changes, index, found[f"work {index}"].shape)
-    return found
+        work = rows[f"work {index}"]
+        rows[f"work {index}"] = work + earlier_work(run.changes, index, work.shape)
+    return rows
 
 
 def _threads(given: int | None, bearings: int) -> int:

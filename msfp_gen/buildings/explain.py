@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.buildings.effects import remaining_loads
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
-from msfp_gen.buildings.vibration import undamped
-from msfp_gen.common.fields import ruled_fields
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, remaining_loads, standing_below, undamped
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.scene import explain as one
 from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.scene.top import NodeTop
 
 LISTED = 12  # frequencies of the frame that are listed
 
@@ -113,15 +111,12 @@ def _kinds(scene: BuildingScene) -> Iterator[Table]:
 
 
 def _interfaces(scene: BuildingScene) -> Iterator[Table]:
-    groups: dict[object, list[int]] = {}
+    groups: dict[NodeTop, list[int]] = {}
     for index, each in enumerate(scene.bearings):
         groups.setdefault(each.interface, []).append(index)
     for interface, members in groups.items():
-        rows = [
-            (name.replace("_", " "), f"{getattr(interface, name):g} {getattr(rule, 'unit', '')}")
-            for name, rule, _ in ruled_fields(type(interface))
-        ]
-        yield Table(f"interface to the building, {_numbers(members, len(scene.bearings))}", (), rows)
+        where = _numbers(members, len(scene.bearings))
+        yield one.top_table(interface, f"interface to the building, {where}")
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:

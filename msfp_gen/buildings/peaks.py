@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.buildings.scene import BuildingScene
 
+Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
 
 
@@ -48,43 +49,42 @@ class Peaks:
     normal_force: Array
 
     @classmethod
-    def of_run(cls, scene: BuildingScene, recorded: Array, entries: Sequence[dict[str, slice]]) -> Peaks:
-        """Peaks that the compiled run recorded (`msfp_building.h`).
-
-        entries: of each bearing, where its normal forces and sliding lie in the kept numbers; "all": these.
-        """
+    def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> Peaks:
+        """Peaks that the compiled run recorded (`msfp_building.h`). kept: numbers of the rows of each bearing."""
         nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
-        counts = (nodes, nodes, storeys, storeys, storeys, 1, 1, 1)
-        parts, begin = [], 0
-        for count in counts:
-            parts.append(recorded[begin : begin + VECTOR * count].reshape(count, VECTOR))
-            begin += VECTOR * count
-        acceleration, displacement, drift, shear, torsion, twist, mean, base = parts
-        rest, bearings = recorded[begin:], []
-        base_torsion, energy, begin = rest[:1], rest[1:3], 3
-        for where in entries:
-            kept = where["all"].stop
-            bearings.append(rest[begin : begin + 2 * VECTOR + 2 + 2 * kept])
-            begin += 2 * VECTOR + 2 + 2 * kept
-        most = [each[2 * VECTOR + 2 + where["all"].stop :] for each, where in zip(bearings, entries, strict=True)]
-        least = [each[2 * VECTOR + 2 :] for each in bearings]
-        normal = [padded([x[w["normal"]] for x, w in zip(of, entries, strict=True)]) for of in (least, most)]
+        vectors = {
+            "node_acceleration": nodes,
+            "node_displacement": nodes,
+            "drift": storeys,
+            "storey_shear": storeys,
+            "torsion": storeys,
+            "twist": 1,
+            "mean": 1,
+            "base": 1,
+        }
+        shapes: Shapes = [(name, (count, VECTOR)) for name, count in vectors.items()]
+        shapes += [("base_torsion", (1,)), ("energy", (2,))]
+        for i, numbers in enumerate(kept):
+            shapes += [(f"displacement {i}", (VECTOR,)), (f"force {i}", (VECTOR,)), (f"axial {i}", (2,))]
+            shapes += [(f"{word} {name} {i}", shape) for word in ("least", "most") for name, shape in numbers]
+        values = parts(recorded, shapes)
+
+        def of_bearings(name: str) -> list[Array]:
+            return [values[f"{name} {i}"] for i in range(len(kept))]
+
         return cls(
-            node_acceleration=acceleration,
-            node_displacement=displacement,
-            drift=drift,
-            storey_shear=shear,
-            storey_torsion=torsion[:, 2],
-            base_twist=twist[:, 2],
-            mean_displacement=mean[0],
-            base_reaction=base[0],
-            base_torsion=base_torsion,
-            energy=energy,
-            bearing_displacement=np.array([each[:VECTOR] for each in bearings]),
-            top_force=np.array([each[VECTOR : 2 * VECTOR] for each in bearings]),
-            axial_force=np.array([each[2 * VECTOR : 2 * VECTOR + 2] for each in bearings]),
-            sliding=padded([x[w["sliding"]] for x, w in zip(most, entries, strict=True)]),
-            normal_force=np.stack(normal, axis=1),
+            **{name: values[name] for name in list(vectors)[:4]},
+            storey_torsion=values["torsion"][:, 2],
+            base_twist=values["twist"][:, 2],
+            mean_displacement=values["mean"][0],
+            base_reaction=values["base"][0],
+            base_torsion=values["base_torsion"],
+            energy=values["energy"],
+            bearing_displacement=np.array(of_bearings("displacement")),
+            top_force=np.array(of_bearings("force")),
+            axial_force=np.array(of_bearings("axial")),
+            sliding=padded(of_bearings("most sliding")),
+            normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
         )
 
     def to_arrays(self) -> xr.Dataset:
@@ -140,21 +140,13 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     return list(orders), np.stack(rows), np.stack(shares)
 
 
-def named(vector: Array) -> dict[str, float]:
-    """A peak of a vector, shape (4,), as plain data."""
-    return dict(zip(("E1", "E2", "E3", "radial"), vector.tolist(), strict=True))
+def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:
+    """Values of the surfaces of all bearings, each of shape (..., surfaces): shape (..., bearings, most surfaces).
 
-
-def along_time(values: Array) -> Array:
-    """Peaks of vectors along time, shape (..., k, 3): shape (..., 4)."""
-    radial = np.hypot(values[..., 0], values[..., 1]).max(axis=-1)
-    found: Array = np.concatenate([np.abs(values).max(axis=-2), radial[..., None]], axis=-1)
-    return found
-
-
-def padded(columns: Sequence[Array]) -> Array:
-    """Values of the surfaces of all bearings, shape (bearings, most surfaces); zero where a bearing has none."""
-    found = np.zeros((len(columns), max(len(each) for each in columns)))
-    for row, each in zip(found, columns, strict=True):
-        row[: len(each)] = each
-    return found
+    fill: where a bearing has no such surface.
+    """
+    most = max(values.shape[-1] for values in columns)
+    table = np.full((*columns[0].shape[:-1], len(columns), most), fill)
+    for index, values in enumerate(columns):
+        table[..., index, : values.shape[-1]] = values
+    return table

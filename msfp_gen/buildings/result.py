@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.bearing_result import BearingResult, bearings_of
 from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
 from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.switching import notes_until_now
+from msfp_gen.buildings.peaks import padded
 from msfp_gen.common.arrays import Array
 from msfp_gen.coupling.response import DISSIPATED
-from msfp_gen.results.note import Note
 from msfp_gen.specification.contract import WORKS, names
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from msfp_gen.buildings.characterise import BuildingCharacterisation
+    from msfp_gen.results.files import Storage
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -41,30 +37,11 @@ class BuildingResult(BuildingData):
         return brief_html(self)
 
     @cached_property
-    def bearings(self) -> tuple[BearingResult, ...]:
-        """The result of every bearing."""
-        return bearings_of(self)
-
-    @cached_property
-    def notes(self) -> tuple[Note, ...]:
-        """Messages of the monitors in order of time; each names its bearing (docs/buildings.md)."""
-        from msfp_gen.buildings.notes import notes_of
-
-        return notes_of(self)
-
-    @cached_property
     def summary(self) -> dict[str, Any]:
         """Main results in SI units, as values that JSON can hold; `buildings.summary.summarise` lists the keys."""
         from msfp_gen.buildings.summary import summarise
 
         return summarise(self)
-
-    @cached_property
-    def dataset(self) -> xr.Dataset:
-        """Rows as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
-        from msfp_gen.buildings.dataset import to_dataset
-
-        return to_dataset(self)
 
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
@@ -75,24 +52,12 @@ class BuildingResult(BuildingData):
 
         return characterise_building(self)
 
-    def to_netcdf(self, path: str | Path) -> Path:
-        """Write rows and scene as netCDF-4 file, completely or not at all. Raises InputError as `Result.to_netcdf`."""
-        from msfp_gen.buildings.files import write_netcdf
-
-        return write_netcdf(self, path)
-
-    def save(self, path: str | Path) -> Path:
-        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as `Result.save`."""
-        from msfp_gen.buildings.files import save
-
-        return save(self, path)
-
     @classmethod
-    def from_netcdf(cls, path: str | Path) -> BuildingResult:
-        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
-        from msfp_gen.buildings.reading import read_building
+    def storage(cls) -> Storage:
+        """The functions of `buildings/dataset.py`."""
+        from msfp_gen.buildings import dataset
 
-        return read_building(path, cls)
+        return dataset
 
 
 def result_of(run: BuildingRun) -> BuildingResult:
@@ -108,8 +73,8 @@ def result_of(run: BuildingRun) -> BuildingResult:
         acceleration=rows["acceleration"],
         ground=rows["ground"][:, 0],
         wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
-        normal_force=[rows[f"normal {i}"] for i in range(count)],
-        sliding=[rows[f"sliding {i}"] for i in range(count)],
+        normal_force=padded([rows[f"normal {i}"] for i in range(count)], np.nan),
+        sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
         dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
         stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
         damped=rows["damped"],
@@ -117,7 +82,7 @@ def result_of(run: BuildingRun) -> BuildingResult:
         input=rows["input"],
         support=rows["ground"][:, run.scene.grounds[1]],
         counts=run.run.counts,
-        monitored=notes_until_now(run),
+        monitored=run.notes,
         recorded_peaks=run.peaks if len(rows["time"]) else None,
     )
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from msfp_gen.analysis.brief import MAX_NOTES, html_of, text_of
-from msfp_gen.buildings.bearing_result import bearings_of
-from msfp_gen.buildings.notes import energy_error, notes_of
-from msfp_gen.buildings.peaks import named
+from msfp_gen.analysis import tables
+from msfp_gen.analysis.brief import html_of, text_of, with_status
+from msfp_gen.buildings.data import BuildingData, energy_error
 from msfp_gen.common.tables import Table, yes
-
-if TYPE_CHECKING:
-    from msfp_gen.buildings.data import BuildingData
+from msfp_gen.results.extremes import by_axis
+from msfp_gen.results.run_data import RunData
 
 
 def summarise(result: BuildingData) -> dict[str, Any]:
@@ -36,15 +34,15 @@ def summarise(result: BuildingData) -> dict[str, Any]:
         counters: trials and tangents. wall_time [s]. real_time_factor: simulated time over wall time; None if unknown.
     """
     scene, duration = result.scene, float(result.time[-1] - result.time[0])
-    bearings = [each.summary for each in bearings_of(result)]
+    bearings = [each.summary for each in result.bearings]
     floors, storeys = floor_rows(result), storey_rows(result)
     peaks = result.peaks
-    shear = named(peaks.base_reaction)
+    shear = by_axis(peaks.base_reaction)
     return {
         "name": scene.name,
         "status": result.status,
         "message": result.message,
-        "notes": [note.line for note in notes_of(result)],
+        "notes": [note.line for note in result.notes],
         "duration": duration,
         "peak_displacement": _largest([each["peak_displacement"] for each in bearings]),
         "weight": scene.weight,
@@ -80,8 +78,8 @@ def floor_rows(result: BuildingData) -> list[dict[str, Any]]:
         {
             "name": node.name,
             "height": float(node.position[2]),
-            "peak_acceleration": named(acceleration),
-            "peak_displacement": named(moved),
+            "peak_acceleration": by_axis(acceleration),
+            "peak_displacement": by_axis(moved),
         }
         for node, acceleration, moved in zip(
             result.scene.building.nodes, peaks.node_acceleration, peaks.node_displacement, strict=True
@@ -95,14 +93,14 @@ def storey_rows(result: BuildingData) -> list[dict[str, Any]]:
     rows = []
     for index, column in enumerate(result.scene.building.columns):
         height = float(nodes[index + 1].position[2] - nodes[index].position[2])
-        drifts = named(peaks.drift[index])
+        drifts = by_axis(peaks.drift[index])
         rows.append(
             {
                 "name": column.name,
                 "height": height,
                 "peak_drift": drifts,
                 "peak_drift_ratio": drifts["radial"] / height,
-                "peak_shear": named(peaks.storey_shear[index]),
+                "peak_shear": by_axis(peaks.storey_shear[index]),
                 "peak_torsion": float(peaks.storey_torsion[index]),
             }
         )
@@ -118,17 +116,14 @@ def brief_rows(result: BuildingData, s: Mapping[str, Any]) -> list[tuple[str, st
     moved, shear, acceleration = s["peak_displacement"], s["peak_base_shear"], s["peak_floor_acceleration"]
     drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
     rows = [
-        ("status", result.status + (f": {result.message}" if result.message else "")),
         ("time", f"{result.time[-1]:.6g} s in {result.counts['steps']} steps, {result.wall_time:.3g} s"),
-        ("bearings", f"{len(bearings_of(result))}, peak displacement {1e3 * moved['radial']:.4g} mm"),
+        ("bearings", f"{len(result.bearings)}, peak displacement {1e3 * moved['radial']:.4g} mm"),
         ("base shear", f"{1e-6 * shear['radial']:.4g} MN ({s['base_shear_ratio']:.3f} of the weight)"),
         ("floors", f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}"),
         ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
         ("rims met", ", ".join(result.scene.label(number - 1) for number in s["rims_met"]) or "none"),
     ]
-    lines = [note.line for note in notes_of(result)]
-    more = f"; {len(lines) - MAX_NOTES} more in .notes" if len(lines) > MAX_NOTES else ""
-    return [*rows, *([("notes", "; ".join(lines[:MAX_NOTES]) + more)] if lines else [])]
+    return with_status(result, rows)
 
 
 def brief_text(result: BuildingData) -> str:
@@ -138,13 +133,15 @@ def brief_text(result: BuildingData) -> str:
 
 def brief_html(result: BuildingData) -> str:
     """The main results as a table, beside the orbit of the bearing that moves most."""
-    most = max(bearings_of(result), key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
+    most = max(result.bearings, key=lambda each: float(result.peaks.bearing_displacement[each.index, 3]))
     x, y = most.displacement[:, :2].T
     return html_of(result.scene.name, brief_rows(result, summarise(result)), x, y, f"orbit of {most.label}")
 
 
-def summary_tables(result: BuildingData) -> list[Table]:
-    """Tables of the run, its floors, storeys and bearings."""
+def summary_tables(result: BuildingData | RunData) -> list[Table]:
+    """Tables of the run of one bearing, or of that of a building with its floors, storeys and bearings."""
+    if isinstance(result, RunData):
+        return tables.summary_tables(result)
     summary = summarise(result)
     rows = [
         *brief_rows(result, summary),
@@ -152,8 +149,8 @@ def summary_tables(result: BuildingData) -> list[Table]:
         ("twist", f"{summary['peak_twist']:.3g} rad"),
     ]
     rows = [row for row in rows if row[0] != "notes"]
-    tables = [Table(summary["name"] or "unnamed building", (), rows), _floors(summary["floors"])]
-    return [*tables, *([_storeys(summary["storeys"])] if summary["storeys"] else []), _bearings(summary["bearings"])]
+    first = [Table(summary["name"] or "unnamed building", (), rows), _floors(summary["floors"])]
+    return [*first, *([_storeys(summary["storeys"])] if summary["storeys"] else []), _bearings(summary["bearings"])]
 
 
 def _energy(energy: Mapping[str, float]) -> str:
@@ -202,7 +199,7 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
             f"{1e-3 * each['peak_top_force']['radial']:.1f}",
             f"{1e-3 * each['axial_load']:.1f}",
             f"{each['minimum_load_ratio']:.2f} ... {each['maximum_load_ratio']:.2f}",
-            f"{1e3 * min(each['capacity_left']):.1f}",
+            f"{1e3 * min(each['minimum_gap']):.1f}",
             yes(each["rims_met"]),
         )
         for each in bearings

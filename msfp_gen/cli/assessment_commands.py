@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
-from msfp_gen.cli.inputs import build, load_source, of_building, one_bearing, result_of
+from msfp_gen.cli.inputs import build, load_source, one_bearing, result_of
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, characterisation_tables, write_csv
-    from msfp_gen.buildings.characterise import building_tables
+    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, write_csv
+    from msfp_gen.buildings.characterise import characterisation_tables
     from msfp_gen.common.output import check_output
 
     if output is not None:
@@ -48,7 +48,7 @@ def characterise(
     if as_json:
         say(json.dumps(characterisation.as_dict(), indent=2, allow_nan=False))
     else:
-        show(building_tables(characterisation) if of_building(result) else characterisation_tables(characterisation))
+        show(characterisation_tables(characterisation))
     if output is not None:
         note(f"wrote {write_csv(characterisation, output)}")
 
@@ -69,7 +69,7 @@ def bound(
     as_json: AsJson = False,
 ) -> None:
     """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
     from msfp_gen.studies.bounding import bounded_scenes, load_factors

@@ -51,7 +51,7 @@ def generate(
 def explain(scene: SceneName) -> None:
     """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
     from msfp_gen.buildings.explain import explain as describe
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
 
     show(describe(load_scene(scene)))
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from msfp_gen.cli.console import Progress, SignOption, note, number, whole_number
-from msfp_gen.cli.inputs import load_source, of_building, result_of
+from msfp_gen.cli.inputs import figures_of, load_source, result_of
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output, make_folder
 from msfp_gen.errors import InputError
 from msfp_gen.results.sign import DEFAULT, sign_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Collection
 
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.cli.inputs import AnyResult
     from msfp_gen.scene.scene import Scene
 
@@ -69,7 +69,7 @@ def plot(
     _check_figure_output(figure, output)
     sign_of(sign, "--sign")
     loaded = _load_for_figures(source)
-    targets = _targets(figure, output, _figures(loaded))
+    targets = _targets(figure, output, figures_of(loaded))
     angle = None if azimuth is None else math.radians(azimuth)
     _reject_unused(targets, {"--time": time}, ("section", "force-path"))
     _reject_unused(targets, {"--azimuth": azimuth, "--friction-circles": friction_circles or None}, ("section",))
@@ -87,7 +87,7 @@ def plot(
             elif name == "force-path":
                 plot_force_path(result, path, time=time)
             else:
-                _figures(result)[name](result, path)
+                figures_of(result)[name](result, path)
         note(f"wrote {path}")
     if failure is not None:
         raise failure
@@ -137,13 +137,6 @@ def animate(
     note(f"wrote {output}")
     if failure is not None:
         raise failure
-
-
-def _figures(loaded: object) -> Mapping[str, Callable[..., Any]]:
-    """The figures of a scene or result, of one bearing or of a building, by their names."""
-    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
-
-    return BUILDING_FIGURES if of_building(loaded) else FIGURES
 
 
 def _check_figure_output(figure: str, output: Path) -> None:

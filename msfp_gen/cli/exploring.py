@@ -25,7 +25,7 @@ def explore(
     ] = Path("explorer.html"),
 ) -> None:
     """Write one HTML file in which sliders change a bearing and its motion, and the response is computed at once."""
-    from msfp_gen.buildings.opening import load_bearing_scene
+    from msfp_gen.buildings.load import load_bearing_scene
     from msfp_gen.common.output import check_output
     from msfp_gen.explorer import write_explorer
     from msfp_gen.explorer.page import SUFFIXES

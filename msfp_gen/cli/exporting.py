@@ -81,7 +81,7 @@ def export(
 
 
 def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> None:
-    from msfp_gen.results.export import TABLE_WRITERS, export_columns
+    from msfp_gen.results.files import TABLE_WRITERS, export_columns
 
     check_output(output, TABLE_WRITERS, "--output")
     names = None if columns is None else [name.strip() for name in columns.split(",")]
@@ -90,13 +90,7 @@ def _export_rows(source: str, output: Path, columns: str | None, sign: str) -> N
     if of_building(loaded) and sign != DEFAULT:
         raise InputError(f"--sign = {sign!r}: columns of a building have one sign, base - top; leave it out")
     result, failure = result_of(loaded)
-    if of_building(result):
-        from msfp_gen.buildings.files import export_columns as export_building
-
-        path = export_building(result, output, names)
-    else:
-        path = export_columns(result, output, names, sign)
-    note(f"wrote {path}")
+    note(f"wrote {export_columns(result, output, names, sign)}")
     if failure is not None:
         raise failure
 

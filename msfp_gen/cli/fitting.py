@@ -63,7 +63,7 @@ def fit(
 
     Runs have the solver.rtol of the scene, then smaller ones until their error is small against the intervals.
     """
-    from msfp_gen.buildings.opening import load_bearing_scene
+    from msfp_gen.buildings.load import load_bearing_scene
     from msfp_gen.common.output import check_output, make_folder
     from msfp_gen.report import REPORT_SUFFIXES, write_fit_report
     from msfp_gen.studies.calibration.fit_result import fit_tables

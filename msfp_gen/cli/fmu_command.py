@@ -33,7 +33,7 @@ def fmu(
     ] = "cs",
 ) -> None:
     """Write a bearing as a unit (FMU) for Co-Simulation: a rig takes motion and gives wrenches, a mass takes forces."""
-    from msfp_gen.buildings.opening import load_bearing_scene
+    from msfp_gen.buildings.load import load_bearing_scene
     from msfp_gen.common.tables import Table
     from msfp_gen.fmu import write_fmu
 

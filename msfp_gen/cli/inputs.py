@@ -8,7 +8,9 @@ from msfp_gen.cli.console import Progress, building
 from msfp_gen.errors import InputError, RunError
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from collections.abc import Callable, Mapping
+
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
 
@@ -18,22 +20,22 @@ if TYPE_CHECKING:
 def load_source(source: str) -> AnyResult | AnyScene:
     """Load a saved result (.nc), or the scene of a file or preset, of one bearing or of a building."""
     if source.lower().endswith(".nc"):
-        from msfp_gen.buildings.reading import read_any
         from msfp_gen.buildings.result import BuildingResult
         from msfp_gen.result import Result
+        from msfp_gen.results.files import read_result
 
-        return read_any(source, Result, BuildingResult)
-    from msfp_gen.buildings.opening import load_scene
+        result: Any = read_result(source, Result, BuildingResult)
+        return result  # type: ignore[no-any-return]
+    from msfp_gen.buildings.load import load_scene
 
     return load_scene(source)
 
 
 def is_result(loaded: object) -> bool:
     """Whether this is a result, not a scene."""
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.result import Result
+    from msfp_gen.results.files import ResultFiles
 
-    return isinstance(loaded, Result | BuildingResult)
+    return isinstance(loaded, ResultFiles)
 
 
 def of_building(loaded: object) -> bool:
@@ -42,6 +44,13 @@ def of_building(loaded: object) -> bool:
     from msfp_gen.buildings.scene import BuildingScene
 
     return isinstance(loaded, BuildingScene | BuildingResult)
+
+
+def figures_of(loaded: object) -> Mapping[str, Callable[..., Any]]:
+    """The figures of a scene or result, of one bearing or of a building, by their names."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+
+    return BUILDING_FIGURES if of_building(loaded) else FIGURES
 
 
 def one_bearing(loaded: Any, what: str) -> Any:
@@ -64,8 +73,8 @@ def build(scene: AnyScene, gradients: bool = False) -> None:
 def run_scene(scene: AnyScene, **options: Any) -> tuple[Any, RunError | None]:
     """Run a scene; its result (of a failed run as far as it was computed), and the error of a failed run."""
     from msfp_gen.scene.scene import Scene
-    from msfp_gen.simulation.either import simulate
     from msfp_gen.simulation.memory import require_room
+    from msfp_gen.simulation.run_any import simulate
 
     if isinstance(scene, Scene):
         require_room(scene, options.get("stream"))

@@ -12,17 +12,14 @@ import typer
 from msfp_gen.cli.checkpoint_options import NO_CHECKPOINT, CheckpointFile, CheckpointOptions, Every, ResumeFile
 from msfp_gen.cli.console import Output, SceneName, choices_of, note, number, say, show
 from msfp_gen.cli.error_options import Budget, ErrorTarget, Explain, TargetError
-from msfp_gen.cli.inputs import of_building, one_bearing, run_scene
+from msfp_gen.cli.inputs import figures_of, one_bearing, run_scene
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
     from msfp_gen.cli.inputs import AnyResult
-    from msfp_gen.common.tables import Table
 
 DEMO = ("ridgecrest-ccc", "fenz-test5")
 
@@ -74,14 +71,14 @@ def run(
     others["--stream"] = stream or None
     target = ErrorTarget.of(error, explain, budget, others)
     if output is not None:
-        from msfp_gen.results.export import check_result_path
+        from msfp_gen.results.files import check_result_path
 
         check_result_path(output, "--output")
     if stream and (output is None or output.suffix.lower() not in DATASET_SUFFIXES):
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
@@ -95,7 +92,7 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
-    from msfp_gen.buildings.opening import load_scene
+    from msfp_gen.buildings.load import load_scene
     from msfp_gen.common.output import make_folder
 
     scenes = [load_scene(name) for name in DEMO]
@@ -103,21 +100,6 @@ def demo(
     for name, scene in zip(DEMO, scenes, strict=True):
         written = _run(scene, output / f"{name}.nc", output / f"{name}.png")
         say("\n".join(["", *(f"wrote {path}" for path in written), ""]))
-
-
-def tables_of(result: AnyResult) -> list[Table]:
-    """The tables of a run, of one bearing or of a building."""
-    from msfp_gen.analysis.tables import summary_tables as of_bearing
-    from msfp_gen.buildings.summary import summary_tables as of_whole
-
-    return of_whole(result) if of_building(result) else of_bearing(result)  # type: ignore[arg-type]
-
-
-def overview_of(result: AnyResult) -> Callable[..., Any]:
-    """The figure of `--plot`."""
-    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
-
-    return (BUILDING_FIGURES if of_building(result) else FIGURES)["overview"]
 
 
 def _with_options(scene: AnyScene, duration: float | None, **solver: Any) -> AnyScene:
@@ -165,7 +147,9 @@ def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None
     if as_json:
         say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
-    show(tables_of(result))
+    from msfp_gen.buildings.summary import summary_tables
+
+    show(summary_tables(result))
     for line in (entry.line for entry in result.notes):
         note(line)
 
@@ -175,5 +159,5 @@ def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bo
     if output is not None and not written:
         result.save(output)
     if plot is not None:
-        overview_of(result)(result, plot)
+        figures_of(result)["overview"](result, plot)
     return [path for path in (output, plot) if path is not None]

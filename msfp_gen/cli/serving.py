@@ -35,7 +35,7 @@ def serve(
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
 ) -> None:
     """Serve bearings to `element genericClient` of OpenSees: every element is a bearing of its own."""
-    from msfp_gen.buildings.opening import load_bearing_scene
+    from msfp_gen.buildings.load import load_bearing_scene
     from msfp_gen.coupling.server import Server
     from msfp_gen.coupling.two_port import TwoPort
 

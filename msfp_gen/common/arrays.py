@@ -1,8 +1,21 @@
-"""The array type of the package: an ndarray of float64 of any shape."""
+"""The array type of the package, an ndarray of float64 of any shape, and arrays that lie one after the other in one."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def parts(values: Any, shapes: Iterable[tuple[str, tuple[int, ...]]]) -> dict[str, Any]:
+    """Parts of the last axis of an array by name, each of shape (..., *its own). shapes: names and shapes, in order."""
+    columns, begin = {}, 0
+    for name, shape in shapes:
+        end = begin + int(np.prod(shape, dtype=int))
+        columns[name] = values[..., begin:end].reshape(values.shape[:-1] + shape)
+        begin = end
+    return columns

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.bearing_result import bearings_of
 from msfp_gen.buildings.summary import floor_rows, storey_rows
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.style import (
@@ -125,7 +124,7 @@ def plot_building(result: BuildingData, path: str | Path | None = None) -> Figur
 
 def draw_plan(axes: Axes, result: BuildingData) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
-    scene, bearings = result.scene, bearings_of(result)
+    scene, bearings = result.scene, result.bearings
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
     factor = magnification(scene.places, peak)
     for one, place in zip(bearings, scene.places, strict=True):
@@ -228,7 +227,7 @@ def title_of(result: BuildingData) -> str:
 
 
 def _overview_title(result: BuildingData) -> str:
-    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings_of(result))
+    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
     shear = float(np.hypot(*result.base_reaction[:, :2].T).max()) / result.scene.weight
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
 

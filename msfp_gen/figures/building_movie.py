@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.bearing_result import bearings_of
-from msfp_gen.buildings.data import BuildingData, at_times
+from msfp_gen.buildings.data import BuildingData
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.building import draw_axial_history, magnification, title_of
 from msfp_gen.figures.film import WIDE, Film, Layout, even
@@ -26,6 +25,7 @@ from msfp_gen.figures.style import (
     headline,
     subscript,
 )
+from msfp_gen.results.resample import at_times
 from msfp_gen.results.sign import shown_sign
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ Move = tuple[Callable[[int], None], list[Any]]
 def building_film(result: BuildingData, times: Array, azimuth: float | None) -> Film:
     """The movie of a building at these times [s], its first elevation along `azimuth` [rad]; None: along E1."""
     frames = at_times(result, times)
-    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings_of(result))
+    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
     moving = MovingFrame(frames, magnification(result.scene.places, peak))
     first = 0.0 if azimuth is None else azimuth
     views = [Elevation(moving, each) for each in (first, first + np.pi / 2)]
@@ -199,8 +199,8 @@ def _draw_loops(axes: Axes, result: BuildingData, time: Array) -> Move:
 
 def _loop(result: BuildingData, axis: int) -> tuple[Array, Array]:
     """Mean displacement [mm] and base shear over the weight along an axis, in the sign of the figures."""
-    mean = np.mean([one.displacement[:, axis] for one in bearings_of(result)], axis=0)
-    shear = sum(one.top_force[:, axis] for one in bearings_of(result)) / result.scene.weight
+    mean = np.mean([one.displacement[:, axis] for one in result.bearings], axis=0)
+    shear = sum(one.top_force[:, axis] for one in result.bearings) / result.scene.weight
     return displacement(mean), shown_sign().factor * np.asarray(shear)
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.buildings.bearing_result import bearings_of
 from msfp_gen.common.arrays import Array
 
 if TYPE_CHECKING:
@@ -113,7 +112,7 @@ class MovingFrame:
     @cached_property
     def on_rim(self) -> NDArray[np.bool_]:
         """Whether a slider of each bearing touches its rim, shape (k, bearings)."""
-        return np.stack([(each.sliding >= each.capacity).any(axis=1) for each in bearings_of(self.result)], axis=1)
+        return np.stack([(each.sliding >= each.capacity).any(axis=1) for each in self.result.bearings], axis=1)
 
     @cached_property
     def lifted(self) -> NDArray[np.bool_]:

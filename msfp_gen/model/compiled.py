@@ -65,12 +65,31 @@ class Stack(Protocol):
         """Named points, rotations and bases (3.1)-(3.12), in shapes as of `evaluation.named_vectors`."""
 
 
-class Run(Protocol):
-    """A run of the compiled integrator, in progress or ended."""
+class AnyRun(Protocol):
+    """A run of a bearing or of a building, in progress or ended."""
 
     @property
     def time(self) -> float:
         """Time reached [s]."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Counters."""
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows held: those recorded, less those dropped."""
+
+    @property
+    def rows(self) -> Array:
+        """Rows held, shape (T, row size)."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
+
+
+class Run(AnyRun, Protocol):
+    """A run of the compiled integrator of a bearing."""
 
     @property
     def status(self) -> tuple[str, int, float]:
@@ -85,20 +104,8 @@ class Run(Protocol):
         """Extremes over all accepted steps, one number after the other, shape (extremes size,)."""
 
     @property
-    def counts(self) -> dict[str, int]:
-        """Counters."""
-
-    @property
-    def row_count(self) -> int:
-        """Number of rows held: those recorded, less those dropped."""
-
-    @property
     def dropped_rows(self) -> int:
         """Number of rows dropped."""
-
-    @property
-    def rows(self) -> Array:
-        """Rows held, shape (T, row size)."""
 
     @property
     def events(self) -> list[EventRow]:
@@ -115,9 +122,6 @@ class Run(Protocol):
 
     def snapshot(self, rows: int = -1) -> bytes:
         """State, with so many of the last rows and no events; negative: with all rows and events."""
-
-    def restore(self, snapshot: bytes) -> None:
-        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
     def start_gradients(self, *, steps: Sequence[float] = (), energies: bool = False, **derivatives: Array) -> None:
         """Begin derivatives with respect to parameters; of everything that the run is given (the wrapper names it)."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.common.arrays import Array
+from msfp_gen.common.arrays import Array, parts
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.jit.build import BuildInfo, Progress, load
 from msfp_gen.model.compiled import Stack
@@ -165,12 +165,7 @@ class Model:
 
     def unpack(self, rows: Array) -> dict[str, Array]:
         """Recorded rows, shape (..., row size), as arrays by name; `ROW` of the extension has names and shapes."""
-        out, start = {}, 0
-        for name, shape in self.extension.ROW:
-            size = int(np.prod(shape, dtype=int))
-            out[name] = rows[..., start : start + size].reshape(rows.shape[:-1] + shape)
-            start += size
-        return out
+        return parts(rows, self.extension.ROW)
 
     def residual(
         self,

@@ -6,11 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.characterise import building_tables
-from msfp_gen.buildings.explain import explain_building
 from msfp_gen.buildings.summary import summary_tables
 from msfp_gen.common.tables import Table
-from msfp_gen.errors import InputError
 from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.version import __version__
@@ -100,25 +97,6 @@ def summary_page(result: BuildingResult) -> list[Table]:
     first, *others = summary_tables(result)
     rows = [row for row in first.rows if row[0] != "time"]
     return [Table("the run", (), [("time simulated", f"{result.time[-1]:.6g} s"), *rows]), *others]
-
-
-def characterisation_page(result: BuildingResult) -> list[Table]:
-    """Tables of the isolation system and its bearings; none if these did not move."""
-    try:
-        return building_tables(result.characterise())
-    except InputError:
-        return []
-
-
-def settings_page(result: BuildingResult) -> list[Table]:
-    """Tables of frame, bearings, effects, motion and solver."""
-    return explain_building(result.scene)
-
-
-def provenance_table(result: BuildingResult) -> Table:
-    """Versions and counters."""
-    rows = {**result.provenance, **{name: str(count) for name, count in result.counts.items()}}
-    return Table("versions and counters", (), [(name.replace("_", " "), text) for name, text in rows.items()])
 
 
 def introduction(result: BuildingResult) -> str:

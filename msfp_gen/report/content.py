@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.tables import transition_table
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
-from msfp_gen.scene.explain import explain
+from msfp_gen.results.files import COUNTER, PROVENANCE, without
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing
+
+    AnyResult = Result | BuildingResult
 
 MILLI, KILO = 1e3, 1e-3
 MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine
@@ -96,9 +99,9 @@ def summary_page(result: Result) -> list[Table]:
     return tables
 
 
-def characterisation_page(result: Result) -> list[Table]:
-    """Tables of the characterisation; none if the bearing did not move."""
-    from msfp_gen.analysis.characterise.tables import characterisation_tables
+def characterisation_page(result: AnyResult) -> list[Table]:
+    """Tables of the characterisation; none if no bearing moved."""
+    from msfp_gen.buildings.characterise import characterisation_tables
 
     try:
         return characterisation_tables(result.characterise())
@@ -106,17 +109,13 @@ def characterisation_page(result: Result) -> list[Table]:
         return []
 
 
-def settings_page(result: Result) -> list[Table]:
-    """Tables of bearing, motion, top, effects and solver."""
-    return explain(result.scene)
-
-
-def provenance_table(result: Result) -> Table:
+def provenance_table(result: AnyResult) -> Table:
     """Table of versions, model and method of the run, and the counters of the solver."""
-    provenance = {name.replace("_", " "): text for name, text in result.provenance.items() if name not in MACHINE_KEYS}
-    counters = {name.replace("_", " "): str(count) for name, count in asdict(result.counters).items()}
-    counters.pop("wall time")
-    return Table("versions, model and counters of the solver", (), [*provenance.items(), *counters.items()])
+    about = result.dataset.attrs
+    provenance = {name: text for name, text in without(PROVENANCE, about).items() if name not in MACHINE_KEYS}
+    counters = {name: count for name, count in without(COUNTER, about).items() if name != "wall_time"}
+    rows = [(name.replace("_", " "), str(value)) for name, value in {**provenance, **counters}.items()]
+    return Table("versions, model and counters of the solver", (), rows)
 
 
 def outcome(status: str, message: str) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.report.content import (
@@ -17,7 +18,6 @@ from msfp_gen.report.content import (
     kind_of,
     outcome,
     provenance_table,
-    settings_page,
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, view
@@ -93,6 +93,9 @@ def report_html(
     return render(
         "page.html.jinja",
         **given,
+        characterisation=characterisation_page(result),
+        settings=explain(result.scene),
+        provenance=provenance_table(result),
         name=result.scene.name or "unnamed scene",
         kind="report",
         title_block=title.rows(given["device"]),
@@ -119,9 +122,6 @@ def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[
         "device": kind_of(result.scene.bearing),
         "terms": TERMS,
         "summary": summary_page(result),
-        "characterisation": characterisation_page(result),
-        "settings": settings_page(result),
-        "provenance": provenance_table(result),
         "scene": scene_attribute(result.scene),
         "explanation": EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time)),
         "figures": list(_pictures(result, FIGURES, PLOTS, progress)),
@@ -134,7 +134,7 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
     """What the page of a building shows."""
     from markupsafe import Markup
 
-    from msfp_gen.buildings.text import scene_text
+    from msfp_gen.buildings.dataset import scene_text
     from msfp_gen.figures import BUILDING_FIGURES
     from msfp_gen.report import building
 
@@ -147,9 +147,6 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
         "device": ", ".join(dict.fromkeys(kind_of(each.bearing) for each in result.scene.bearings)),
         "terms": building.TERMS,
         "summary": building.summary_page(result),
-        "characterisation": building.characterisation_page(result),
-        "settings": building.settings_page(result),
-        "provenance": building.provenance_table(result),
         "scene": scene_text(result.scene),
         "explanation": building.explanation(data["frames"]["time"]["shape"][0], len(result.time)),
         "figures": list(_pictures(result, building.FIGURES, BUILDING_FIGURES, progress)),

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
-from msfp_gen.results.history import History
+from msfp_gen.common.arrays import Array, parts
+from msfp_gen.results.history import LABELS, History
 from msfp_gen.results.sliding import separated
 
 LEAST = ("gap", "least_normal", "least_friction")  # of these the least value counts, of all others the largest
@@ -20,18 +20,18 @@ class Extremes:
     """Extremes of a run.
 
     displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
-    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; slip_speed, the largest, while the surface
-    is closed [m/s]; least_normal, most_normal [N]; least_friction, most_friction, where a friction law acts;
-    temperature, the highest, where it heats [degC].
+    Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
+    the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
+    where a friction law acts; temperature, the highest, where it heats [degC].
     """
 
     displacement: Array
     top_force: Array
     sliding: Array
     gap: Array
-    slip_speed: Array
     least_normal: Array
     most_normal: Array
+    slip_speed: Array | None = None
     least_friction: Array | None = None
     most_friction: Array | None = None
     temperature: Array | None = None
@@ -42,8 +42,8 @@ class Extremes:
         mu, temperature = history.friction_coefficient, history.temperature
         speed = np.where(separated(history), 0.0, np.hypot(*np.moveaxis(history.slip_velocity, 2, 0)))
         return cls(
-            displacement=_largest(history.displacement),
-            top_force=_largest(history.top_force),
+            displacement=largest(history.displacement),
+            top_force=largest(history.top_force),
             sliding=history.sliding.max(axis=0),
             gap=history.gap.min(axis=0),
             slip_speed=speed.max(axis=0),
@@ -61,11 +61,7 @@ class Extremes:
         numbers: name and shape of each, `EXTREMES` of the extension. recorded: one after the other. azimuth: of the
         frame of a planar model [rad], in which all horizontal vectors are along E1.
         """
-        found, start = {}, 0
-        for name, shape in numbers:
-            size = int(np.prod(shape, dtype=int))
-            found[name] = recorded[start : start + size]
-            start += size
+        found = {name: values.ravel() for name, values in parts(recorded, numbers).items()}
         if azimuth:
             for name in ("displacement", "top_force"):
                 along, _, vertical, radial = found[name]
@@ -98,6 +94,13 @@ class Extremes:
         return Extremes(**found)
 
 
-def _largest(vector: Array) -> Array:
-    """Largest magnitude by axis and in the horizontal plane; `vector` has shape (T, 3)."""
-    return np.append(np.abs(vector).max(axis=0), np.hypot(vector[:, 0], vector[:, 1]).max())
+def largest(vectors: Array) -> Array:
+    """Largest magnitudes along time by axis and in the horizontal plane: of shape (..., T, 3), shape (..., 4)."""
+    radial = np.hypot(vectors[..., 0], vectors[..., 1]).max(axis=-1)
+    magnitudes: Array = np.concatenate([np.abs(vectors).max(axis=-2), radial[..., None]], axis=-1)
+    return magnitudes
+
+
+def by_axis(magnitudes: Array) -> dict[str, float]:
+    """Largest magnitudes by axis and in the horizontal plane, shape (4,), as plain data."""
+    return dict(zip((*LABELS["axis"], "radial"), magnitudes.tolist(), strict=True))

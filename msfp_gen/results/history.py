@@ -139,6 +139,20 @@ class History:
         """Row of the largest horizontal displacement; see `first_peak`."""
         return first_peak(self.horizontal)
 
+    @property
+    def direction(self) -> Array:
+        """Unit vector of the largest horizontal displacement, shape (2,); E1 if the bearing did not move."""
+        peak: Array = self.displacement[self.peak_row, :2]
+        size = float(np.hypot(*peak))
+        return peak / size if size else np.array([1.0, 0.0])
+
+    @property
+    def path(self) -> tuple[Array, Array]:
+        """Horizontal displacement along and transverse to this direction, shape (T,) each [m]."""
+        e1, e2 = self.direction
+        along, across = (self.displacement[:, :2] @ np.array(axis) for axis in ([e1, e2], [-e2, e1]))
+        return along, across
+
     def arrays(self) -> dict[str, Array]:
         """The arrays of this run by field, without those that are None."""
         found = {name: getattr(self, name) for name in quantities()}

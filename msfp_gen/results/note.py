@@ -24,7 +24,7 @@ class Note:
     furthest beyond its limit: distance beyond the capacity [m], force [N], inertial over normal force [-], temperature
     rise [K], slip velocity [m/s], temperature [degC], share of the energy [-], movement [m], distance of the normal
     force from the axis [m], number of landings, error over the derivative [-], value of the scene. action: the effects
-    with which the run continued; "": it continued unchanged, or ended.
+    with which the run continued; "": it continued unchanged, or ended. bearing: of a building, from 1; 0: none.
     """
 
     time: float
@@ -33,6 +33,7 @@ class Note:
     value: float
     text: str
     action: str = ""
+    bearing: int = 0
 
     @property
     def line(self) -> str:

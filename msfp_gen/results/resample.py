@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,23 +10,28 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
-from msfp_gen.results.history import History
-from msfp_gen.results.run_data import RunData
+from msfp_gen.results.files import ResultFiles
 
-R = TypeVar("R", bound=RunData)
+R = TypeVar("R", bound=ResultFiles)
 
 
 def at_times(result: R, times: ArrayLike) -> R:
-    """`result` with rows at other times, by linear interpolation between its own rows.
+    """`result`, of one bearing or of a building, at other times, by linear interpolation between its own rows.
 
     times: ndarray, shape (K,), or a number [s]. Raises InputError for a time outside the run.
     """
-    history = result.history
-    new_times = checked_times(history.time, times)
-    columns = history.arrays().items()
-    rows: dict[str, Any] = {name: interpolated(history.time, values, new_times) for name, values in columns}
-    energy = {name: interpolated(history.time, values, new_times) for name, values in history.energy.items()}
-    return replace(result, history=History(**rows | {"time": new_times}, energy=energy))
+    rows: Any = getattr(result, "history", result)  # that of a building has its rows itself
+    new_times = checked_times(rows.time, times)
+
+    def at(values: Any) -> Any:
+        if isinstance(values, dict):
+            return {name: at(column) for name, column in values.items()}
+        return interpolated(rows.time, values, new_times) if isinstance(values, np.ndarray) else values
+
+    changed = replace(
+        rows, **{field.name: at(getattr(rows, field.name)) for field in fields(rows)} | {"time": new_times}
+    )
+    return changed if rows is result else replace(result, history=changed)  # type: ignore[type-var]
 
 
 def checked_times(rows: Array, times: ArrayLike) -> Array:

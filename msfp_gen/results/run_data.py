@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.common.identity import fingerprint
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.history import Counters, Event, History
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class RunData:
-    """Scene, rows, events and provenance of a run. `msfp_gen.Result` adds dataset, summary and files.
+class RunData(ResultFiles):
+    """Scene, rows, events and provenance of a run. `msfp_gen.Result` adds dataset and summary.
 
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
     text, "" for a run that succeeded. counters: the work of the solver. provenance: versions, model keys and solver
@@ -30,6 +30,7 @@ class RunData:
     parameters; None: not computed.
     """
 
+    source: ClassVar[str] = "msfp-gen"
     scene: Scene
     history: History
     events: tuple[Event, ...] = ()
@@ -46,16 +47,6 @@ class RunData:
         """Extremes over all accepted steps and rows."""
         rows = Extremes.of_rows(self.history)
         return rows if self.recorded_extremes is None else rows | self.recorded_extremes
-
-    @property
-    def identity(self) -> str:
-        """The sha256 of the scene, motion included, as in checkpoints; provenance names the model and its version."""
-        return fingerprint(self.scene)
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether the run reached its end or its stop condition."""
-        return self.status in ("ok", "stopped")
 
     @property
     def friction_coefficient(self) -> Array:

@@ -10,15 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from msfp_gen.errors import InputError
 
-if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
-
-R = TypeVar("R", bound="RunData")
 VARIABLES = ("displacement", "top_force", "top_moment")  # that change their sign
 
 
@@ -58,16 +53,3 @@ def using_sign(word: str) -> Iterator[None]:
         yield
     finally:
         _current.reset(token)
-
-
-def signed(result: R, word: str) -> R:
-    """`result` with `VARIABLES` of rows and events in another sign, for an exported table. Raises InputError."""
-    factor, history = sign_of(word).factor, result.history
-    if factor == 1.0:
-        return result
-    rows = replace(history, **{name: factor * getattr(history, name) + 0.0 for name in VARIABLES})  # no -0.0
-    events = [
-        replace(event, displacement=factor * event.displacement, top_force=factor * event.top_force)
-        for event in result.events
-    ]
-    return replace(result, history=rows, events=tuple(events))

@@ -1,4 +1,4 @@
-"""Reading of the derivatives of a run: a group of its netCDF-4 file (`results/netcdf.py`)."""
+"""Reading of the derivatives of a run: a group of its netCDF-4 file (`results/files.py`)."""
 
 from __future__ import annotations
 

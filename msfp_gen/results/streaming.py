@@ -1,6 +1,6 @@
 """A netCDF-4 file written block by block, for runs whose rows do not fit into memory.
 
-It holds what `write_netcdf` writes: variables, attributes and digest are the same.
+It holds what `to_netcdf` writes: variables, attributes and digest are the same.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from typing import Any
 
 from msfp_gen.common.output import replacing
 from msfp_gen.results.dataset import energy_variables, row_variables, to_dataset
+from msfp_gen.results.files import DIGEST, digest_of_dataset
 from msfp_gen.results.history import History
 from msfp_gen.results.joining import taken
-from msfp_gen.results.netcdf import digest_of_dataset
-from msfp_gen.results.reading import DIGEST
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest, seal
 from msfp_gen.results.thinning import BLOCK

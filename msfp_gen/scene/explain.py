@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
-    from msfp_gen.scene.top import Top
+    from msfp_gen.scene.top import NodeTop, Top
     from msfp_gen.specification.friction_laws import Law
 
 SURFACE_COLUMNS = {
@@ -64,7 +64,7 @@ def explain(scene: Scene) -> list[Table]:
         *doubt_tables(scene_doubts(scene)),
         body_table(scene.bearing),
         motion_table(scene.motion),
-        _top(scene.top),
+        top_table(scene.top, f"top: {scene.top.kind}, {TOPS[scene.top.kind]}"),
         *_history("load on the top plate", scene.load),
         *_history("rotation of the top", scene.top_rotation),
         effect_table(scene.effect_selection),
@@ -127,14 +127,15 @@ def motion_table(motion: Motion) -> Table:
     )
 
 
-def _top(top: Top) -> Table:
+def top_table(top: Top | NodeTop, title: str) -> Table:
+    """Stiffness, damping, mass and load of a top, or of the interface to a building."""
     rows = [
         (name.replace("_", " "), "rigid" if value is None else f"{_value(value)} {rule.unit}")
         for name, rule, _ in ruled_fields(type(top))
         if isinstance(rule, Quantity)
         for value in (getattr(top, name),)
     ]
-    return Table(f"top: {top.kind}, {TOPS[top.kind]}", (), rows)
+    return Table(title, (), rows)
 
 
 def effect_table(selection: EffectSelection) -> Table:

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import check_folder, clear_leftovers, write_bytes
@@ -22,7 +22,6 @@ from msfp_gen.errors import InputError
 from msfp_gen.simulation.row_file import RowFile, rows_beside
 
 if TYPE_CHECKING:
-    from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
     from msfp_gen.scene.scene import Scene
 
@@ -55,6 +54,24 @@ def require_no_checkpoint(checkpoint: str | Path) -> None:
         raise InputError(
             f"checkpoint = {str(checkpoint)!r}: {str(found[0])!r} exists; resume it, or remove it to start anew"
         )
+
+
+class Resumable(Protocol):
+    """The run of a bearing or of a building, which can be saved and continued."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+
+    @property
+    def dropped_rows(self) -> int:
+        """Number of rows that it no longer holds."""
+
+    def snapshot(self) -> bytes:
+        """Its state, with the rows that it holds."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Continue from a snapshot of a run of the same scene and build. Raises ValueError."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +130,7 @@ class Checkpoint:
         self._start = time.monotonic()
         self._due = self._start + every
 
-    def restore(self, run: Run, rows: RowFile | None = None) -> None:
+    def restore(self, run: Resumable, rows: RowFile | None = None) -> None:
         """Set a new run, and its rows on disk, to the saved state, if there is one. Raises InputError if damaged."""
         if self._snapshot is not None:
             try:
@@ -126,12 +143,12 @@ class Checkpoint:
                 raise self._refused("made by a run that streams its rows")
             self._snapshot = None
 
-    def save_if_due(self, run: Run, rows: RowFile | None = None) -> None:
+    def save_if_due(self, run: Resumable, rows: RowFile | None = None) -> None:
         """Save the run if enough time has passed since the last checkpoint."""
         if time.monotonic() >= self._due:
             self.save(run, rows)
 
-    def save(self, run: Run, rows: RowFile | None = None) -> None:
+    def save(self, run: Resumable, rows: RowFile | None = None) -> None:
         """Save the run now. If writing fails, a warning is given and the last checkpoint remains.
 
         rows: those on disk of a run that streams them.

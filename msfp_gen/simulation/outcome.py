@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.solver import Solver
     from msfp_gen.simulation.segment import Segment
 
 
@@ -43,16 +44,15 @@ def extremes_of(segments: Sequence[Segment]) -> Extremes | None:
     return reduce(or_, found) if found else None
 
 
-def provenance_of(scene: Scene, segments: Sequence[Segment]) -> dict[str, str]:
-    """Versions, models and options of the solver with which the segments were computed."""
+def provenance_of(solver: Solver, models: str) -> dict[str, str]:
+    """Versions, names of the models, and options of the solver with which a run was computed."""
     return {
         "msfp_gen": __version__,
-        "model": ", then ".join(segment.model.spec.key for segment in segments),
+        "model": models,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "method": scene.solver.method,
-        "rtol": f"{scene.solver.rtol:g}",
-        "build_seconds": f"{sum(segment.setup for segment in segments):.3g}",
+        "method": solver.method,
+        "rtol": f"{solver.rtol:g}",
     }
 
 
@@ -71,15 +71,18 @@ OVERTURNED = 0.1  # tilt of the top plate above which the stack is considered to
 
 def message(scene: Scene, model: Model, run: Run, status: str, cause: str | None = None) -> str:
     """One line with time, surface, cause, remedy and last state. cause: None for the meaning of the status."""
-    _, surface, value = run.status
-    where = f", surface {surface}" if surface else ""
-    found = _STATUSES[status]
-    if surface and found.quantity:
-        where += f", {found.quantity} = {value:.4g}"
-    text = f"stopped at t = {run.time:.6g} s of {scene.end:.6g} s{where}: {cause or found.failure}"
-    text += _state(scene, model, run) if found.motion and run.row_count else ""
+    text = stopped(run.time, scene.end, status, *run.status[1:], cause)
+    text += _state(scene, model, run) if _STATUSES[status].motion and run.row_count else ""
     text += PULLED if _pulled(scene, run) else ""
     return text + (MASSLESS if _inertia_missing(scene, model, status) else "")
+
+
+def stopped(time: float, end: float, status: str, surface: int, value: float, cause: str | None = None) -> str:
+    """Time reached and end of a run [s], surface (0: none), value and cause; None: the meaning of the status."""
+    known = _STATUSES[status]
+    where = f", surface {surface}" if surface else ""
+    where += f", {known.quantity} = {value:.4g}" if surface and known.quantity else ""
+    return f"stopped at t = {time:.6g} s of {end:.6g} s{where}: {cause or known.failure}"
 
 
 def _pulled(scene: Scene, run: Run) -> bool:

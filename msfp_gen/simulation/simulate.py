@@ -292,7 +292,8 @@ def _result(sequence: RunSequence, history: History) -> Result:
         counters=replace(total, wall_time=sum(segment.wall for segment in segments)),
         status=last.status,
         message="" if last.status in ("ok", "stopped") else message_of(scene, last),
-        provenance=provenance_of(scene, segments),
+        provenance=provenance_of(scene.solver, ", then ".join(segment.model.spec.key for segment in segments))
+        | {"build_seconds": f"{sum(segment.setup for segment in segments):.3g}"},
         notes=tuple(sequence.notes)
         + history_notes(scene, last.model.effects, thinned_history(history))
         + landing_notes(events)

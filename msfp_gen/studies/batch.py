@@ -7,15 +7,15 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.buildings.opening import AnyScene
+from msfp_gen.buildings.load import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.either import simulate
 from msfp_gen.simulation.memory import require_memory
+from msfp_gen.simulation.run_any import simulate
 from msfp_gen.simulation.settling import needs_settling
 from msfp_gen.simulation.simulate import RunSequence, settle
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count

@@ -10,7 +10,7 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.opening import AnyScene, with_absolute_paths
+from msfp_gen.buildings.load import AnyScene, with_absolute_paths
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.changes import keys_of

@@ -17,7 +17,7 @@ from support import malformed_scenes
 from support import record_writers as w
 from support.damaged_records import CSV, MUTATIONS, WAVES
 
-from msfp_gen.buildings.opening import load_scene
+from msfp_gen.buildings.load import load_scene
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.loader import scene_text

@@ -19,7 +19,7 @@ from msfp_gen import (
     load_scene,
     simulate,
 )
-from msfp_gen.buildings import effects as selection
+from msfp_gen.buildings import scene as selection
 
 LIFTING = Effects(uplift=True)
 

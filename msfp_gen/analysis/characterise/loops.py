@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.results.history import first_peak
 
 REVERSAL = 0.02  # least reverse motion after a turning point, over the range of the run
 CLOSURE = 0.05  # largest distance between start and end of a closed cycle, over its range
+TRANSVERSE = 0.02  # largest transverse displacement of a motion in one direction, over the largest displacement
+REST_INTERVAL = 0.05  # last share of a run in which the bearing must be at rest
+REST_MOVEMENT = 0.01  # largest movement in it of a bearing at rest, over the largest displacement
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,71 @@ class Loop:
     energy_dissipated: float
     effective_damping: float | None
     zero_displacement_force: float
+
+
+class Path(NamedTuple):
+    """A horizontal motion and its force, at T times.
+
+    time: shape (T,) [s]. u, force: shape (T, 2) [m], [N]. direction: unit vector of the largest displacement. row: of
+    it. peak: it [m].
+    """
+
+    time: Array
+    u: Array
+    force: Array
+    direction: Array
+    row: int
+    peak: float
+
+    @classmethod
+    def of(cls, time: Array, displacement: Array, force: Array, what: str = "the bearing") -> Path:
+        """The path of displacement [m] and force [N], shape (T, 2 or 3). Raises InputError if `what` did not move."""
+        u = displacement[:, :2]
+        size = np.hypot(*u.T)
+        row = first_peak(size)
+        if not size[row]:
+            raise InputError(f"characterise: {what} did not move in this run; give a motion, or a longer duration")
+        return cls(time, u, force[:, :2], u[row] / size[row], row, float(size.max()))
+
+    @property
+    def along(self) -> tuple[Array, Array]:
+        """Displacement and force along the direction, shape (T,) each."""
+        return self.u @ self.direction, self.force @ self.direction
+
+    @property
+    def secant_stiffness(self) -> float:
+        """Force along the largest displacement, divided by it [N/m]."""
+        return float(self.force[self.row] @ self.direction / np.hypot(*self.u[self.row]))
+
+    @property
+    def straight(self) -> bool:
+        """Whether the motion is in one direction."""
+        transverse = self.u @ np.array([-self.direction[1], self.direction[0]])
+        return bool(np.abs(transverse).max() <= TRANSVERSE * self.peak)
+
+    @property
+    def residual(self) -> float:
+        """Displacement in the last row [m]."""
+        return float(np.hypot(*self.u[-1]))
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it moves by less than `REST_MOVEMENT` of its peak in the last part of the run."""
+        begin = self.time[-1] - REST_INTERVAL * (self.time[-1] - self.time[0])
+        return bool(np.hypot(*np.ptp(self.u[self.time >= begin], axis=0)) <= REST_MOVEMENT * self.peak)
+
+    @property
+    def turning(self) -> list[int]:
+        """Rows of the turning points of a motion in one direction; none of any other."""
+        u = self.along[0]
+        return turning_points(u, REVERSAL * float(np.ptp(u))) if self.straight else []
+
+    def cycles(self) -> Iterator[tuple[int, int, int, Loop]]:
+        """Rows of start, reversal and end of every closed cycle of a motion in one direction, and its properties."""
+        u, force = self.along
+        for start, middle, end in closed_cycles(u, self.turning):
+            rows = slice(start, end + 1)
+            yield start, middle, end, effective_properties(u[rows], force[rows], middle - start)
 
 
 def turning_points(u: Array, threshold: float) -> list[int]:

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from math import pi, sqrt
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from msfp_gen.analysis.characterise.loops import REVERSAL, Loop, closed_cycles, effective_properties, turning_points
+from msfp_gen.analysis.characterise.loops import Loop, Path
 from msfp_gen.analysis.characterise.stages import Branch, branch_of, signed_slip
-from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, surface_demands
+from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands, surface_demands
 from msfp_gen.analysis.summary import axial_load
 from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
-from msfp_gen.errors import InputError
-from msfp_gen.results.history import History
 
 if TYPE_CHECKING:
+    from msfp_gen.results.extremes import Extremes
     from msfp_gen.results.run_data import RunData
+    from msfp_gen.scene.bearing import Bearing
 
-TRANSVERSE = 0.02  # largest transverse displacement of a motion in one direction, over the largest displacement
-REST_INTERVAL = 0.05  # last share of a run in which the bearing must be at rest
-REST_MOVEMENT = 0.01  # largest movement in it of a bearing at rest, over the largest displacement
 Kind = Literal["cycles", "monotonic", "one direction", "two directions"]
 LOOP_QUANTITIES = (
     "effective_stiffness",
@@ -55,7 +52,7 @@ class Cycle:
         effective_period: 2 pi sqrt(N/(g k_eff)) [s]; None without a constant load.
         balance_energy: energy dissipated by friction, rims and top in this time by the energy balance [J], to compare
             with the area of the loop.
-        branches: the half cycle to the opposite turning point, and the one back.
+        branches: the half cycle to the opposite turning point, and the one back; none of a bearing of a building.
         surfaces: demands on the surfaces within the cycle.
     """
 
@@ -65,17 +62,17 @@ class Cycle:
     loop: Loop
     effective_period: float | None
     balance_energy: float
-    branches: tuple[Branch, Branch]
+    branches: tuple[Branch, ...]
     surfaces: tuple[SurfaceDemand, ...]
 
     def stage_stiffness(self) -> dict[tuple[int, ...], float]:
         """Sliding surfaces -> stiffness [N/m], mean of both half cycles; regimes in which all stick are left out."""
-        found: dict[tuple[int, ...], list[float]] = {}
+        stiffness: dict[tuple[int, ...], list[float]] = {}
         for branch in self.branches:
             for stage in branch.stages:
                 if stage.surfaces:
-                    found.setdefault(stage.surfaces, []).append(stage.stiffness)
-        return {surfaces: float(np.mean(values)) for surfaces, values in found.items()}
+                    stiffness.setdefault(stage.surfaces, []).append(stage.stiffness)
+        return {surfaces: float(np.mean(values)) for surfaces, values in stiffness.items()}
 
 
 @dataclass(frozen=True)
@@ -147,85 +144,116 @@ def characterise(result: RunData) -> Characterisation:
 
     Raises InputError if the bearing did not move.
     """
-    history = result.history
-    peak = float(history.horizontal.max())
-    if peak == 0.0:
-        raise InputError("characterise: the bearing did not move in this run; give a motion, or a longer duration")
-    row = history.peak_row
-    direction = history.displacement[row, :2] / history.horizontal[row]
-    cycles, first = _cycles_and_first_loading(result, direction)
-    kind = _kind(result, direction, cycles)
-    demands = surface_demands(result)
-    uplifts = [demand.maximum_uplift for demand in demands if demand.maximum_uplift is not None]
-    at_rest = _at_rest(history, peak)
-    load = axial_load(result)
-    return Characterisation(
-        name=result.scene.name,
-        status=result.status,
-        kind=kind,
-        direction=(float(direction[0]), float(direction[1])),
-        axial_load=load,
-        cycles=cycles,
-        first_loading=first,
-        transitions=transitions(result, load) if kind == "monotonic" else None,
-        envelope=_envelope(cycles),
-        surfaces=demands,
-        peak_displacement=float(result.extremes.displacement[3]),
-        peak_force=float(result.extremes.top_force[3]),
-        secant_stiffness=float(history.top_force[row, :2] @ direction / history.horizontal[row]),
-        energy_dissipated=float(_dissipated(history)[-1]),
-        residual_displacement=float(history.horizontal[-1]),
-        at_rest=at_rest,
-        maximum_uplift=max(uplifts, default=None),
-        notes=tuple(_notes(result, kind, at_rest, demands)),
-    )
-
-
-def _cycles_and_first_loading(result: RunData, direction: Array) -> tuple[tuple[Cycle, ...], Branch | None]:
-    """Closed cycles and first loading of a motion in one direction; neither for any other motion."""
-    history = result.history
-    if not _is_straight(history, direction):
-        return (), None
-    u, force = (rows[:, :2] @ direction for rows in (history.displacement, history.top_force))
-    slip, plastic = signed_slip(result, direction)
-    turning = turning_points(u, REVERSAL * float(np.ptp(u)))
+    history, load = result.history, axial_load(result)
+    path = Path.of(history.time, history.displacement, history.top_force)
+    (u, force), (slip, plastic) = path.along, signed_slip(result, path.direction)
 
     def branch(first: int, last: int) -> Branch:
         rows = slice(first, last + 1)
         return branch_of(u[rows], force[rows], slip[rows], plastic[rows], history.gap[rows])
 
-    cycles, dissipated, load = [], _dissipated(history), axial_load(result)
-    for number, (start, middle, end) in enumerate(closed_cycles(u, turning), 1):
-        rows = slice(start, end + 1)
-        loop = effective_properties(u[rows], force[rows], middle - start)
-        cycles.append(
-            Cycle(
-                number,
-                float(history.time[start]),
-                float(history.time[end]),
-                loop,
-                _period(loop.effective_stiffness, load, result.scene.bearing.gravity),
-                float(dissipated[end] - dissipated[start]),
-                (branch(start, middle), branch(middle, end)),
-                surface_demands(result, rows),
-            )
+    dissipated, turning = _dissipated(result), path.turning
+    cycles = _cycles(path, load, result.scene.bearing, dissipated, lambda rows: surface_demands(result, rows), branch)
+    kind: Kind = "cycles" if cycles else "monotonic" if is_monotonic(result) else _directions(path)
+    name, status, demands = result.scene.name, result.status, surface_demands(result)
+    whole = _whole(name, status, kind, path, load, cycles, demands, dissipated, result.extremes)
+    notes = list(whole.notes)
+    if any(demand.maximum_uplift is None for demand in demands):
+        notes.append("uplift is not modelled in this run")
+    if load is None:
+        notes.append("no constant axial load: no effective period")
+    return replace(
+        whole,
+        first_loading=branch(turning[0], turning[1]) if len(turning) > 1 else None,
+        transitions=transitions(result, load) if kind == "monotonic" else None,
+        notes=tuple(notes),
+    )
+
+
+def _directions(path: Path) -> Kind:
+    return "one direction" if path.straight else "two directions"
+
+
+def characterise_rows(
+    name: str,
+    status: str,
+    path: Path,
+    bearing: Bearing,
+    load: float,
+    gap: Array,
+    dissipated: Array,
+    extremes: Extremes,
+) -> Characterisation:
+    """Characterise one bearing of a building, by what its rows have.
+
+    name, status: of the run. load: at rest [N]. gap: to the rims, shape (T, n-1) [m]. dissipated: energy since the
+    start, shape (T,) [J]. extremes: over all steps.
+    """
+    cycles = _cycles(path, load, bearing, dissipated, lambda rows: capacity_demands(bearing, gap[rows].min(axis=0)))
+    kind: Kind = "cycles" if cycles else _directions(path)
+    demands = capacity_demands(bearing, extremes.gap)
+    note = "the rows of a building have no slip velocities: no sliding regimes, velocities, heat and uplift of surfaces"
+    whole = _whole(name, status, kind, path, load, cycles, demands, dissipated, extremes)
+    return replace(whole, notes=(*whole.notes, f"{note}; periods are with N at rest"))
+
+
+def _cycles(
+    path: Path,
+    load: float | None,
+    bearing: Bearing,
+    dissipated: Array,
+    demands: Callable[[slice], tuple[SurfaceDemand, ...]],
+    branch: Callable[[int, int], Branch] | None = None,
+) -> list[Cycle]:
+    """The closed cycles of a path. demands: over some rows. branch: from one row to another; None: not known."""
+    return [
+        Cycle(
+            number,
+            float(path.time[start]),
+            float(path.time[end]),
+            loop,
+            _period(loop.effective_stiffness, load, bearing.gravity),
+            float(dissipated[end] - dissipated[start]),
+            () if branch is None else (branch(start, middle), branch(middle, end)),
+            demands(slice(start, end + 1)),
         )
-    return tuple(cycles), branch(turning[0], turning[1]) if len(turning) > 1 else None
+        for number, (start, middle, end, loop) in enumerate(path.cycles(), 1)
+    ]
 
 
-def _is_straight(history: History, direction: Array) -> bool:
-    """Whether the motion is in one direction."""
-    transverse = history.displacement[:, :2] @ np.array([-direction[1], direction[0]])
-    return bool(np.abs(transverse).max() <= TRANSVERSE * history.horizontal.max())
-
-
-def _kind(result: RunData, direction: Array, cycles: Sequence[Cycle]) -> Kind:
-    """The kind of motion, as in `Characterisation.kind`."""
-    if cycles:
-        return "cycles"
-    if is_monotonic(result):
-        return "monotonic"
-    return "one direction" if _is_straight(result.history, direction) else "two directions"
+def _whole(
+    name: str,
+    status: str,
+    kind: Kind,
+    path: Path,
+    load: float | None,
+    cycles: Sequence[Cycle],
+    demands: tuple[SurfaceDemand, ...],
+    dissipated: Array,
+    extremes: Extremes,
+) -> Characterisation:
+    """What follows from path and cycles. dissipated: energy since the start, shape (T,) [J]."""
+    uplifts = [demand.maximum_uplift for demand in demands if demand.maximum_uplift is not None]
+    return Characterisation(
+        name=name,
+        status=status,
+        kind=kind,
+        direction=(float(path.direction[0]), float(path.direction[1])),
+        axial_load=load,
+        cycles=tuple(cycles),
+        first_loading=None,
+        transitions=None,
+        envelope=_envelope(cycles),
+        surfaces=demands,
+        peak_displacement=float(extremes.displacement[3]),
+        peak_force=float(extremes.top_force[3]),
+        secant_stiffness=path.secant_stiffness,
+        energy_dissipated=float(dissipated[-1]),
+        residual_displacement=path.residual,
+        at_rest=path.at_rest,
+        maximum_uplift=max(uplifts, default=None),
+        notes=tuple(_notes(kind, path.at_rest, demands)),
+    )
 
 
 def _period(stiffness: float, load: float | None, gravity: float) -> float | None:
@@ -235,12 +263,12 @@ def _period(stiffness: float, load: float | None, gravity: float) -> float | Non
 
 def _envelope(cycles: Sequence[Cycle]) -> dict[str, Range]:
     """Quantity -> its range over the cycles in which it is defined."""
-    found = {}
+    ranges = {}
     for name in LOOP_QUANTITIES:
         values = [v for v in (loop_quantity(cycle, name) for cycle in cycles) if v is not None]
         if values:
-            found[name] = Range(min(values), float(np.mean(values)), max(values))
-    return found
+            ranges[name] = Range(min(values), float(np.mean(values)), max(values))
+    return ranges
 
 
 def loop_quantity(cycle: Cycle, name: str) -> float | None:
@@ -249,21 +277,14 @@ def loop_quantity(cycle: Cycle, name: str) -> float | None:
     return value
 
 
-def _dissipated(history: History) -> Array:
+def _dissipated(result: RunData) -> Array:
     """Energy dissipated since the start [J], shape (T,)."""
-    parts = [values for name, values in history.energy.items() if name.endswith("_dissipated")]
+    parts = [values for name, values in result.history.energy.items() if name.endswith("_dissipated")]
     total: Array = np.sum(parts, axis=0)
     return total
 
 
-def _at_rest(history: History, peak: float) -> bool:
-    """Whether the bearing moves by less than REST_MOVEMENT of its `peak` [m] in the last part of the run."""
-    begin = history.time[-1] - REST_INTERVAL * (history.time[-1] - history.time[0])
-    last = history.displacement[history.time >= begin, :2]
-    return bool(np.hypot(*np.ptp(last, axis=0)) <= REST_MOVEMENT * peak)
-
-
-def _notes(result: RunData, kind: Kind, at_rest: bool, demands: Sequence[SurfaceDemand]) -> list[str]:
+def _notes(kind: Kind, at_rest: bool, demands: Sequence[SurfaceDemand]) -> list[str]:
     """What is not defined in this run, and why."""
     notes = []
     if kind == "two directions":
@@ -283,8 +304,4 @@ def _notes(result: RunData, kind: Kind, at_rest: bool, demands: Sequence[Surface
         notes.append(
             f"no radius of the slider is given, so no contact area and no heat flux: surface {', '.join(unknown)}"
         )
-    if any(demand.maximum_uplift is None for demand in demands):
-        notes.append("uplift is not modelled in this run")
-    if axial_load(result) is None:
-        notes.append("no constant axial load: no effective period")
     return notes

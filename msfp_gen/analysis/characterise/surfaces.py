@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,9 @@ import numpy as np
 from msfp_gen.results.sliding import separated
 
 if TYPE_CHECKING:
+    from msfp_gen.common.arrays import Array
     from msfp_gen.results.run_data import RunData
+    from msfp_gen.scene.bearing import Bearing
 
 
 @dataclass(frozen=True)
@@ -22,9 +24,9 @@ class SurfaceDemand:
         surface: 1..n-1.
         capacity_left: least gap to the rim [m]; negative where the rim is compressed.
         capacity_left_share: the same over the capacity [-].
-        peak_velocity: largest slip velocity while the surface is in contact [m/s].
-        peak_heat_flux: largest mu N |v|/A [W/m^2]; None if A is not known.
-        heat: its integral over time [J/m^2]; None if A is not known.
+        peak_velocity: largest slip velocity while the surface is in contact [m/s]; None if it is not known.
+        peak_heat_flux: largest mu N |v|/A [W/m^2]; None if A or v is not known.
+        heat: its integral over time [J/m^2]; None if A or v is not known.
         contact_area: A = pi r^2, with r the radius of the sliding patch, else the rim radius of the slider [m^2]; None
             if the bearing has neither.
         maximum_uplift: largest opening of the surface [m]; None in a model without uplift.
@@ -33,7 +35,7 @@ class SurfaceDemand:
     surface: int
     capacity_left: float
     capacity_left_share: float
-    peak_velocity: float
+    peak_velocity: float | None
     peak_heat_flux: float | None
     heat: float | None
     contact_area: float | None
@@ -47,29 +49,35 @@ def surface_demands(result: RunData, rows: slice | None = None) -> tuple[Surface
     speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
     power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
+    fastest = extremes.slip_speed if whole and extremes.slip_speed is not None else speed.max(axis=0)
     has_uplift = result.scene.modelled.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
-    found = []
-    for i, surface in enumerate(bearing.surfaces):
-        gap = float(extremes.gap[i] if whole else history.gap[rows, i].min())
-        area = _contact_area(result, i)
-        found.append(
-            SurfaceDemand(
-                i + 1,
-                gap,
-                gap / surface.capacity,
-                float(extremes.slip_speed[i] if whole else speed[:, i].max()),
-                float(power[:, i].max()) / area if area else None,
-                float(heat[i]) / area if area else None,
-                area,
-                float(history.lift[rows, i].max()) if has_uplift else None,
+    demands = []
+    for i, basic in enumerate(capacity_demands(bearing, extremes.gap if whole else history.gap[rows].min(axis=0))):
+        area = basic.contact_area
+        demands.append(
+            replace(
+                basic,
+                peak_velocity=float(fastest[i]),
+                peak_heat_flux=float(power[:, i].max()) / area if area else None,
+                heat=float(heat[i]) / area if area else None,
+                maximum_uplift=float(history.lift[rows, i].max()) if has_uplift else None,
             )
         )
-    return tuple(found)
+    return tuple(demands)
 
 
-def _contact_area(result: RunData, surface: int) -> float | None:
+def capacity_demands(bearing: Bearing, gap: Array) -> tuple[SurfaceDemand, ...]:
+    """What the least gaps of the surfaces tell, shape (n-1,) [m]; velocity, heat and uplift are None."""
+    return tuple(
+        SurfaceDemand(
+            i + 1, float(least), float(least) / surface.capacity, None, None, None, _contact_area(bearing, i), None
+        )
+        for i, (surface, least) in enumerate(zip(bearing.surfaces, gap, strict=True))
+    )
+
+
+def _contact_area(bearing: Bearing, surface: int) -> float | None:
     """Contact area of a surface (index from 0) [m^2]; None if no radius is given."""
-    bearing = result.scene.bearing
     patch = bearing.surfaces[surface].patch_radius
     radius = bearing.slider_rim_radius(surface) if patch is None else patch
     return pi * radius**2 if radius > 0 else None

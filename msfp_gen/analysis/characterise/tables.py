@@ -152,8 +152,8 @@ def _named_branches(found: Characterisation) -> Iterator[tuple[str, Branch]]:
         yield "first loading", found.first_loading
     if found.cycles:
         last = found.cycles[-1]
-        yield f"cycle {last.number}, half 1", last.branches[0]
-        yield f"cycle {last.number}, half 2", last.branches[1]
+        for half, branch in enumerate(last.branches, start=1):
+            yield f"cycle {last.number}, half {half}", branch
 
 
 def _stage_table(branches: list[tuple[str, Branch]]) -> Table:
@@ -189,7 +189,7 @@ def _surface_table(demands: tuple[SurfaceDemand, ...]) -> Table:
             str(demand.surface),
             f"{demand.capacity_left * 1e3:.2f}",
             f"{demand.capacity_left_share * 100:.1f}",
-            f"{demand.peak_velocity * 1e3:.4g}",
+            _number(demand.peak_velocity, 1e3),
             _number(demand.peak_heat_flux, 1e-3),
             _number(demand.heat, 1e-3),
             _number(demand.maximum_uplift, 1e3),

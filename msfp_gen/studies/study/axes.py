@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.buildings.opening import located_value
+from msfp_gen.buildings.load import located_value
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.studies.study.sampling import Distribution, distribution_from, number_of

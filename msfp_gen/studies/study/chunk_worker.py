@@ -19,7 +19,7 @@ from msfp_gen.studies.study.quantities import Column, Keep
 from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.opening import AnyScene
+    from msfp_gen.buildings.load import AnyScene
 
 BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run
 

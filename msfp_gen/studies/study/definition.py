@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from msfp_gen.buildings.columns import column_names
-from msfp_gen.buildings.opening import AnyScene
+from msfp_gen.buildings.dataset import column_names
+from msfp_gen.buildings.load import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields

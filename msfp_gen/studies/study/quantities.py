@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.buildings.columns import columns_of
+from msfp_gen.buildings.dataset import columns_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities

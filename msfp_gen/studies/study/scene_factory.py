@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from msfp_gen.buildings.opening import AnyScene, scene_of
+from msfp_gen.buildings.load import AnyScene, scene_of
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
 from msfp_gen.scene.file.motion_tables import RecordMotion

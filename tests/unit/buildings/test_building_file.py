@@ -28,7 +28,7 @@ from msfp_gen import (
     presets,
 )
 from msfp_gen.buildings.file import building_from_table
-from msfp_gen.buildings.opening import load_bearing_scene, with_absolute_paths
+from msfp_gen.buildings.load import load_bearing_scene, with_absolute_paths
 
 TEXT = """
 name = "one storey"

@@ -9,10 +9,9 @@ import pytest
 from support.buildings import BEARING, LOAD, rocking
 
 from msfp_gen import Auto, Effects, RunError, simulate
-from msfp_gen.buildings import effects as selection
+from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.switching import notes_until_now, switch
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.scene import monitors
 
@@ -58,7 +57,7 @@ def test_no_axial_force_jumps_where_uplift_opens():
     before, force = RestartState.of_port(old.port), old.model.unpack(old.port.row)["top_force"]
     pressed = before.contact_force(BEARING)[:, 2]  # without the rims, which the contacts do not carry
     assert run.run.status[:2] == ("guard", 3) and old.port.trips["uplift"][0] == time
-    assert switch(run) and run.run.status[0] == "ok"
+    assert run.switch() and run.run.status[0] == "ok"
     after = RestartState.of_port(run.members[2].port)
     assert np.array_equal(after.q[:, :3], before.q) and np.array_equal(after.f, before.f) and after.time == time
     assert after.q[:, 5] == pytest.approx(-pressed / 5e9, rel=1e-9)
@@ -98,10 +97,10 @@ def test_notes_of_heat_give_the_peak_over_all_models_of_a_bearing(monkeypatch):
     """Two of the bearings change their model after the limit of heat, here a hundredth of the usual one, is passed."""
     monkeypatch.setattr(monitors, "NOTED_SOFTENING", 5e-4)
     run, highest = start_run(rocking(None)), np.zeros(4)
-    while run.run.advance(10) or switch(run):
+    while run.run.advance(10) or run.switch():
         parts = [RestartState.of_port(member.port).monitor_heat for member in run.members]
         highest = np.maximum(highest, [each.sum(axis=1).max() for each in parts])
-    notes = {index: note for index, note in notes_until_now(run) if note.kind == "heat"}
+    notes = {note.bearing - 1: note for note in run.notes if note.kind == "heat"}
     assert sorted(notes) == [0, 1, 2, 3]
     for index, note in notes.items():
         assert highest[index] <= note.value < 1.05 * highest[index] and note.time < 0.5 * run.time

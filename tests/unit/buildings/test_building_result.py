@@ -11,11 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.buildings import MOTION, PLACES, frame, scene
+from support.synthetic import loops as loops_of_one
+from support.synthetic import opened
 
 from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
-from msfp_gen.buildings.characterise import cycles_of
+from msfp_gen.analysis.characterise import loops
+from msfp_gen.analysis.characterise.tables import characterisation_tables, csv_rows
+from msfp_gen.buildings.dataset import column_names, columns_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.summary import summary_tables
+from msfp_gen.figures import plot_loops
 from msfp_gen.results.note import Note
 
 
@@ -80,6 +85,34 @@ def test_bearings_have_the_signs_of_a_run_of_one_bearing():
     assert np.abs(total - inertia)[:, :2].max() < 0.02 * np.abs(inertia).max()  # inertia of the bearings themselves
 
 
+def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
+    """Variables, units and meanings of its dataset, keys of its summary, quantities of its characterisation, files."""
+    one, alone = result().bearings[1], loops_of_one()
+    for name, variable in one.dataset.data_vars.items():
+        assert name in alone.dataset or name in ("axial_force", "dissipated", "stored")
+        if name in alone.dataset:
+            assert variable.dims == alone.dataset[name].dims and variable.attrs == alone.dataset[name].attrs
+    assert np.array_equal(one.dataset["top_force"], one.top_force) and one.dataset.sizes["surface"] == 4
+    shared = {"peak_displacement", "peak_top_force", "peak_force_ratio", "axial_load", "peak_sliding", "minimum_gap"}
+    shared |= {"rims_met", "minimum_normal_force", "maximum_normal_force"}
+    assert shared <= one.summary.keys() & alone.summary.keys()
+    found = characterise(one)
+    assert found.as_dict().keys() == alone.characterise().as_dict().keys()
+    assert found.peak_force == one.summary["peak_top_force"]["radial"] and found.secant_stiffness > 0
+    assert found.surfaces[0].capacity_left == one.summary["minimum_gap"][0] and "slip velocities" in found.notes[-1]
+    assert all(table.text for table in characterisation_tables(found)) and csv_rows(found)
+    path = one.save(tmp_path / "one.csv")
+    assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top") and plot_loops(one)
+    file = one.save(tmp_path / "one.nc")
+    assert opened(file).identical(one.dataset.assign_attrs(digest=opened(file).attrs["digest"]))
+    with pytest.raises(InputError, match="one bearing of a building; read the file of the building"):
+        BuildingResult.from_netcdf(file)
+
+
+def test_columns_of_a_scene_are_those_of_its_result():
+    assert set(column_names(made())) == set(columns_of(result()))
+
+
 def test_torsion_of_the_base_is_that_of_the_masses():
     """Its moment about the centre of mass is what turns the building."""
     building, found = made().building, result()
@@ -128,7 +161,7 @@ def test_damaged_and_foreign_files_are_refused(tmp_path: Path):
         BuildingResult.from_netcdf(tmp_path / "short.nc")
     from msfp_gen.result import Result
 
-    with pytest.raises(InputError, match="no result of msfp-gen"):
+    with pytest.raises(InputError, match=r"result of a building; read it with BuildingResult\.from_netcdf"):
         Result.from_netcdf(result().to_netcdf(tmp_path / "again.nc"))
 
 
@@ -166,14 +199,15 @@ def test_a_failed_run_states_how_it_ended():
 
 def test_notes_of_monitors_name_the_bearing():
     uplift = Note(0.14, "uplift", 3, 5.0, "it is unloaded", "uplift = True")
-    heat = [(index, Note(0.2 + index, "heat", 1, 10.0 + index, "it is hot")) for index in range(3)]
-    found = replace(result(), monitored=(*heat[::-1], (0, uplift), (2, replace(uplift, time=0.3, action=""))))
+    heat = [Note(0.2 + index, "heat", 1, 10.0 + index, "it is hot", bearing=index + 1) for index in range(3)]
+    lifted = replace(uplift, bearing=1)
+    found = replace(result(), monitored=(*heat[::-1], lifted, replace(uplift, time=0.3, action="", bearing=3)))
     assert [note.line for note in found.notes] == [
         "t = 0.14 s: bearing 1 (A): it is unloaded; continued with uplift = True",
         "t = 0.3 s: bearing 3: it is unloaded",
         "t = 2.2 s: bearing 3: it is hot; the same holds for 2 other bearings, with less",
     ]
-    assert found.bearings[0].model_changes == (uplift,) and found.bearings[2].model_changes == ()
+    assert found.bearings[0].model_changes == (lifted,) and found.bearings[2].model_changes == ()
     assert "notes" in repr(found)
 
 
@@ -193,12 +227,12 @@ def test_cycles_of_a_motion_along_one_axis():
     k, strength, amplitude, direction = 2e6, 3e5, 0.1, np.array([0.6, 0.8])
     u, rate = amplitude * np.sin(2 * np.pi * time), np.cos(2 * np.pi * time)
     force = k * u + strength * np.sign(rate)
-    found = cycles_of(np.outer(u, direction), np.outer(force, direction), direction)
+    found = [loop for *_, loop in loops.Path.of(time, np.outer(u, direction), np.outer(force, direction)).cycles()]
     assert len(found) == 3
     assert found[0].energy_dissipated == pytest.approx(4 * strength * amplitude, rel=1e-2)
     assert found[0].zero_displacement_force == pytest.approx(strength, rel=1e-6)
     sideways = np.outer(u, direction) + np.outer(np.cos(time), [0.01, 0.0])
-    assert cycles_of(sideways, np.outer(force, direction), direction) == ()
+    assert list(loops.Path.of(time, sideways, np.outer(force, direction)).cycles()) == []
 
 
 def test_effects_of_each_bearing_are_selected_and_explained():

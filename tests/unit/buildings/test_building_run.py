@@ -11,10 +11,10 @@ import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
-from msfp_gen.buildings import run
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult, result_of
-from msfp_gen.buildings.run import simulate_building
+from msfp_gen.simulation import run_any
+from msfp_gen.simulation.run_any import simulate_building
 
 EVENTFUL = scene(frame(), duration=0.8)
 
@@ -150,9 +150,9 @@ def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
         compiled = SimpleNamespace(
             rows=(), row_count=0, status=("newton", 1, 0, 0.0), time=0.0, advance=lambda steps: False
         )
-        return SimpleNamespace(scene=made, run=compiled)
+        return SimpleNamespace(scene=made, run=compiled, time=0.0, switch=lambda: False)
 
-    monkeypatch.setattr(run, "start_run", failed)
+    monkeypatch.setattr(run_any, "start_run", failed)
     with pytest.raises(RunError, match="bearing 1: stopped at t = 0 s") as caught:
         simulate(scene(frame()))
     assert caught.value.result is None

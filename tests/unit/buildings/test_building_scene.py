@@ -62,7 +62,7 @@ def test_shapes_and_repetition():
     assert result.displacement.shape == result.acceleration.shape == (6, count)
     assert result.wrench.shape == (6, 4, 2, 6) and result.dissipated.shape == (6, 4)
     assert result.drift.shape == result.storey_force.shape == (6, 3, 6)
-    assert [each.shape for each in result.normal_force] == 4 * [(6, 4)]
+    assert result.normal_force.shape == result.sliding.shape == (6, 4, 4)
     assert result.node("base").shape == (6, 3, 6) and result.base_reaction.shape == (6, 3)
     assert np.array_equal(result.wrench, again.wrench) and np.array_equal(result.displacement, again.displacement)
 

@@ -11,11 +11,11 @@ from support.buildings import MOTION, PLACES, frame, scene
 from support.films import drawn_twice
 
 from msfp_gen import Building, BuildingScene, InputError, simulate
-from msfp_gen.buildings.data import at_times
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import animate, film
 from msfp_gen.figures.building_movie import Elevation, building_film
 from msfp_gen.figures.frame import MovingFrame
+from msfp_gen.results.resample import at_times
 
 TIMES = np.array([0.1, 0.355, 0.6])
 
@@ -33,7 +33,7 @@ def test_rows_between_rows():
     shown, time = at_times(result(), TIMES), result().time
     assert isinstance(shown, BuildingResult) and np.array_equal(shown.time, TIMES)
     wanted = np.interp(TIMES, time, result().axial_force[:, 2])
-    assert shown.axial_force[:, 2] == pytest.approx(wanted) and shown.sliding[3].shape == (3, 4)
+    assert shown.axial_force[:, 2] == pytest.approx(wanted) and shown.bearings[3].sliding.shape == (3, 4)
     with pytest.raises(InputError, match=r"time = 0\.9 s: the run holds 0 to 0\.8 s"):
         at_times(result(), [0.1, 0.9])
 
@@ -64,8 +64,8 @@ def test_states_of_bearings():
     given = at_times(result(), TIMES)
     wrench = given.wrench.copy()
     wrench[1, 2, 1, 2] = -1e-3 * made().axial_loads[2]
-    sliding = [each.copy() for each in given.sliding]
-    sliding[0][2, 3] = made().bearings[0].bearing.surfaces[3].capacity + 1e-6
+    sliding = given.sliding.copy()
+    sliding[2, 0, 3] = made().bearings[0].bearing.surfaces[3].capacity + 1e-6
     shown = MovingFrame(replace(given, wrench=wrench, sliding=sliding), 1.0)
     assert np.argwhere(shown.lifted).tolist() == [[1, 2]]
     assert np.argwhere(shown.on_rim).tolist() == [[2, 0]]

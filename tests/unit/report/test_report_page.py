@@ -14,11 +14,12 @@ import pytest
 from support import preset_run
 from support.synthetic import loops, opened
 
+from msfp_gen.buildings.explain import explain
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.report import TitleBlock, report_html, write_report
-from msfp_gen.report.content import TERMS, provenance_table, settings_page, summary_numbers, summary_page
+from msfp_gen.report.content import TERMS, provenance_table, summary_numbers, summary_page
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
 from msfp_gen.report.page import FIGURES
 from msfp_gen.result import Result
@@ -141,11 +142,11 @@ def test_every_number_of_the_settings_has_its_unit():
     """But for counts, shares of a sum, and numbers inside a sentence."""
     result = preset_run("fenz-test5")
     plain = {"cycles", "fraction", "scale", "rtol"}
-    for table in settings_page(result):
+    for table in explain(result.scene):
         for row in table.rows:
             if not table.columns and len(row) == 2 and row[0] not in plain:
                 assert not re.fullmatch(r"[-+\d.e, ]*\d", row[1]), row
-    assert ("amplitude", "0.14 m") in {row[:2] for table in settings_page(result) for row in table.rows}
+    assert ("amplitude", "0.14 m") in {row[:2] for table in explain(result.scene) for row in table.rows}
 
 
 def test_page_is_the_same_on_every_machine(page, saved):

@@ -17,7 +17,7 @@ from support.synthetic import loops
 from msfp_gen import InputError, load_scene
 from msfp_gen.cli import main
 from msfp_gen.result import Result
-from msfp_gen.results.export import WRITERS, columns, save
+from msfp_gen.results.files import WRITERS, table_of
 from msfp_gen.scene.file.loader import scene_from_table
 
 FLAT = (".csv", ".parquet")
@@ -55,7 +55,7 @@ def test_flat_files_hold_every_quantity_to_the_last_digit(result, suffix, tmp_pa
     for name, values in expected.items():
         np.testing.assert_array_equal(found[name], values)
     along_time = [v for v in result.dataset.data_vars.values() if v.dims[0] == "time"]
-    assert len(found) == 1 + sum(v.size // len(rows.time) for v in along_time) == len(columns(result.dataset))
+    assert len(found) == 1 + sum(v.size // len(rows.time) for v in along_time) == len(table_of(result.dataset))
 
 
 def test_csv_says_where_it_came_from_and_holds_a_scene_that_runs(result, tmp_path):
@@ -107,7 +107,7 @@ def test_matlab_names_are_valid_and_not_cut(result, tmp_path):
 def test_every_format_of_a_result_without_events(tmp_path, result):
     quiet = dataclasses.replace(result, events=())
     for suffix in WRITERS:
-        assert save(quiet, tmp_path / f"run{suffix}").stat().st_size > 1000
+        assert quiet.save(tmp_path / f"run{suffix}").stat().st_size > 1000
     assert Result.from_netcdf(tmp_path / "run.nc").events == ()
     assert loadmat(tmp_path / "run.mat")["event_time"].size == 0
 

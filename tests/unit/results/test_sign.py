@@ -10,7 +10,7 @@ from support import preset_run
 
 from msfp_gen import InputError, figures
 from msfp_gen.cli import main
-from msfp_gen.results.export import export_columns
+from msfp_gen.results.files import export_columns
 from msfp_gen.results.sign import SIGNS, shown_sign
 
 U, NOT_U = "u₁ = base − top [mm]", "u₁ = top − base [mm]"

@@ -7,24 +7,23 @@ from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
-from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.buildings.compiled_run import BuildingRun, start_run
+from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
-from msfp_gen.version import __version__
+from msfp_gen.simulation.outcome import provenance_of, stopped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from msfp_gen.buildings.compiled_run import BuildingRun
     from msfp_gen.result import Result
     from msfp_gen.scene.scene import Scene
 
+STEPS_PER_CALL = 20  # of a building, between two looks at interrupts, progress and checkpoints
 _OF_BUILDINGS = ("progress", "checkpoint", "every", "resume", "threads")
 
 
@@ -67,23 +66,10 @@ def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingR
     for name, value in options.items():
         if name not in _OF_BUILDINGS and value not in (False, None, ()):
             raise InputError(f"{name}: the run of a building has no such option; leave it out")
-    return _timed(scene, {name: options[name] for name in _OF_BUILDINGS if name in options})
+    return simulate_building(scene, **{name: options[name] for name in _OF_BUILDINGS if name in options})
 
 
-def _timed(scene: BuildingScene, options: dict[str, Any]) -> BuildingResult:
-    """The run of a building, whose result states how it ended, with what and how long it took."""
-    begin, about = monotonic(), {"msfp_gen": __version__, "numpy": np.__version__}
-    try:
-        return replace(_simulate_building(scene, **options), provenance=about, wall_time=monotonic() - begin)
-    except RunError as error:
-        result = error.result
-        if isinstance(result, BuildingResult):
-            ended = {"status": error.status, "message": str(error), "wall_time": monotonic() - begin}
-            result = replace(result, provenance=about, **ended)  # type: ignore[arg-type]
-        raise RunError(str(error), status=error.status, result=result) from None
-
-
-def _simulate_building(
+def simulate_building(
     scene: BuildingScene,
     progress: bearings.Progress | None = None,
     checkpoint: str | Path | None = None,
@@ -91,20 +77,57 @@ def _simulate_building(
     resume: bool = False,
     threads: int | None = None,
 ) -> BuildingResult:
-    from msfp_gen.buildings.run import simulate_building
+    """The motion of a building and its bearings from rest.
 
-    if checkpoint is None:
-        if resume:
-            raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
-        return simulate_building(scene, progress, threads=threads)
-    path = checkpoint
-    if not resume:
-        require_no_checkpoint(path)
+    progress: called with the time reached and the end [s]. checkpoint, every, resume: as of `simulate`. threads: as in
+    `start_run`. Raises InputError; RunError that names the bearing: it cannot follow, or a step has no solution; its
+    `result` has the rows until then, as after an interrupt; None before the first row.
+    """
+    begin = monotonic()
+    if checkpoint is None and resume:
+        raise InputError("resume: needs the checkpoint to resume from; give checkpoint")
+    if checkpoint is not None and not resume:
+        require_no_checkpoint(checkpoint)
+    run = start_run(scene, threads)
+    keeper = None if checkpoint is None else Checkpoint(checkpoint, identity(run), every, resume)
+    if keeper is not None:
+        keeper.restore(run)
+    interrupted = _advance(run, progress, keeper)
+    status, message = run.run.status[0], ""
+    if keeper is not None and status == "ok":  # a run that failed fails again from the last checkpoint
+        keeper.save(run)
+    if status == "ok" and interrupted:
+        status = "interrupted"
+    if status != "ok":
+        message = failure(run, status)
+    result = None
+    if status == "ok" or run.run.row_count:
+        about = provenance_of(scene.solver, ", ".join(spec.key for spec in scene.specs))
+        ended = {"status": status, "message": message, "wall_time": monotonic() - begin}
+        result = replace(result_of(run), provenance=about, **ended)  # type: ignore[arg-type]
+    if result is None or message:
+        raise RunError(message, status=status, result=result)
+    return result
 
-    def keep(run: BuildingRun) -> Checkpoint:
-        return Checkpoint(path, identity(run), every, resume)
 
-    return simulate_building(scene, progress, keep, threads)
+def _advance(run: BuildingRun, progress: bearings.Progress | None, keeper: Checkpoint | None) -> bool:
+    """Take all steps; True after Ctrl-C."""
+    try:
+        while run.run.advance(STEPS_PER_CALL) or run.switch():
+            if keeper is not None:
+                keeper.save_if_due(run)
+            if progress is not None:
+                progress(run.time, run.scene.end)
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+def failure(run: BuildingRun, status: str) -> str:
+    """One line with bearing, time, surface, cause and remedy."""
+    _, bearing, surface, value = run.run.status
+    who = run.scene.label(bearing - 1) if bearing else "building"
+    return f"{who}: {stopped(run.time, run.scene.end, status, surface, value)}"
 
 
 def identity(run: BuildingRun) -> Identity:

@@ -1,0 +1,472 @@
+"""`ResultFiles`: the files of a result, of one bearing or of a building: netCDF-4, which is read again, and tables.
+
+A file may be damaged, or made by another person. It is data: its scene names no file, its motion lies in it. Every file
+that is not as expected is refused with one InputError.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import asdict
+from functools import cached_property
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.common.output import DATASET_SUFFIXES, check_output, replacing, write_bytes
+from msfp_gen.errors import InputError
+from msfp_gen.results.note import Note
+from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
+from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from msfp_gen.motions.motion import Motion
+
+COUNTER, PROVENANCE = "counter_", "provenance_"  # prefixes of the attributes with counters and provenance
+DIGEST = "digest"  # attribute: of all values that are read
+EDITION = "edition"  # attribute: of the names in a file; that of another version of msfp-gen differs if these do
+WORDS = ("scene", "motion", "status", "message", "notes")  # attributes that are texts
+KINDS = {  # of results, by the attribute `source`: what they are of, and how they are read
+    "msfp-gen": "one bearing; read it with Result.from_netcdf",
+    "msfp-gen building": "a building; read it with BuildingResult.from_netcdf",
+    "msfp-gen bearing": "one bearing of a building; read the file of the building, which has it in its bearings",
+}
+# What h5py, json, tomllib and NumPy raise for content that they cannot read.
+DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
+REMEDY = "give a file that `run -o` wrote"
+Arrays = dict[str, Any]
+F = TypeVar("F", bound="ResultFiles")
+
+
+class Storage(Protocol):
+    """A module that makes the dataset of one kind of result, and reads its files."""
+
+    DERIVED: dict[str, Any]  # variables of the dataset that follow from the others: they are written but not read
+
+    def to_dataset(self, result: Any) -> xr.Dataset:
+        """The dataset of a result."""
+
+    def groups_of(self, result: Any) -> dict[str, xr.Dataset]:
+        """The groups of the netCDF-4 file beside the dataset, by name."""
+
+    def edition(self) -> str:
+        """A digest of the names that a file of this version has."""
+
+    def fields_in(self, root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
+        """The fields of the result from a file, except status, message and provenance.
+
+        about: attributes of the file; arrays: takes the arrays that were read, by their paths in the file. Raises
+        InputError, or what `DAMAGE` lists.
+        """
+
+
+class ResultFiles(ABC):
+    """The files of a result, and the identity of its scene.
+
+    source: the attribute of a file by which its kind of result is known.
+    """
+
+    source: ClassVar[str]
+
+    @classmethod
+    @abstractmethod
+    def storage(cls) -> Storage:
+        """What makes the dataset of its kind of result, and reads its files."""
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Rows, and events, as an xarray.Dataset, with units, meanings and signs in attributes; built at first use."""
+        return self.storage().to_dataset(self)
+
+    def derived_and_groups(self) -> tuple[Collection[str], dict[str, xr.Dataset]]:
+        """Variables of the dataset that follow from the others, and the groups of the netCDF-4 file beside it."""
+        return self.storage().DERIVED, self.storage().groups_of(self)
+
+    if TYPE_CHECKING:  # fields of the subclasses, or properties
+
+        @property
+        def scene(self) -> Any:
+            """The scene that was run."""
+
+        @property
+        def status(self) -> str:
+            """How the run ended."""
+
+    @property
+    def title(self) -> str:
+        """What the result is of, for the head of a table."""
+        return self.scene.name or "unnamed scene"
+
+    @property
+    def identity(self) -> str:
+        """The sha256 of the scene, motions and matrices included, as in checkpoints; provenance names the versions."""
+        return fingerprint(self.scene)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the run reached its end or its stop condition."""
+        return self.status in ("ok", "stopped")
+
+    def to_netcdf(self, path: str | Path) -> Path:
+        """Write the dataset and the scene as netCDF-4 file, completely or not at all; a failed run with its status.
+
+        Derivatives with respect to parameters are in its group `gradient`.
+
+        Raises InputError where the suffix is not .nc or the folder does not exist.
+        """
+        path = check_output(path, DATASET_SUFFIXES)
+        derived, groups = self.derived_and_groups()
+        value = digest_of_dataset(self.dataset.drop_vars(derived, errors="ignore"), groups)
+        write_groups(path, self.dataset.assign_attrs({DIGEST: value}), groups)
+        return path
+
+    def to_csv(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+        """Write a CSV file: one comment, `name [unit]` as header, one line per row; then the origin as # comments.
+
+        The origin is the attributes of the dataset, the events, and the scene as TOML text. columns, sign: as of
+        `export_columns`. Raises InputError where the suffix is not .csv or the folder does not exist.
+        """
+        target = check_output(path, (".csv",))
+        dataset = signed(self.dataset, sign)
+        table = selected_columns(table_of(dataset), columns)
+        rows = np.column_stack([column.values for column in table]).tolist()
+        title = " ".join(f"{self.title}, status {self.status}".split())
+        about = "versions, events and scene stand after them"
+        with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(f"# {title}; {_sign_text(sign)}; {len(rows)} rows; {about}\n")
+            file.write(",".join(f"{column.name} [{column.unit}]" for column in table) + "\n")
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+            file.writelines(f"# {line}\n" for line in _origin(dataset))
+        return target
+
+    def to_parquet(self, path: str | Path, columns: Sequence[str] | None = None, sign: str = DEFAULT) -> Path:
+        """Write a Parquet file: units and meanings as metadata of columns, the rest as that of the file.
+
+        columns, sign: as of `export_columns`. Raises InputError as `to_csv` does.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        target = check_output(path, (".parquet",))
+        dataset = signed(self.dataset, sign)
+        table = selected_columns(table_of(dataset), columns)
+        about = {str(key): str(value) for key, value in dataset.attrs.items()}
+        about |= {"sign": _sign_text(sign), "events": json.dumps(_events(dataset))}
+        fields = [pa.field(c.name, pa.float64(), metadata={"units": c.unit, "long_name": c.meaning}) for c in table]
+        content = BytesIO()
+        arrays = [np.ascontiguousarray(c.values) for c in table]
+        pq.write_table(pa.table(arrays, schema=pa.schema(fields, metadata=about)), content)
+        write_bytes(target, [content.getbuffer()])
+        return target
+
+    def to_mat(self, path: str | Path) -> Path:
+        """Write a MATLAB 5 file: every variable of the dataset by name, and structs `units`, `meaning`, `attributes`.
+
+        Raises InputError as `to_csv` does.
+        """
+        from scipy.io import savemat
+
+        target, dataset = check_output(path, (".mat",)), self.dataset
+        # One-dimensional arrays become column vectors, as usual in MATLAB, and texts become cells.
+        content: dict[str, Any] = {str(name): _matlab(values.to_numpy()) for name, values in dataset.variables.items()}
+        for key, attribute in (("units", "units"), ("meaning", "long_name")):
+            content[key] = {str(n): v.attrs[attribute] for n, v in dataset.variables.items() if attribute in v.attrs}
+        content["attributes"] = {str(key): value for key, value in dataset.attrs.items()}
+        stream = BytesIO()
+        savemat(stream, content, oned_as="column", long_field_names=True, do_compression=True)
+        write_bytes(target, [stream.getbuffer()])
+        return target
+
+    def save(self, path: str | Path) -> Path:
+        """Write the format of the suffix: .nc, .parquet, .csv or .mat. Raises InputError as the other writers do."""
+        target = check_result_path(path)
+        return WRITERS[target.suffix.lower()](self, target)
+
+    @classmethod
+    def from_netcdf(cls, path: str | Path) -> Self:
+        """The result in a file that `to_netcdf` wrote, its scene included. Raises InputError for any other file."""
+        return read_result(path, cls)
+
+
+TABLE_WRITERS: dict[str, Callable[[Any, str | Path, Sequence[str] | None, str], Path]] = {
+    ".csv": ResultFiles.to_csv,
+    ".parquet": ResultFiles.to_parquet,
+}
+WRITERS: dict[str, Callable[[Any, str | Path], Path]] = {
+    ".nc": ResultFiles.to_netcdf,
+    ".parquet": ResultFiles.to_parquet,
+    ".csv": ResultFiles.to_csv,
+    ".mat": ResultFiles.to_mat,
+}
+
+
+def check_result_path(path: str | Path, name: str = "output") -> Path:
+    """`path` if a result can be written there; raises InputError otherwise.
+
+    name: that of the option, for the message.
+    """
+    return check_output(path, WRITERS, name)
+
+
+def export_columns(
+    result: ResultFiles, path: str | Path, names: Sequence[str] | None = None, sign: str = DEFAULT
+) -> Path:
+    """Write some columns of `result` as CSV or Parquet, by the suffix; time is always the first.
+
+    names: of columns (`displacement_E1`) or of variables of the dataset, for all of their columns (`sliding`), in the
+    order in which they are written; None: all. sign: of displacement and force across the bearing, a word of
+    `sign.SIGNS`. Raises InputError for another name, another sign or an invalid path.
+    """
+    target = check_output(path, TABLE_WRITERS, "output")
+    return TABLE_WRITERS[target.suffix.lower()](result, target, names, sign)
+
+
+class Column(NamedTuple):
+    """One column of the table of a run: variable of the dataset, name, unit, meaning, and values, shape (T,)."""
+
+    variable: str
+    name: str
+    unit: str
+    meaning: str
+    values: Array
+
+
+def table_of(dataset: xr.Dataset) -> list[Column]:
+    """Every variable along time as columns, one for each component: `displacement_E1`, `sliding_2`, `tilt_3_psi`.
+
+    Blanks in labels are underscores. Surfaces that a bearing of a building does not have are left out.
+    """
+    columns = [_column(dataset["time"], "time", dataset["time"].to_numpy())]
+    for name, variable in dataset.data_vars.items():
+        if variable.dims[:1] == ("time",):
+            values = variable.to_numpy()
+            for index in np.ndindex(values.shape[1:]):
+                labels = [str(dataset[dim].values[i]) for dim, i in zip(variable.dims[1:], index, strict=True)]
+                column = values[(slice(None), *index)]
+                if not (column.size and np.isnan(column[0])):
+                    columns.append(_column(variable, "_".join([str(name), *labels]).replace(" ", "_"), column))
+    return columns
+
+
+def selected_columns(table: list[Column], names: Sequence[str] | None) -> list[Column]:
+    """The columns with these names, or of these variables, after time; all for None. Raises InputError."""
+    if names is None:
+        return table
+    chosen = [table[0]]
+    for name in names:
+        columns = [column for column in table if name in (column.name, column.variable)]
+        if not columns:
+            known = ", ".join(dict.fromkeys(column.variable for column in table))
+            raise InputError(
+                f"columns: {name!r} is none; give names of columns, such as displacement_E1, or of {known}"
+            )
+        chosen += [column for column in columns if column not in chosen]
+    return chosen
+
+
+def _column(variable: xr.DataArray, name: str, values: Array) -> Column:
+    return Column(str(variable.name), name, str(variable.attrs["units"]), str(variable.attrs["long_name"]), values)
+
+
+def _sign_text(word: str) -> str:
+    sign = sign_of(word)
+    return f"u = {sign.difference.replace('−', '-')}, F {sign.force}"
+
+
+def _origin(dataset: xr.Dataset) -> list[str]:
+    """Attributes of the dataset, events, and the scene as TOML text, as lines."""
+    attributes = dict(dataset.attrs)
+    scene = str(attributes.pop("scene")).splitlines()
+    about = [f"{key}: {' '.join(str(value).split())}" for key, value in attributes.items()]
+    return [*about, *(f"event: {json.dumps(event)}" for event in _events(dataset)), "scene:", *scene]
+
+
+def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """The events of a run as plain data; none of the run of a building."""
+    columns = {str(name): values for name, values in dataset.data_vars.items() if values.dims[:1] == ("event",)}
+    rows = zip(*(values.to_numpy().tolist() for values in columns.values()), strict=True)
+    names = [name.removeprefix("event_") for name in columns]
+    return [dict(zip(names, row, strict=True)) for row in rows]
+
+
+def signed(dataset: xr.Dataset, word: str) -> xr.Dataset:
+    """A dataset with displacement and force across the bearing in another sign, a word of `sign.SIGNS`.
+
+    Raises InputError for another word, and for the dataset of a building.
+    """
+    factor = sign_of(word).factor
+    if factor == 1.0:
+        return dataset
+    if "displacement" not in dataset:
+        raise InputError(f"sign = {word!r}: columns of a building have one sign, base - top; leave it out")
+    changed = [name for base in VARIABLES for name in (base, f"event_{base}") if name in dataset]
+    return dataset.assign({name: dataset[name].copy(data=factor * dataset[name] + 0.0) for name in changed})  # no -0.0
+
+
+def _matlab(values: Any) -> Any:
+    return values.astype(object) if values.dtype.kind == "U" else values
+
+
+def attributes_of(
+    result: Any, edition: str, scene: str, notes: Sequence[Note], counters: Mapping[str, float]
+) -> dict[str, str | int | float]:
+    """The attributes of every dataset: name, kind, how the run ended, notes, scene as TOML text, counters, versions."""
+    return {
+        "title": result.scene.name or "unnamed",
+        "source": result.source,
+        EDITION: edition,
+        "status": result.status,
+        "message": result.message,
+        "notes": json.dumps([asdict(note) for note in notes]),
+        "scene": scene,
+        **{COUNTER + name: value for name, value in counters.items()},
+        **{PROVENANCE + name: value for name, value in result.provenance.items()},
+    }
+
+
+def write_groups(path: Path, dataset: xr.Dataset, groups: Mapping[str, xr.Dataset]) -> None:
+    """Write a dataset, and others as groups, as one sealed netCDF-4 file, completely or not at all."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    # The file is made in memory, because HDF5 crashes instead of raising an error when the disk is full.
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=_encoding(dataset))
+        for name, group in groups.items():
+            group.dump_to_store(H5NetCDFStore(file, group=name), encoding=_encoding(group))
+    write_bytes(path, [content.getbuffer(), seal(sha256(content.getbuffer()))])
+
+
+def _encoding(dataset: xr.Dataset) -> dict[Hashable, dict[str, Any]]:
+    """Compression of rows and of the pieces of a motion.
+
+    The lowest compression level suffices: histories of stuck surfaces and of rims repeat most values.
+    """
+    from msfp_gen.scene.file.stored_motion import COMPRESSED
+
+    rows = {name for name, values in dataset.data_vars.items() if "time" in values.dims and values.size}
+    encoding: dict[Hashable, dict[str, Any]] = {name: {"zlib": True, "complevel": 1} for name in rows}
+    return encoding | {name: options for name, options in COMPRESSED.items() if name in dataset}
+
+
+def digest_of_dataset(
+    dataset: xr.Dataset, groups: Mapping[str, xr.Dataset], rows: Mapping[str, ArrayDigest] | None = None
+) -> str:
+    """The digest of the values that `read_result` reads, also in groups of the file by name.
+
+    rows: of what was written in blocks, instead of `dataset`.
+    """
+    arrays: Arrays = {str(name): variable.to_numpy() for name, variable in dataset.data_vars.items()}
+    arrays["time"] = dataset["time"].to_numpy()
+    about = dict(dataset.attrs)
+    arrays |= rows or {}
+    for name, group in groups.items():
+        arrays |= {f"{name}/{key}": variable.to_numpy() for key, variable in group.data_vars.items()}
+        about |= {f"{name}/{key}": value for key, value in group.attrs.items()}
+    return digest_of(about, arrays)
+
+
+def digest_of(attributes: Mapping[str, Attribute], arrays: Arrays) -> str:
+    """The digest of a file with these attributes and arrays; those that are not read do not matter.
+
+    arrays: ndarrays, or the `ArrayDigest` of those that came in blocks.
+    """
+    read = {name: value for name, value in attributes.items() if _is_read(name)}
+    known = {name: v if isinstance(v, ArrayDigest) else ArrayDigest.of(v) for name, v in arrays.items()}
+    return digest(read, known)
+
+
+def _is_read(name: str) -> bool:
+    return name in (*WORDS, "extremes") or name.startswith((COUNTER, PROVENANCE, "motion", "gradient/"))
+
+
+def read_result(path: str | Path, *kinds: type[F]) -> F:
+    """The result in a file of `to_netcdf`, as an instance of that one of `kinds`. Raises InputError for other files."""
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise InputError("no such file; give the name of a result")
+        with stored_groups(path) as root:
+            return _result_in(root, kinds)
+    except InputError as error:
+        raise InputError(f"path = {str(path)!r}: {error}") from None
+    except DAMAGE as error:
+        raise InputError(f"path = {str(path)!r}: no netCDF-4 file that can be read ({error}); {REMEDY}") from error
+    except MemoryError:
+        raise InputError(f"path = {str(path)!r}: this result does not fit into memory; free some") from None
+
+
+def _result_in(root: StoredGroup, kinds: Sequence[type[F]]) -> F:
+    about = root.attributes(lambda name: name in ("source", DIGEST, EDITION) or _is_read(name))
+    source, edition = about.pop("source", None), about.pop(EDITION, None)
+    kind = next((kind for kind in kinds if kind.source == source), None)
+    if kind is None:
+        what = f"this is the result of {KINDS[str(source)]}" if source in KINDS else f"no result of msfp-gen; {REMEDY}"
+        raise InputError(what)
+    try:
+        return _read(root, about, kind)
+    except (InputError, *DAMAGE) as error:
+        if edition != kind.storage().edition():
+            raise InputError(
+                "another version of msfp-gen wrote this result, which this one cannot read; run its scene again "
+                "(attribute scene)"
+            ) from error
+        raise
+
+
+def _read(root: StoredGroup, about: dict[str, Attribute], kind: type[F]) -> F:
+    if not all(isinstance(about.get(name), str) for name in WORDS):
+        raise ValueError(f"an attribute of {', '.join(WORDS)} is no text")
+    written, arrays = about.pop(DIGEST, None), dict[str, Any]()
+    fields = kind.storage().fields_in(root, about, arrays)
+    if not str(about["status"]).isidentifier():
+        raise ValueError(f"status = {about['status']!r} is no word")
+    if written is not None and written != digest_of(about, arrays):  # another program may have left it out
+        raise InputError("a value was changed after this file was written; run the scene again")
+    for name, value in without(COUNTER, about).items():
+        if not isinstance(value, float if name == "wall_time" else int) or not 0 <= value < math.inf:
+            raise ValueError(f"attribute {COUNTER}{name} is no count")
+    fields |= {name: str(about[name]) for name in ("status", "message")}
+    fields["provenance"] = {name: str(value) for name, value in without(PROVENANCE, about).items()}
+    return kind(**fields)
+
+
+def without(prefix: str, attributes: Mapping[str, Attribute]) -> dict[str, Attribute]:
+    """The attributes with a prefix, by their names without it."""
+    return {name.removeprefix(prefix): value for name, value in attributes.items() if name.startswith(prefix)}
+
+
+def notes_in(about: Mapping[str, Attribute]) -> tuple[Note, ...]:
+    """The notes of a file; the numbers in them are finite. Raises ValueError."""
+    notes = tuple(Note(**table) for table in json.loads(str(about["notes"])))
+    for note in notes:
+        texts, numbers = (note.kind, note.text, note.action), (note.time, note.value)
+        valid = all(isinstance(text, str) for text in texts) and type(note.surface) is type(note.bearing) is int
+        if not valid or not all(type(x) in (int, float) and math.isfinite(x) for x in numbers):
+            raise ValueError("a note is damaged")
+    return notes
+
+
+def motion_in(root: StoredGroup, name: str = "motion") -> tuple[Motion, Arrays, dict[str, Attribute]]:
+    """The motion that a group of a file has as polynomials, its arrays and attributes by their paths in the file."""
+    from msfp_gen.scene.file.stored_motion import from_pieces
+
+    group = root.group(name)
+    count = group.length("knots")
+    shapes = {"knots": (count,), "coefficients": (max(0, count - 1), 6, 6), "jumps": (group.length("jumps"),)}
+    pieces = {key: group.array(key, shape, compressed=key != "knots") for key, shape in shapes.items()}
+    about = group.attributes(lambda key: key in ("name", "metadata", "max_step"))
+    motion = from_pieces(pieces, about)
+    arrays, named = ({f"{name}/{key}": value for key, value in values.items()} for values in (pieces, about))
+    return motion, arrays, named
