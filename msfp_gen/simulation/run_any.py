@@ -12,6 +12,7 @@ from msfp_gen.buildings.result import BuildingResult, result_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
 from msfp_gen.simulation.outcome import provenance_of, stopped
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msfp_gen.result import Result
-    from msfp_gen.scene.scene import Scene
 
 STEPS_PER_CALL = 20  # of a building, between two looks at interrupts, progress and checkpoints
 _OF_BUILDINGS = ("progress", "checkpoint", "every", "resume", "threads")
@@ -62,6 +62,8 @@ def simulate(scene: Scene | BuildingScene, *, progress: bearings.Progress | None
 def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingResult:
     """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
     if not isinstance(scene, BuildingScene):
+        if not isinstance(scene, Scene):
+            raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")
         return bearings.simulate(scene, **options)
     for name, value in options.items():
         if name not in _OF_BUILDINGS and value not in (False, None, ()):
