@@ -20,7 +20,7 @@ TRIPLE, QUINTUPLE = BY_TITLE["triple"], BY_TITLE["quintuple"]
 
 @pytest.mark.parametrize(
     "device",
-    thinned(devices.DEVICES, lambda device: device.scene != "double-articulated-push"),
+    thinned(devices.DEVICES, lambda device: device.scene not in ("double-articulated-push", "quintuple-push")),
     ids=lambda device: device.scene,
 )
 def test_run_is_within_one_per_cent_of_friction_circles(device):

@@ -214,6 +214,7 @@ def test_numbers_under_the_cursor_are_those_of_the_file(browser, saved):
         assert [float(x) for x in force] == pytest.approx(at["top_force"].values * 1e-3, abs=0.006)
 
 
+@pytest.mark.slow
 def test_summary_shows_what_its_cells_hold(browser, saved):
     cell = browser.find_element("css selector", "[data-key='peak_displacement.radial']")
     peak = Result.from_netcdf(saved).summary["peak_displacement"]["radial"]
@@ -221,6 +222,7 @@ def test_summary_shows_what_its_cells_hold(browser, saved):
     assert cell.text == f"{peak * 1e3:.5g} mm"
 
 
+@pytest.mark.slow
 def test_keys_move_the_cursor_and_say_the_time(browser):
     from selenium.webdriver.common.keys import Keys
 
@@ -233,6 +235,7 @@ def test_keys_move_the_cursor_and_say_the_time(browser):
     assert js(browser, "return current === frameCount - 1")
 
 
+@pytest.mark.slow
 def test_a_click_on_a_chart_goes_to_that_time(browser):
     from selenium.webdriver.common.action_chains import ActionChains
 
@@ -245,6 +248,7 @@ def test_a_click_on_a_chart_goes_to_that_time(browser):
     assert 0.4 < share < 0.5  # the middle of the picture, whose margin on the left is wider
 
 
+@pytest.mark.slow
 def test_play_runs_to_the_end_and_stops(browser):
     from selenium.webdriver.support.ui import Select, WebDriverWait
 
@@ -258,6 +262,7 @@ def test_play_runs_to_the_end_and_stops(browser):
     assert button.text == "Play" and complaints(browser) == []
 
 
+@pytest.mark.slow
 def test_it_prints(browser):
     import base64
 
@@ -265,6 +270,7 @@ def test_it_prints(browser):
     assert pdf.startswith(b"%PDF") and len(pdf) > 100_000
 
 
+@pytest.mark.slow
 def test_without_webgl_it_says_so_and_draws_from_the_side(start, page):
     plain = start("--disable-3d-apis")
     plain.get(page.as_uri())

@@ -387,6 +387,7 @@ def test_a_signal_leaves_a_valid_part_that_says_so(name: str, tmp_path: Path, un
         assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
 
 
+@pytest.mark.slow
 def test_kill_at_any_moment_loses_no_checkpoint(tmp_path: Path, uninterrupted: Result) -> None:
     """SIGKILL, again and again, mostly in the middle of writing: with chunks this short that is all the run does."""
     dice, path = random.Random(3), tmp_path / "run.ck"

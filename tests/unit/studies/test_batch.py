@@ -231,7 +231,7 @@ def test_ctrl_c_ends_a_batch(processes: bool, tmp_path: Any) -> None:
     ) as run:
         try:
             assert run.stdout is not None and run.stdout.readline() == "ready\n"
-            time.sleep(3.0)
+            time.sleep(1.5)
             begin = time.perf_counter()
             os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to every process of the group
             _, errors = run.communicate(timeout=60)

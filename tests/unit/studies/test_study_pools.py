@@ -139,6 +139,7 @@ def test_rows_of_dask_are_those_of_threads(cluster: Any, whole: pd.DataFrame, tm
     pd.testing.assert_frame_equal(rows_of(tmp_path), whole)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_nothing_but_time(cluster: Any, whole: pd.DataFrame, tmp_path: Path) -> None:
     """Its chunks go to the other worker, and its nanny starts it again."""
     victim = next(iter(cluster.workers.values())).pid

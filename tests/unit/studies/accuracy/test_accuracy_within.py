@@ -40,7 +40,7 @@ def truth(scene, rtol):
 
 
 @pytest.mark.parametrize("name", ["fenz-test2", "becker-circle-50", "double-push", "single-push"])
-@pytest.mark.parametrize("target", [5e-3, 5e-4])
+@pytest.mark.parametrize("target", [5e-3, pytest.param(5e-4, marks=pytest.mark.slow)])
 def test_the_estimate_is_the_error(name, target):
     """Within a factor of two below and five above, and the target is met."""
     scene = load_scene(name)
@@ -152,7 +152,7 @@ def test_slow_ringing_of_stuck_sliders_is_in_the_estimate(mass, amplitude, frequ
     assert largest_error(errors(run_native("implicit", scene, 1e-3, 60.0, repeats=0), exact)) > 0.05
 
 
-@pytest.mark.parametrize("load", ["alone", "summed"])
+@pytest.mark.parametrize("load", [pytest.param("alone", marks=pytest.mark.slow), "summed"])
 def test_a_short_pulse_is_in_the_estimate(load):
     pulse = Load.from_arrays([0, 5, 5.005, 5.01, 10], np.outer([0, 0, 1, 0, 0], [10e3, 0.0, 0.0]))
     sway = Load.harmonic((0.0, 0.0, 40e3), frequency=0.2, cycles=1)
