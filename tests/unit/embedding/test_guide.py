@@ -1,36 +1,14 @@
-"""A folder that `msfp-gen generate -o` writes explains itself: its README names every file, value and status."""
+"""README.md of a folder that `msfp-gen generate -o` writes; test_generate_import.py reads that of a whole folder."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
-from msfp_gen import Effects, InputError, Layout, cli
+from msfp_gen import Effects, InputError, Layout
 from msfp_gen.embedding import README, write_guide
-from msfp_gen.specification import contract, rows
 from msfp_gen.specification.layout import ModelSpec
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    target = tmp_path_factory.mktemp("guide") / "model"
-    assert cli.main(["generate", "5", "2", "2", "-o", str(target)]) == 0
-    return target
-
-
-def test_readme_names_every_file_value_and_status(folder: Path) -> None:
-    text = (folder / README).read_text(encoding="utf-8")
-    named = set(re.findall(r"`([\w.]+)`", text))
-    files = {path.name for path in folder.iterdir()} - {README}
-    assert {name for name in files if not name.endswith((".so", ".pyd"))} <= named
-    assert {name for name in named if name.endswith((".c", ".h", ".pyx"))} <= files
-    spec = ModelSpec(Layout.tfp(), Effects())
-    for entries in (contract.BODY, contract.SURFACE, contract.TOP, rows.row(spec.effects), contract.EVENT_KINDS):
-        for entry in entries:
-            assert entry.meaning in text, entry.name
-    assert {status.name for status in contract.STATUSES if status.compiled} <= named
 
 
 @pytest.mark.parametrize(

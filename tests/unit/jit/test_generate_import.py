@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -14,10 +15,11 @@ import pytest
 from support import ROOT, Array
 
 from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
+from msfp_gen.embedding import README
 from msfp_gen.jit.compiler import FLAGS, find_compiler
 from msfp_gen.jit.processor import x86_64_level
 from msfp_gen.motions.piecewise import hermite5
-from msfp_gen.specification import contract
+from msfp_gen.specification import contract, rows
 
 LOAD = 112e3
 REPORT = Effects(bouc_wen="report")  # that of main.c
@@ -97,6 +99,18 @@ def test_folder_holds_sources_with_their_log_and_no_part_files(folder: Path) -> 
         "manifest.json",
     } <= names
     assert not [name for name in names if name.startswith(".") or name.endswith(".o")]
+
+
+def test_readme_names_every_file_value_and_status(folder: Path) -> None:
+    text = (folder / README).read_text(encoding="utf-8")
+    named = set(re.findall(r"`([\w.]+)`", text))
+    files = {path.name for path in folder.iterdir()} - {README}
+    assert {name for name in files if not name.endswith((".so", ".pyd"))} <= named
+    assert {name for name in named if name.endswith((".c", ".h", ".pyx"))} <= files
+    for entries in (contract.BODY, contract.SURFACE, contract.TOP, rows.row(REPORT), contract.EVENT_KINDS):
+        for entry in entries:
+            assert entry.meaning in text, entry.name
+    assert {status.name for status in contract.STATUSES if status.compiled} <= named
 
 
 def run_program(folder: Path, place: Path, *flags: str) -> str:
