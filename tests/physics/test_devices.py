@@ -33,6 +33,7 @@ def test_run_is_within_one_per_cent_of_friction_circles(device):
     assert np.interp(grid[far], u, ratio(result)[:, 0]) == pytest.approx(exact[far], rel=0.01)
 
 
+@pytest.mark.slow
 def test_quintuple_passes_its_nine_stages_where_friction_circles_say():
     """Slides 4, 3; 2; 5; 1; 6 and then the rims 1, 6, 2, 5, outermost first: stages I to IX of MCEER-15-0007."""
     result = devices.run(QUINTUPLE)

@@ -58,6 +58,7 @@ def test_few_instants_keep_the_peaks():
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to draw the page")
+@pytest.mark.slow
 def test_a_browser_draws_it(tmp_path: Path):
     path = tmp_path / "frame.html"
     path.write_text(page(), encoding="utf-8")

@@ -243,6 +243,7 @@ def test_opensees_agrees_with_the_linearised_bearing():
     assert found.force_rms < 0.05
 
 
+@pytest.mark.slow
 def test_command(capsys):
     words = ["bench", "model-error", "fenz-test2", "--duration", "1", "--tolerances", "1e-2"]
     assert main(words) == 0
