@@ -7,6 +7,8 @@ RUNS   := $(VENV)/.runs
 SITE   := $(VENV)/.site
 ZIG    := $(VENV)/.zig
 PEERS  := $(VENV)/.peers
+# Hundreds of processes of the tests import the same modules: they are compiled once, also where images forbid it.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test slow lint types package wheels processors bounds clang zig fuzz mutants figures docs clean
 
