@@ -13,6 +13,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -29,6 +30,7 @@ from msfp_gen.specification.layout import ModelSpec
 
 Progress = Callable[[str, float], None]
 ENTRY = "msfp_entry.c"
+_INCLUDE = re.compile(r'(?:#include|cdef extern from) "([\w.]+)"')
 GENERATION_SHARE = 0.13  # of the build time, for the progress display; compilation takes the rest
 
 
@@ -172,12 +174,23 @@ void *PyInit_{module}(void) {{ return PyInit_msfp_module(); }}
 def kept_wrapper(files: Mapping[str, str], inputs: Mapping[str, Any]) -> Path:
     """Where the cache keeps the object of a wrapper, `wrapper-<key>.o`.
 
-    files: of the generator; inputs: of the entry that is built. The key covers all that the object is made from.
+    files: of the generator; inputs: of the entry that is built. The key covers all that the object is made from: the
+    wrapper with the headers that it includes, and the tools.
     """
-    texts = {name: text for name, text in files.items() if name.endswith(".pyx") or name == "msfp.h"}
+    wrapper = next(name for name in files if name.endswith(".pyx"))
+    texts = {name: files[name] for name in _included(wrapper, files)}
     tools = {name: inputs[name] for name in ("compiler", "abi")} | {"cython": inputs["tools"]["cython"]}
     key = cache.digest_files({**texts, "": json.dumps([tools, inputs["flags"]["wrapper"]])})
     return cache.cache_root() / f"wrapper-{key[:20]}.o"
+
+
+def _included(name: str, files: Mapping[str, str]) -> set[str]:
+    """The name of a file, and those of the others that it includes."""
+    names = {name}
+    for header in _INCLUDE.findall(files[name]):
+        if header in files:
+            names |= _included(header, files)
+    return names
 
 
 def _info(spec: ModelSpec, manifest: cache.Manifest, folder: Path, key: str, cached: bool, seconds: float) -> BuildInfo:

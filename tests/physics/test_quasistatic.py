@@ -127,7 +127,7 @@ def _flown(Y: float, slip: float) -> float:
 @example([0.0078125, 0.0, -0.171875, -0.75, 0.0], 0.0625)
 @example([0.0493912051877736, 0.0, 0.0, 0.0, 0.0, 0.42130850566702116], 0.03594109265996657)
 def test_histories_with_many_turns(points: list[float], reach: float) -> None:
-    """Of 4,000 random histories the worst is off by 0.6 % at 1e-4, 99 of 100 by less than 0.15 %, and it converges."""
+    """Few histories are off by more than 0.2 % at an ordinary tolerance, such as these; all converge."""
     time = np.linspace(0.0, 2.0 * (len(points) + 1), len(points) + 2)
     path = np.zeros((len(time), 3))
     path[1:-1, 0] = reach * np.array(points)

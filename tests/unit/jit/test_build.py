@@ -194,6 +194,15 @@ def test_the_wrapper_of_all_models_is_compiled_once(models: Path) -> None:
     assert build.load_extension(other.path, "msfp_5_2_2").twice(2.0) == 4.0
 
 
+def test_a_header_of_the_wrapper_decides_which_object_is_used(models: Path) -> None:
+    inputs, files = cache.Entry.of(SPEC).inputs, fake_model.sources()
+    known = build.kept_wrapper(files, inputs)
+    for name, text in files.items():
+        path = build.kept_wrapper({**files, name: text + "\n"}, inputs)
+        assert (path == known) == (name in ("msfp_kernels.c", "msfp_symbols.h")), name
+    assert build.kept_wrapper(files, inputs | {"compiler": ["other"]}) != known
+
+
 # --- failures
 
 
