@@ -112,6 +112,6 @@ def _save(bounds: Bounds, folder: Path) -> list[Path]:
     """Write every run as netCDF, the numbers as CSV and the loops as a figure; returns the paths."""
     from msfp_gen.studies.bounding.output import plot_bounds, write_quantities
 
-    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases]
+    written = [case.result.to_netcdf(folder / f"{case.name}.nc") for case in bounds.cases if case.result is not None]
     plot_bounds(bounds, folder / "bounds.png")
     return [*written, write_quantities(bounds, folder / "bounds.csv"), folder / "bounds.png"]

@@ -84,7 +84,9 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
         make_folder(folder, "--output")
     with Progress(f"{len(chosen)} scenes") as progress, closing(started) as runs:
         for index, result in runs:
-            file = None if folder is None else folder / _file_name(index + 1, len(chosen), result.scene.name)
+            file = None
+            if folder is not None and not isinstance(result, RunError):
+                file = folder / _file_name(index + 1, len(chosen), result.scene.name)
             row = row_of(index + 1, chosen[index], result, file)
             if file is not None:
                 result.save(file)
@@ -92,7 +94,7 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
             if progress is not None:
                 progress(len(rows), len(chosen))
     if folder is not None:
-        note(f"wrote {len(rows)} runs to {folder}")
+        note(f"wrote {sum(bool(row.file) for row in rows)} runs to {folder}")
 
 
 @contextmanager

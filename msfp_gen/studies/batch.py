@@ -80,6 +80,8 @@ def simulate_batch(
     results: dict[int, Any] = {}
     with closing(runs):
         for index, result in runs:
+            if isinstance(result, RunError):
+                raise result
             results[index] = result
             if progress is not None:
                 progress(len(results), len(scenes))
@@ -97,9 +99,10 @@ def completed_runs(
 ) -> Generator[tuple[int, Any], None, None]:
     """Run scenes at the same time; yields (index, result) in the order in which the runs end.
 
-    Arguments, results and RunError are those of `simulate_batch`, but no result is kept, so that the rows of all need
-    not fit into memory. Closing the iterator, or an exception in its consumer (use `contextlib.closing`), ends the
-    other runs. Raises InputError before the first run.
+    Arguments and results are those of `simulate_batch`, but the result of a run that failed before its first row is
+    its RunError, and no result is kept, so that the rows of all need not fit into memory. Closing the iterator, or an
+    exception in its consumer (use `contextlib.closing`), ends the other runs. Raises InputError before the first run,
+    and RunError where a worker process died.
 
     labels: of the scenes in messages; None: their names. progress: of all runs, called in their threads with the share
     that is done, and 1; not with processes.
@@ -125,7 +128,12 @@ def _completed(
     with local_pool(workers, processes) as pool:
         settled = dict(enumerate(scenes))
         tilted = [i for i, scene in settled.items() if isinstance(scene, Scene) and needs_settling(scene)]
-        settled |= pool.results(_settled, ((i, (labels[i], scenes[i])) for i in tilted))
+        for i, outcome in pool.results(_settled, ((i, (labels[i], scenes[i])) for i in tilted)):
+            if isinstance(outcome, RunError):
+                del settled[i]
+                yield i, outcome
+            else:
+                settled[i] = outcome
         build_models(settled.values())
         # Long runs start first, so that all workers end at about the same time.
         order = sorted(settled, key=lambda index: -settled[index].end)
@@ -134,7 +142,7 @@ def _completed(
             for i in order
         )
         for index, result in pool.results(_run, calls):
-            yield index, replace(result, scene=scenes[index])
+            yield index, result if isinstance(result, RunError) else replace(result, scene=scenes[index])
             del result
 
 
@@ -187,13 +195,19 @@ def _located(label: str) -> Iterator[None]:
         raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
 
 
-def _settled(label: str, scene: Scene) -> AnyScene:
-    """A scene of a batch after settling, in a worker."""
-    with _located(label):
-        return settle(scene)
+def _settled(label: str, scene: Scene) -> AnyScene | RunError:
+    """A scene of a batch after settling, in a worker, or why it failed."""
+    try:
+        with _located(label):
+            return settle(scene)
+    except RunError as error:
+        return error
 
 
 def _run(label: str, scene: AnyScene, settled: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
-    """One run of a batch, in a worker."""
-    with _located(label):
-        return run_to_end(scene, settled, strict, proceed or raise_if_stopped, threads)
+    """One run of a batch, in a worker; its RunError if it has no rows."""
+    try:
+        with _located(label):
+            return run_to_end(scene, settled, strict, proceed or raise_if_stopped, threads)
+    except RunError as error:
+        return error

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.buildings.load import AnyScene, with_absolute_paths
 from msfp_gen.common.tables import Table, write_columns
-from msfp_gen.errors import InputError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, of_building, plain_cell, summary_value
@@ -121,8 +121,11 @@ class Row(NamedTuple):
         return {**about, **self.summary}
 
 
-def row_of(number: int, variation: Variation, result: Result | BuildingResult, file: Path | None) -> Row:
-    """The row of a run; the result itself is not kept."""
+def row_of(number: int, variation: Variation, result: Result | BuildingResult | RunError, file: Path | None) -> Row:
+    """The row of a run, or of one that failed before its first row; the result itself is not kept."""
+    if isinstance(result, RunError):
+        summary: Mapping[str, Any] = {"status": result.status, "message": str(result), "name": variation.scene.name}
+        return Row(number, variation.source, variation.varied, summary, "")
     return Row(number, variation.source, variation.varied, result.summary, "" if file is None else file.name)
 
 
@@ -164,13 +167,15 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     if len(scenes) > 1 or not paths:
         leading["scene"] = [_short(Path(row.source).stem) for row in rows]
     varied = {path: [_short(str(row.varied.get(path, ""))) for row in rows] for path in paths}
-    forces = [row.summary["peak_base_shear" if of_building(row.summary) else "peak_top_force"] for row in rows]
     peaks = {
         "status": [str(row.summary["status"]) for row in rows],
-        "u [mm]": [f"{row.summary['peak_displacement']['radial'] * 1e3:.2f}" for row in rows],
-        "F [kN]": [f"{force['radial'] * 1e-3:.2f}" for force in forces],
-        "rims": [str(len(row.summary["rims_met"])) for row in rows],
-        "[ms]": [f"{row.summary['wall_time'] * 1e3:.0f}" for row in rows],
+        "u [mm]": [_number(row, "peak_displacement.radial", 1e3, 2) for row in rows],
+        "F [kN]": [
+            _number(row, f"{'peak_base_shear' if of_building(row.summary) else 'peak_top_force'}.radial", 1e-3, 2)
+            for row in rows
+        ],
+        "rims": [str(len(row.summary.get("rims_met", ()))) for row in rows],
+        "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }
     shown = list(paths)
     while True:
@@ -183,6 +188,12 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     if len(shown) < len(paths):
         title += f"\nnot shown: {', '.join(paths[len(shown) :])}; give --table FILE"
     return Table(title, tuple(table), list(zip(*table.values(), strict=True)))
+
+
+def _number(row: Row, path: str, scale: float, digits: int) -> str:
+    """A value of a summary for the terminal; a run that failed before its first row has none."""
+    value = summary_value(row.summary, path)
+    return "-" if value is None else f"{value * scale:.{digits}f}"
 
 
 def _differs(rows: Sequence[Row], path: str) -> bool:

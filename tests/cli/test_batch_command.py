@@ -19,11 +19,12 @@ from typing import Any
 import pytest
 from support import ROOT, endless, hearing
 
-from msfp_gen import InputError, changed_scene, load_scene, simulate
+from msfp_gen import InputError, RunError, Scene, changed_scene, load_scene, simulate
 from msfp_gen.cli import main
 from msfp_gen.cli.interrupts import signals_as_interrupts
 from msfp_gen.motions import records
 from msfp_gen.result import Result
+from msfp_gen.studies import batch
 from msfp_gen.studies.batch import completed_runs
 from msfp_gen.studies.sweep import row_of, sweep_table, variations, varied_field, write_table
 
@@ -148,6 +149,27 @@ def test_what_failed_is_named_and_kept(tmp_path: Any, capsys: pytest.CaptureFixt
     out, err = capsys.readouterr()
     assert "steps" in out and "error: 1 of 2 runs did not reach their end; the first: fenz-test1" in err
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_run_without_rows_is_a_row_of_the_table(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_to_end = batch.run_to_end
+
+    def second_fails(scene: Scene, *arguments: Any) -> Any:
+        if scene.solver.rtol == 2e-3:
+            raise RunError("stopped at t = 0 s: jammed", status="newton")
+        return run_to_end(scene, *arguments)
+
+    monkeypatch.setattr(batch, "run_to_end", second_fails)
+    words = ["batch", "fenz-test1", "--vary", "solver.rtol=1e-3,2e-3,3e-3", "-o", str(tmp_path / "runs")]
+    assert main([*words, "--table", str(tmp_path / "runs.csv")]) == 1
+    out, err = capsys.readouterr()
+    assert "newton" in out and "error: 1 of 3 runs did not reach their end; the first: fenz-test1, solver.rtol" in err
+    assert len(list((tmp_path / "runs").iterdir())) == 2
+    rows = list(csv.DictReader((tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["status"] for row in rows] == ["ok", "newton", "ok"]
+    assert rows[1]["message"].endswith("jammed") and rows[1]["peak_top_force [N]"] == rows[1]["file"] == ""
 
 
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:

@@ -113,9 +113,10 @@ def _quantity_table(bounds: Bounds) -> Table:
 def plot_bounds(bounds: Bounds, path: str | Path | None = None) -> Figure:
     """Top force [kN] over displacement across the bearing [mm] of all cases, along each axis that moves.
 
-    A run that failed is drawn up to its last row. Raises InputError for a path that cannot be written.
+    A run that failed is drawn up to its last row, one without rows is left out. Raises InputError for a path that
+    cannot be written.
     """
-    drawn = [case for name in LINE_STYLES for case in bounds.cases if case.name == name]
+    drawn = [case for name in LINE_STYLES for case in bounds.cases if case.name == name and case.result is not None]
     axes = sorted({axis for case in drawn for axis in axes_along(_loop(case.result)[0])}) or [0]
     with page(6.4 * len(axes), 5.0, path, "bounds") as figure:
         name = next(case.scene.name for case in bounds.cases if case.name == "nominal") or "unnamed scene"
@@ -149,8 +150,9 @@ def _draw(axes: Axes, bounds: Bounds, cases: list[Case], axis: int) -> None:
     axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left")
 
 
-def _loop(result: Result | BuildingResult) -> tuple[Array, Array]:
-    """Displacement across the bearing and force on its top, or of a building their mean and sum, shapes (k, 3)."""
+def _loop(result: Result | BuildingResult | None) -> tuple[Array, Array]:
+    """Displacement across the bearing [m] and force on its top [N], of a building their mean and sum, shape (k, 3)."""
+    assert result is not None  # cases without rows are not drawn
     if isinstance(result, BuildingResult):
         u = np.mean([each.displacement for each in result.bearings], axis=0)
         return u, np.sum([each.top_force for each in result.bearings], axis=0)

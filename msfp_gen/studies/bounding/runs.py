@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.scene import BuildingScene
-from msfp_gen.errors import InputError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.friction_parameters import proportional, select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.friction_laws import Law, law_of
@@ -115,14 +115,14 @@ class Case:
     Attributes:
         name: "lower", "nominal" or "upper".
         scene: the scene with its properties multiplied.
-        result: the run; of a run that failed its rows until then.
+        result: the run; of a run that failed its rows until then, None if it has none.
         characterisation: None if the run failed.
         failure: message of a failure, else empty.
     """
 
     name: str
     scene: AnyScene
-    result: Result | BuildingResult
+    result: Result | BuildingResult | None
     characterisation: Characterisation | BuildingCharacterisation | None
     failure: str = ""
 
@@ -219,7 +219,7 @@ def bound(scene: AnyScene, table: FactorTable, *, progress: Progress | None = No
 
     Raises:
         InputError: a factor of a surface that the bearing does not have, or a bearing that does not move.
-        RunError: a run failed at its start, so that it has no rows.
+        RunError: no case has rows.
     """
     cases = _cases(scene, table, progress)
     if isinstance(scene, Scene) and (common := _common_effects(scene, cases)) is not None:
@@ -231,7 +231,8 @@ def _common_effects(scene: Scene, cases: Sequence[Case]) -> Auto | None:
     """`Auto` with every effect that the last model of any case has; None where all cases have the same model."""
     if not isinstance(scene.effects, Auto):
         return None
-    models = [set(case.result.provenance["model"].split(", then ")[-1].split("-")) for case in cases]
+    results = [case.result for case in cases if case.result is not None]
+    models = [set(result.provenance["model"].split(", then ")[-1].split("-")) for result in results]
     if all(model == models[0] for model in models):
         return None
     used = set().union(*models)
@@ -243,13 +244,17 @@ def _cases(scene: AnyScene, table: FactorTable, progress: Progress | None) -> li
     scenes = bounded_scenes(scene, table)
     with closing(completed_runs(list(scenes.values()), labels=list(scenes), progress=progress)) as runs:
         results = dict(runs)
-    return [_case(name, results[index]) for index, name in enumerate(scenes)]
+    if all(isinstance(result, RunError) for result in results.values()):
+        raise results[0]
+    return [_case(name, scene, results[index]) for index, (name, scene) in enumerate(scenes.items())]
 
 
-def _case(name: str, result: Any) -> Case:
+def _case(name: str, scene: AnyScene, result: Any) -> Case:
+    if isinstance(result, RunError):
+        return Case(name, scene, None, None, str(result).removeprefix(f"{name}: "))
     if result.status in ENDED:
-        return Case(name, result.scene, result, result.characterise())
-    return Case(name, result.scene, result, None, result.message)
+        return Case(name, scene, result, result.characterise())
+    return Case(name, scene, result, None, result.message)
 
 
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:

@@ -24,6 +24,7 @@ from msfp_gen import (
     InputError,
     Layout,
     Motion,
+    RunError,
     Scene,
     Solver,
     Surface,
@@ -282,6 +283,26 @@ def test_a_bound_that_fails_leaves_the_others(upper_fails: None, tmp_path: Path,
     rows = {row["quantity"]: row for row in csv.DictReader((folder / "bounds.csv").read_text("utf-8").splitlines())}
     assert rows["peak_force [N]"]["upper"] == "" and float(rows["peak_force [N]"]["lower"]) > 0
     assert rows["peak_force [N]"]["governs"] == ""  # nothing governs what was not compared
+
+
+def test_a_bound_that_fails_before_its_first_row_leaves_the_others(
+    monkeypatch: Any, upper_fails: None, tmp_path: Path, capsys: Any
+) -> None:
+    def run_to_end(scene: Scene, *_: Any) -> Any:
+        if scene.name.endswith("upper"):
+            raise RunError("stopped at t = 0 s: jammed", status="newton")
+        return dataclasses.replace(loops(), scene=scene)
+
+    monkeypatch.setattr("msfp_gen.studies.batch.run_to_end", run_to_end)
+    folder = tmp_path / "out"
+    assert main(["bound", "fenz-test5", "-o", str(folder)]) == 1
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error == "error: not all cases could be run; upper: stopped at t = 0 s: jammed"
+    assert sorted(path.name for path in folder.iterdir()) == ["bounds.csv", "bounds.png", "lower.nc", "nominal.nc"]
+
+    monkeypatch.setattr("msfp_gen.studies.bounding.runs.CASES", ("upper",))
+    with pytest.raises(RunError, match="upper: stopped at t = 0 s"):
+        bound(load_scene("fenz-test5"), load_factors("asce7"))
 
 
 def test_an_interruption_stops_all_runs(monkeypatch: Any) -> None:
