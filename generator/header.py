@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,7 @@ def word_enums() -> list[tuple[str, str, str, str, list[tuple[str, str, str]]]]:
     ]
 
 
+@cache
 def environment() -> Environment:
     """Templates of the package, in which an undefined name is an error."""
     from jinja2 import Environment, FunctionLoader, StrictUndefined

@@ -55,6 +55,18 @@ typedef double msfp_pack;
 #endif
 enum { MSFP_PACK_SIZE = sizeof(msfp_pack) / sizeof(double) };
 
+/* The dimensions by their short names. */
+enum {
+    NB = MSFP_NB,
+    NQ = MSFP_NQ,
+    NA = MSFP_NA,
+    ND = MSFP_ND,
+    DOF = MSFP_DOF,
+    PAIR = MSFP_PLANAR ? 1 : 2, /* tilt angles of a body */
+    FORCE = MSFP_FORCE_SIZE,
+    MOMENT = MSFP_MOMENT_SIZE
+};
+
 /* ---- a bearing and its top ---------------------------------------------------------------- */
 
 /* Blocks of parameters: msfp_model.h names their entries and units. */

@@ -13,7 +13,7 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.parts import InitialState
 from msfp_gen.scene.solver import Solver
-from msfp_gen.specification.layout import Auto, Effects
+from msfp_gen.specification.layout import Auto
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -53,11 +53,16 @@ def settling_scene(scene: Scene) -> Scene:
 
 
 def _effects(scene: Scene) -> Auto:
-    """The friction law of the scene; the other effects are selected for the slow tilting."""
+    """Rims and friction law as given in the scene; the other effects are selected for the slow tilting."""
     given = scene.effects
     spin = "locked" if given.spin == "free" else given.spin
-    rims = given.rims if isinstance(given, Effects) else None
-    return Auto(rims=rims, spin=spin, bouc_wen=given.bouc_wen, friction=given.friction, friction_law=given.friction_law)
+    return Auto(
+        rims=given.rims,
+        spin=spin,
+        bouc_wen=given.bouc_wen,
+        friction=given.friction,
+        friction_law=given.friction_law,
+    )
 
 
 def state_at_rest(q: Array, h: Array) -> InitialState:

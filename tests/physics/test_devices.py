@@ -98,7 +98,14 @@ def test_formula_of_the_double_is_that_of_fenz_and_constantinou_2006():
     assert found(0.3) == pytest.approx((0.3 + 0.04 * r[1] + 0.08 * r[3]) / (r[1] + r[3]), rel=1e-4)
 
 
-@pytest.mark.parametrize("device", devices.DEVICES, ids=lambda device: device.scene)
+@pytest.mark.parametrize(
+    "device",
+    thinned(
+        [(each,) for each in devices.DEVICES],
+        lambda device: device.scene not in ("double-articulated-push", "quintuple-push"),
+    ),
+    ids=lambda device: device.scene,
+)
 def test_arms_of_friction_explain_the_difference(device):
     """Early in the push, where angles are small, the formula with the true arms is within 1 %, the published is not."""
     row = devices.rows(device)[0]
@@ -125,7 +132,7 @@ def test_page_shows_what_is_measured(tmp_path):
 
 
 # Every kind of stack there is: one surface up or down, all one way, both ways, more above than below.
-ANY = [(2, 1, 0), (2, 0, 1), (3, 2, 0), (3, 0, 2), (3, 1, 1), (4, 1, 2), (5, 3, 1), (7, 3, 3)]
+ANY = [(2, 1, 0), (2, 0, 1), (3, 2, 0), (3, 0, 2), (3, 1, 1), (4, 1, 2), (4, 2, 1), (5, 3, 1), (7, 3, 3)]
 
 
 def stack(layout: Layout) -> Bearing:
@@ -136,7 +143,7 @@ def stack(layout: Layout) -> Bearing:
     return Bearing(layout, 0.06, surfaces, bodies, base_rim_radius=0.1, base_rim_offset=0.003)
 
 
-@pytest.mark.parametrize("counts", thinned([(x,) for x in ANY], lambda counts: counts == (4, 1, 2)), ids=str)
+@pytest.mark.parametrize("counts", thinned([(x,) for x in ANY], lambda counts: counts == (4, 2, 1)), ids=str)
 def test_every_layout_is_generated_run_and_drawn(counts, tmp_path):
     layout = Layout(*counts)
     level = 0.0 if layout.n == 2 else 1e9

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "api.h"
 
-enum { NB = MSFP_NB, STATE = MSFP_NB * MSFP_NQ };
+enum { STATE = MSFP_NB * MSFP_NQ };
 
 static void copied(double *to, const double *from, size_t count)
 {

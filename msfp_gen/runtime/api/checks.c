@@ -5,7 +5,7 @@
 #include "api.h"
 #include "msfp_checks.h"
 
-enum { NB = MSFP_NB, MOST_ITEMS = INT32_MAX / 64 }; /* of a list: sizes in bytes fit */
+enum { MOST_ITEMS = INT32_MAX / 64 }; /* of a list: sizes in bytes fit */
 static const double time_tolerance = 1e-9; /* times closer than this share of max(1, t) are equal, as in run.c */
 static const int signs[NB] = MSFP_SIGNS;
 

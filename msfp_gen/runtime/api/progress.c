@@ -5,8 +5,6 @@
 #include <string.h>
 #include "api.h"
 
-enum { NB = MSFP_NB };
-
 void msfp_api_run_progress(const msfp_run *run, msfp_progress *progress)
 {
     *progress = (msfp_progress){ run->status, run->status_surface, run->status_value, run->now.t, run->h,

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "api.h"
 
-enum { NB = MSFP_NB };
-
 void msfp_api_scene_default(msfp_scene *scene)
 {
     memset(scene, 0, sizeof *scene);

@@ -4,8 +4,6 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, NA = MSFP_NA, ND = MSFP_ND, FORCE = MSFP_FORCE_SIZE };
-
 static const int unknown[ND] = MSFP_FREE;
 
 /* Interface forces that balance loads, weights and inertia, summed from the top down. With uplift the unilateral

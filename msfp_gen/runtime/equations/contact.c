@@ -11,9 +11,7 @@
 #include "msfp_kernels.h"
 
 enum {
-    NB = MSFP_NB,
     LANES = MSFP_LANES,
-    MOMENT = MSFP_MOMENT_SIZE,
     FRICTION = MSFP_SHEAR_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: g, and mu where it follows a law */
     ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */

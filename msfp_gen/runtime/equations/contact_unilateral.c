@@ -5,7 +5,6 @@
 #include "msfp_kernels.h"
 
 #if MSFP_UPLIFT
-enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
 
 static const int signs[NB] = MSFP_SIGNS;
 

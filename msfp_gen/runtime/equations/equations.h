@@ -8,7 +8,6 @@
 #include <math.h>
 #include "msfp_model.h"
 
-enum { MSFP_PAIR = MSFP_PLANAR ? 1 : 2 }; /* tilt angles of a body */
 #if MSFP_LAW
 #define MSFP_IF_LAW(...) , __VA_ARGS__ /* one more argument where the friction coefficient is an unknown */
 #else

@@ -9,7 +9,6 @@
 #include "equations.h"
 
 #if MSFP_HEAT
-enum { NB = MSFP_NB };
 
 static const double lambda[MSFP_HEAT] = MSFP_HEAT_RATES, weight[MSFP_HEAT] = MSFP_HEAT_WEIGHTS;
 

@@ -4,8 +4,6 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
-
 static const int signs[NB] = MSFP_SIGNS;
 
 #if MSFP_UPLIFT
@@ -166,8 +164,8 @@ void msfp_support_axis(const msfp_point *at, double *upright)
 {
     double support[MSFP_SUPPORT_SIZE];
     for (int order = 0; order < 2; ++order)
-        for (int i = 0; i < MSFP_PAIR; ++i)
-            support[order * MSFP_PAIR + i] = at->support[order][MSFP_PLANAR ? 1 : i];
+        for (int i = 0; i < PAIR; ++i)
+            support[order * PAIR + i] = at->support[order][MSFP_PLANAR ? 1 : i];
     msfp_upright(support, upright);
 }
 #endif

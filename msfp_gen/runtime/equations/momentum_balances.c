@@ -6,10 +6,6 @@
 #include "msfp_kernels.h"
 
 enum {
-    NB = MSFP_NB,
-    DOF = MSFP_DOF,
-    FORCE = MSFP_FORCE_SIZE,
-    MOMENT = MSFP_MOMENT_SIZE,
     FRICTION = MSFP_FRICTION_SIZE
 };
 enum { ROWS = FORCE + MOMENT }; /* of a body */

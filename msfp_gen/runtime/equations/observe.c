@@ -7,8 +7,6 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-enum { NB = MSFP_NB };
-
 void msfp_base_motion(const msfp_point *at, double *base)
 {
     msfp_base_motion_O_put(base, at->base[0]);

@@ -4,8 +4,6 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE, PAIR = MSFP_PAIR };
-
 #if MSFP_RIMS
 /* Inputs of the rim of surface j. */
 static void rim_coordinates(const msfp_work *w, int j, double *x)

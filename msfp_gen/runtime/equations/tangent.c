@@ -12,16 +12,7 @@
 #include "msfp_kernels.h"
 
 #if !MSFP_UPLIFT
-enum {
-    NB = MSFP_NB,
-    DOF = MSFP_DOF,
-    NA = MSFP_NA,
-    ND = MSFP_ND,
-    FORCE = MSFP_FORCE_SIZE,
-    MOMENT = MSFP_MOMENT_SIZE,
-    PAIR = MSFP_PAIR,
-    LANES = MSFP_LANES
-};
+enum { LANES = MSFP_LANES };
 /* Fields of the local variation of a body: the inputs of the contact beside its force come first. */
 enum {
     TWIST = MSFP_TWIST_SIZE,

@@ -7,7 +7,6 @@
 #include "msfp_kernels.h"
 
 #if MSFP_UPLIFT
-enum { NB = MSFP_NB, DOF = MSFP_DOF, NA = MSFP_NA, ND = MSFP_ND, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
 
 static void seed_columns(msfp_work *w, const msfp_seed *seed)
 {

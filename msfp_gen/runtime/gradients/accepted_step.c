@@ -4,7 +4,6 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, NQ = MSFP_NQ, DOF = MSFP_DOF, C = MSFP_COLUMNS };
 static const double shortest_settling = 0.02, longest_settling = 0.1; /* of what follows a rim contact [s] */
 static const double slight_pull = 1e-3; /* of the normal force: a pull that does not change the motion */
 

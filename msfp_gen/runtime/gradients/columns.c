@@ -13,15 +13,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-enum {
-    NB = MSFP_NB,
-    C = MSFP_COLUMNS,
-    NA = MSFP_NA,
-    ND = MSFP_ND,
-    FORCE = MSFP_FORCE_SIZE,
-    MOMENT = MSFP_MOMENT_SIZE
-};
-
 /* Columns of a vector along E1, E2, E3 into a block of a polar vector, which in the plane has no E2. */
 MSFP_INLINE void put_polar(double *block, msfp_columns *const vector)
 {
@@ -137,8 +128,8 @@ MSFP_COLUMNWISE void msfp_rim_columns(const msfp_parameters *p, const msfp_param
 {
     double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * C];
     for (int order = 0; order < 2; ++order)
-        for (int i = 0; i < MSFP_PAIR; ++i) {
-            const int field = msfp_coordinate_field(order, i), to = order * MSFP_PAIR + i;
+        for (int i = 0; i < PAIR; ++i) {
+            const int field = msfp_coordinate_field(order, i), to = order * PAIR + i;
             x[to] = w->x[j + 1][field];
             memcpy(dx + to * C, d->x[j + 1] + field * C, C * sizeof *dx);
         }

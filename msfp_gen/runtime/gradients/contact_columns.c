@@ -14,9 +14,7 @@
 #include "msfp_gradient_kernels.h"
 
 enum {
-    C = MSFP_COLUMNS,
     LANES = MSFP_LANES,
-    MOMENT = MSFP_MOMENT_SIZE,
     FRICTION = MSFP_SHEAR_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns of a contact: g, and mu where it follows a law */
     RESULTS = MSFP_CONTACT_RESULTS,

@@ -5,7 +5,7 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, C = MSFP_COLUMNS, EXTREMES = sizeof(msfp_extremes) / sizeof(double) };
+enum { EXTREMES = sizeof(msfp_extremes) / sizeof(double) };
 #define EXTREME(name) (offsetof(msfp_extremes, name) / sizeof(double))
 
 /* Magnitudes along the axes and in the horizontal plane, with their columns. */

@@ -6,8 +6,6 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
-
 /* Column c of a block of `count` numbers. */
 static void put_column(double *block, const double *values, int count, int c)
 {

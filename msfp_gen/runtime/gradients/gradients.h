@@ -10,6 +10,7 @@
 #include "run.h"
 
 #if MSFP_GRADIENTS
+enum { C = MSFP_COLUMNS };
 typedef double msfp_columns[MSFP_COLUMNS];
 
 /* ---- columns.c: one evaluation of the equations ---- */

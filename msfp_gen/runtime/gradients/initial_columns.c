@@ -9,7 +9,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, C = MSFP_COLUMNS };
 static const int unknown[ND] = MSFP_FREE;
 
 /* Third derivative of a history at its last search. */

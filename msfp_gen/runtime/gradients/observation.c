@@ -9,8 +9,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-enum { NB = MSFP_NB, C = MSFP_COLUMNS };
-
 /* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
  * centre, where its columns are zero. */
 MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,

@@ -11,7 +11,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-enum { NB = MSFP_NB, C = MSFP_COLUMNS, FORCE = MSFP_FORCE_SIZE, MOMENT = MSFP_MOMENT_SIZE };
 MSFP_STATIC_ASSERT(!MSFP_UPLIFT && !MSFP_TOP_ROTATION, gradients_of_powers); /* ModelSpec refuses them */
 
 MSFP_COLUMNWISE void msfp_base_motion_columns(const msfp_point_columns *dat, double *dbase)

@@ -8,8 +8,6 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
-
 enum { EVENT = 7 }; /* numbers of an event: time, displacement, top force */
 
 /* `*items` with room for `wanted` items of `size` doubles for each parameter. */

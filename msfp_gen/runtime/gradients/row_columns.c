@@ -7,8 +7,6 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, NQ = MSFP_NQ, C = MSFP_COLUMNS };
-
 /* Columns of the row of an observed state. */
 static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, const msfp_slopes *slopes,
                              double t, const msfp_state_columns *ds, msfp_row_columns d)

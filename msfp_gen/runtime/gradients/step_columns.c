@@ -9,7 +9,7 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ, C = MSFP_COLUMNS, STAGES = MSFP_STAGES };
+enum { STAGES = MSFP_STAGES };
 static const int unknown[ND] = MSFP_FREE;
 
 /* As msfp_lu_solve for all columns at once. */

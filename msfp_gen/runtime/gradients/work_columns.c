@@ -9,7 +9,7 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-enum { NB = MSFP_NB, C = MSFP_COLUMNS, WORKS = MSFP_WORKS };
+enum { WORKS = MSFP_WORKS };
 
 /* work += columns of h weight power */
 MSFP_INLINE void add_product(const msfp_group *group, double h, double weight, double power, const double *dpower,

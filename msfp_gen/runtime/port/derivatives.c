@@ -10,7 +10,7 @@
 #include <string.h>
 #include "port.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, FREEDOMS = MSFP_PORT_FREEDOMS, MOST_STEPS = 4 };
+enum { FREEDOMS = MSFP_PORT_FREEDOMS, MOST_STEPS = 4 };
 /* A perturbation accelerates a supported mass by no more than its share of this [m/s^2]. */
 static const double mild_acceleration = 10.0;
 /* The slip that a perturbation causes, over the smallest yield displacement: Y and Z are known to 1e-12. */

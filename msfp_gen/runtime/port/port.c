@@ -4,8 +4,6 @@
 #include <string.h>
 #include "port.h"
 
-enum { NB = MSFP_NB };
-
 static void attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
 {
     memset(history, 0, sizeof *history);

@@ -8,7 +8,7 @@
 #include <string.h>
 #include "port.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, FREEDOMS = MSFP_END_FREEDOMS };
+enum { FREEDOMS = MSFP_END_FREEDOMS };
 
 /* Base motion, load and rotation of the support of a stage. */
 static void set_ends(const msfp_port *port, const msfp_ends *ends, msfp_point *at)

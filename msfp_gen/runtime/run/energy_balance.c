@@ -6,7 +6,6 @@
 #include <math.h>
 #include "run.h"
 
-enum { NB = MSFP_NB };
 static const double largest_gain = 0.1; /* share of the largest energy so far that a step may create by its error */
 static const double largest_loss = 0.5; /* share that it may lose: damped ringing may be a large part of it */
 static const double smallest_energy =

@@ -3,7 +3,7 @@
 #include <math.h>
 #include "run.h"
 
-enum { NB = MSFP_NB, STOP = NB, FIRST_CONTACT = NB + 1 }; /* event functions: gaps, stop displacement, compressions */
+enum { STOP = NB, FIRST_CONTACT = NB + 1 }; /* event functions: gaps, stop displacement, compressions */
 
 /* Size below which event function i counts as zero [m]. */
 static double event_tolerance(const msfp_run *run, int i)

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "run.h"
 
-enum { NB = MSFP_NB };
-
 static void take_largest(double *extreme, double value)
 {
     if (value > *extreme)

@@ -2,7 +2,6 @@
 #include "run.h"
 
 #if !MSFP_UPLIFT
-enum { NB = MSFP_NB };
 static const double unloaded_share =
     0.02; /* of weight and load: a surface with less normal force is about to lift off */
 static const double unbounded_share =

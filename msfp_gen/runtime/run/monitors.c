@@ -9,8 +9,6 @@
 #include <string.h>
 #include "run.h"
 
-enum { NB = MSFP_NB };
-
 static const double lambda[MSFP_HEAT_STATES] = MSFP_HEAT_RATES, weight[MSFP_HEAT_STATES] = MSFP_HEAT_WEIGHTS;
 
 int msfp_check_state(msfp_run *run, const msfp_work *w, const msfp_state *s)

@@ -4,8 +4,6 @@
 #include <string.h>
 #include "run.h"
 
-enum { NB = MSFP_NB };
-
 static void observe(msfp_run *run, const msfp_state *s, msfp_observation *o, msfp_row *row)
 {
     const msfp_parameters *p = &run->parameters;

@@ -6,7 +6,6 @@
 #include "run.h"
 
 enum {
-    NB = MSFP_NB,
     ROWS_OF_STEP = 10000, /* rows inside one step, at most: those of a long rest need not fit into memory */
     STABILITY_LIMIT_STEPS =
         500 /* consecutive steps; rim contact causes a few (Hairer and Wanner, Solving ODEs II, IV.2: 15) */

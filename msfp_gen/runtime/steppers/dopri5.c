@@ -4,7 +4,7 @@
 #include <string.h>
 #include "steppers.h"
 
-enum { NB = MSFP_NB, NQ = MSFP_NQ, STAGES = 7 };
+enum { STAGES = 7 };
 
 static const double a[STAGES][STAGES - 1] = {
     { 0 },

@@ -7,8 +7,6 @@
 #include <string.h>
 #include "steppers.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ };
-
 static const int unknown[ND] = MSFP_FREE;
 
 MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double weight, int count)

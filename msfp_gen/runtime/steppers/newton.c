@@ -3,7 +3,6 @@
 #include <string.h>
 #include "steppers.h"
 
-enum { NB = MSFP_NB, DOF = MSFP_DOF, ND = MSFP_ND, NQ = MSFP_NQ };
 enum {
     MAX_ITERATIONS = 30,
     JUMP_ITERATIONS = 10 /* from this iteration on a residual up to the jump of the rim force is accepted */

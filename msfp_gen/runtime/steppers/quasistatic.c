@@ -15,7 +15,7 @@ int msfp_is_quasistatic(const msfp_run *run)
 }
 
 #if MSFP_CLOSED_FORM
-enum { NB = MSFP_NB, ANGLE = 1 }; /* theta, the unknown of a planar body */
+enum { ANGLE = 1 }; /* theta, the unknown of a planar body */
 static const double largest_change = 0.4; /* of Y in a step, as extrapolated */
 
 /* What the next step uses of a state. */

@@ -3,7 +3,6 @@
 #include <string.h>
 #include "steppers.h"
 
-enum { NB = MSFP_NB };
 static const int unknown[MSFP_ND] = MSFP_FREE;
 
 void msfp_point_at(msfp_run *run, double t, msfp_point *at)
