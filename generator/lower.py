@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import sympy as sp
 
-from .program import Program, Statement
+from .program import Program, Statement, derivative
+
+
+@cache
+def operations_of(expression: sp.Expr) -> int:
+    """Number of arithmetic operations of an expression."""
+    return int(sp.count_ops(expression, visual=False))
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Kernel:
     @property
     def operations(self) -> int:
         """Number of arithmetic operations of the values."""
-        return int(sum(sp.count_ops(s.expression, visual=False) for s in self.values))
+        return sum(operations_of(s.expression) for s in self.values)
 
     @property
     def tangent_operations(self) -> int:
@@ -120,7 +127,7 @@ def lower(program: Program) -> Kernel:
     for statement in needed_statements(program.statements, targets):
         terms = []
         for source in sorted(statement.expression.free_symbols & active, key=str):
-            partial = sp.diff(statement.expression, source).xreplace(functions)
+            partial = derivative(statement.expression, source).xreplace(functions)
             if partial == 0:
                 continue
             if not (partial.is_Number or partial.is_Symbol or (-partial).is_Symbol):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
 
@@ -58,6 +60,7 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
 _PRINTER = Printer()
 
 
+@cache
 def to_c(expression: sp.Expr) -> str:
-    """C text of one expression."""
+    """C text of one expression. Kept, since models share most of their statements."""
     return str(_PRINTER.doprint(expression))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 import sympy as sp
 
@@ -16,6 +17,12 @@ Vector = tuple[sp.Expr, sp.Expr, sp.Expr]
 AXES = "xyz"
 POLAR, AXIAL = (None, 0, None), (0, None, 0)
 """Constant components of a vector in a planar model, which keeps (E1, E3) of a polar and E2 of an axial one."""
+
+
+@cache
+def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Partial derivative of an expression. Kept, since models share most of their statements."""
+    return sp.diff(expression, symbol)
 
 
 @dataclass(frozen=True)
@@ -183,7 +190,7 @@ class Program:
     def rate(self, expression: sp.Expr) -> sp.Expr:
         """Total time derivative of an expression by the chain rule, as a new statement."""
         expression = sp.sympify(expression)
-        terms = (sp.diff(expression, s) * self.rate_of(s) for s in sorted(expression.free_symbols, key=str))
+        terms = (derivative(expression, s) * self.rate_of(s) for s in sorted(expression.free_symbols, key=str))
         return self.let(sp.Add(*terms), "rate")
 
     def rate_vector(self, vector: Vector) -> Vector:
