@@ -5,8 +5,6 @@
 #include "fmu.h"
 #include "port.h"
 
-enum { NB = FMU_SURFACES, NQ = FMU_COORDINATES };
-
 void fmu_release(fmu *f)
 {
     const msfp_api *api = FMU_MODEL();
