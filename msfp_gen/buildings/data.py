@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from msfp_gen.buildings.peaks import Peaks
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below, undamped
+from msfp_gen.buildings.plausibility import building_doubts
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import coordinates_of, named_columns
@@ -451,7 +452,7 @@ def _notes_of(result: BuildingData) -> tuple[Note, ...]:
     ]
     notes = [*values, *_gathered(result.monitored)]
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
-    whole = [Note(0.0, "value", *doubt) for doubt in undamped(scene, scene.vertical_modes)]
+    whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
     return tuple(sorted([*labelled, *whole, *_energy(result)], key=lambda note: note.time))
 
 

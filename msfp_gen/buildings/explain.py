@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, remaining_loads, standing_below, undamped
+from msfp_gen.buildings.plausibility import building_doubts
+from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.tables import Table, vector
 from msfp_gen.scene import explain as one
 from msfp_gen.scene.effect_selection import doubtful_values
@@ -124,7 +125,7 @@ def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
     for index, (each, load) in enumerate(zip(scene.bearings, scene.axial_loads, strict=True)):
         given, needed, _ = standing_below(each, load)
         yield from unsteady(f"{scene.label(index)}: interface.rotational_stiffness", given, needed)
-    yield from undamped(scene, scene.vertical_modes)
+    yield from building_doubts(scene)
 
 
 def _solver(scene: BuildingScene) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
@@ -15,7 +15,7 @@ from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_ty
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
-from msfp_gen.scene.effect_selection import GIVEN, LEAST_DAMPING, USUAL_DAMPING, EffectSelection, Reason, ringing
+from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
@@ -28,7 +28,7 @@ ROW_STEP = 0.01  # between rows [s]
 LEAST_SHARE = 0.1  # of the load at rest that an estimate must leave for uplift to be left out
 STEP = 5e-3  # of the linear response [s]
 SMALL = 1e-12  # of a mode that vertical motion does not excite
-SHARE = 0.2  # of the strain energy of a mode, in the interfaces, above which these can damp it
+APART = 1e-3  # least distance between the axes of two bearings [m]
 REST = 1e-9  # largest velocity of the ground at the start [m/s]
 
 
@@ -118,6 +118,7 @@ class BuildingScene:
                 check_seats(each.bearing, each.interface, each.effects)
         check_fields(self, "scene")
         self._check_gravity()
+        self._check_places()
         self._check_motion()
         if self.solver.method == "dopri5":
             raise InputError("solver.method = 'dopri5': the run of a building is implicit; give 'implicit'")
@@ -214,7 +215,7 @@ class BuildingScene:
             )
         for index, load in enumerate(loads):
             if load <= 0:
-                raise InputError(f"scene.bearings[{index}].position: it carries {load:.4g} N at rest; move it [m]")
+                raise InputError(f"scene.bearings[{index}].position: {self._tension(float(load))}; move it [m]")
         return loads
 
     @cached_property
@@ -248,6 +249,29 @@ class BuildingScene:
         if not node.carries:
             raise InputError(f"scene.bearings[{index}].node = {given.node!r}: no bearing can be attached there")
         return node.rows if given.position is None else node.linked([*given.position, node.position[2]])
+
+    def _tension(self, load: float) -> str:
+        """Why a bearing carries no compression at rest."""
+        centre, low, high = self.mass_centre, self.places.min(axis=0), self.places.max(axis=0)
+        where = f"the centre of mass of the building at ({centre[0]:.3g}, {centre[1]:.3g}) m"
+        if np.any(centre < low) or np.any(centre > high):
+            ranges = f"{low[0]:.3g} to {high[0]:.3g} m along E1 and {low[1]:.3g} to {high[1]:.3g} m along E2"
+            return f"it would be in tension at rest ({load:.4g} N): {where} is outside the bearings, {ranges}"
+        return f"it would be in tension at rest ({load:.4g} N), where a bearing cannot pull: {where} loads the others"
+
+    def _check_places(self) -> None:
+        """Raise InputError where two bearings have one place or one name."""
+        assert len(self.attachments) == len(self.bearings)  # their nodes exist
+        levels = [self.building.node(each.node).position[2] for each in self.bearings]
+        places = np.column_stack([self.places, levels])
+        for second, each in enumerate(self.bearings):
+            for first in range(second):
+                field, other = f"scene.bearings[{second}]", f"scene.bearings[{first}]"
+                if each.name and each.name == self.bearings[first].name:
+                    raise InputError(f"{field}.name = {each.name!r}: {other} has it too; give another")
+                if np.linalg.norm(places[second] - places[first]) < APART:
+                    at = ", ".join(f"{x:g}" for x in places[second][:2])
+                    raise InputError(f"{field}.position = ({at}): {other} is there too; give places apart [m]")
 
     def _check_gravity(self) -> None:
         for index, each in enumerate(self.bearings):
@@ -288,26 +312,6 @@ def vertical_modes(scene: BuildingScene) -> VerticalModes:
     )
     squares = np.maximum(squares, 0.0)
     return VerticalModes(squares, shapes, rates, stored / np.maximum(squares, 1e-9 * squares.max()))
-
-
-def undamped(scene: BuildingScene, modes: VerticalModes) -> Iterator[tuple[int, float, str]]:
-    """A doubt where a mode that the interfaces could damp has less than `LEAST_DAMPING` of critical damping.
-
-    Yields 0 (no surface), the least damping ratio and the text with the damping that cures it.
-    """
-    on_springs = modes.shares > SHARE
-    if not on_springs.any():
-        return
-    turns = np.sqrt(modes.squares[on_springs])
-    ratios = modes.rates[on_springs] / (2 * turns)
-    least, interface = int(ratios.argmin()), scene.bearings[0].interface
-    if ratios[least] < LEAST_DAMPING:
-        missing = 2 * (USUAL_DAMPING - ratios) / (turns * modes.shares[on_springs])  # damping over stiffness [s]
-        given = interface.vertical_damping
-        cure = given + float(missing.max()) * interface.vertical_stiffness
-        what = "the building vibrates on the vertical springs of its interfaces"
-        name = "building.interface.vertical_damping"
-        yield 0, float(ratios[least]), ringing(name, given, what, turns[least], ratios[least], cure)
 
 
 def select_effects(scene: BuildingScene) -> tuple[EffectSelection, ...]:

@@ -13,6 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.errors import InputError
 
+HIGHEST = 1000.0  # storey [m]
 FREEDOMS = 6  # of a node: displacements along E1, E2, E3 and rotations about them
 MOTIONS = ("translation along E1", "translation along E2", "translation along E3",
            "rotation about E1", "rotation about E2", "rotation about E3")  # fmt: skip
@@ -96,6 +97,8 @@ class Storey:
 
     def __post_init__(self) -> None:
         check_fields(self, "storey")
+        if self.height >= HIGHEST:
+            raise InputError(f"storey.height = {self.height:g} m: no storey is as high; is it in mm? Give it in m")
         if (self.vertical_stiffness is None) != (self.rocking_stiffness is None):
             given, other = ("vertical_stiffness", "rocking_stiffness")
             given, other = (given, other) if self.rocking_stiffness is None else (other, given)

@@ -118,7 +118,7 @@ class MassTop(Top):
     height: of its centre of mass above the top of the top plate, r_nn [m].
     rotational_stiffness, rotational_damping: restraint against tilt, such as that of the remaining structure
     [N m/rad], [N m s/rad]. vertical_stiffness, vertical_damping: between top plate and mass, of bearing and columns, k
-    and c of docs/model.md [N/m], [N s/m]; None: rigid. At the start the spring carries the weight at rest. Raises
+    and c of docs/model.md [N/m], [N s/m]; None or 0: rigid. At the start the spring carries the weight at rest. Raises
     InputError.
     """
 
@@ -134,6 +134,8 @@ class MassTop(Top):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.vertical_stiffness == 0.0:  # no spring, as of a rig
+            object.__setattr__(self, "vertical_stiffness", None)
         if self.vertical_damping and self.vertical_stiffness is None:
             raise InputError(
                 f"top.vertical_damping = {self.vertical_damping!r}: a damper alone carries no weight; give "

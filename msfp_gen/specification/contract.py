@@ -86,7 +86,7 @@ TOP_MASS = (  # of a top with a mass, in place of those of these names
     Value("mass", Quantity("kg", above=0.0), "supported mass"),
     Value("inertia_transverse", _INERTIA, "its moment of inertia about a horizontal axis"),
     Value("inertia_axial", _INERTIA, "its moment of inertia about the vertical axis"),
-    Value("vertical_stiffness", Quantity("N/m", above=0.0), "vertical stiffness below it", zero="rigid"),
+    Value("vertical_stiffness", Quantity("N/m", least=0.0), "vertical stiffness below it", zero="rigid"),
 )
 INTERFACE = (  # of the interface of a two-port likewise
     Value("stiffness", Quantity("N/m", above=0.0), "horizontal stiffness"),

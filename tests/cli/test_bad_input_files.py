@@ -92,7 +92,7 @@ SCENES = {
         motion(kind="harmonic", amplitude=0.1, frequency=0.1, name="a\0b"),
         ("motion.name = 'a\\x00b'", "without the NUL character"),
     ),
-    "a bundled path": (motion(kind="record", bundled="../../x"), ("'../../x' does not come with the package",)),
+    "a bundled path": (motion(kind="record", bundled="../../x"), ("bundled = '../../x': no such record",)),
     "a file with NUL": (HEAD + 'motion = {kind = "record", file = "a\\u0000b"}', ("file = 'a\\x00b'", "no path")),
     "a file of 5000 letters": (motion(kind="record", file="a" * 5000), ("motion.file", "no such file")),
     "a file without a name": (motion(kind="record", file=""), ("no such file",)),

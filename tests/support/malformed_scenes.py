@@ -113,7 +113,7 @@ ROWS = [
     ("initial_state", {"q": 0, "v": [], "h": []}, ("initial_state.q = 0", "lists of 3")),
     ("motion", {"kind": "record"}, ("motion.file and motion.bundled", "give one")),
     ("motion", RECORD | {"file": "a.v1"}, ("motion.file and motion.bundled: both",)),
-    ("motion", {"kind": "record", "bundled": "kobe"}, ("motion.record", "'kobe'", "ridgecrest-2019-ci-ccc")),
+    ("motion", {"kind": "record", "bundled": "kobe"}, ("motion.bundled", "'kobe'", "ridgecrest-2019-ci-ccc")),
     ("motion", {"kind": "record", "file": "gone.v1"}, ("motion.file", "gone.v1", "no such file")),
     ("motion", {"kind": "arrays", "file": "gone.csv"}, ("motion.file", "gone.csv", "no such file")),
     ("motion", {"kind": "arrays", "file": 3}, ("motion.file = 3", "text")),

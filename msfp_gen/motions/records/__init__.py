@@ -112,6 +112,6 @@ def bundled(name: str) -> Record:
     Raises InputError for another name.
     """
     if name not in BUNDLED:
-        raise InputError(f"record: {name!r} does not come with the package; choose from {', '.join(BUNDLED)}")
+        raise InputError(f"bundled = {name!r}: no such record comes with the package; choose from {', '.join(BUNDLED)}")
     file = files(__package__) / "files" / f"{name}.v1.gz"
     return _record_of([lines_of(Path(file.name), file.read_bytes())])  # part of the package, and no input file

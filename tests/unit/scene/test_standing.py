@@ -24,7 +24,7 @@ from msfp_gen import (
 )
 from msfp_gen.buildings.data import value_notes
 from msfp_gen.buildings.explain import explain
-from msfp_gen.buildings.scene import undamped
+from msfp_gen.buildings.plausibility import building_doubts
 from msfp_gen.scene.effect_selection import scene_doubts
 from msfp_gen.scene.standing import links, needed_rotational_stiffness, standing_of
 
@@ -100,7 +100,7 @@ def test_no_published_scene_is_doubted():
     for name in presets.names("scene"):
         scene = load_scene(name)
         if isinstance(scene, BuildingScene):
-            assert not list(undamped(scene, scene.vertical_modes))
+            assert not list(building_doubts(scene))
             assert not any(value_notes(b, n) for b, n in zip(scene.bearings, scene.axial_loads, strict=True))
         else:
             assert not [text for _, _, text in scene_doubts(scene) if text.startswith("top.")], name
@@ -110,7 +110,7 @@ def test_a_building_that_rings_on_its_interfaces_is_noted_with_the_cure():
     slab = Building.shear(BaseSlab(MASS, (3 * MASS, 3 * MASS, 6 * MASS), (0.4, 0.2)), [])
     interface = replace(INTERFACE, vertical_damping=0.0)
     scene = building_scene(slab, interface=interface, duration=0.05)
-    (doubt,) = undamped(scene, scene.vertical_modes)
+    (doubt,) = building_doubts(scene)
     assert doubt[2].startswith("building.interface.vertical_damping = 0: the building vibrates") and doubt[1] == 0.0
     assert any(doubt[2] == row[0] for table in explain(scene) for row in table.rows)
     assert [note.text for note in simulate(scene).notes if note.kind == "value"] == [doubt[2]]
@@ -118,7 +118,7 @@ def test_a_building_that_rings_on_its_interfaces_is_noted_with_the_cure():
     cured = building_scene(slab, interface=replace(interface, vertical_damping=cure))
     modes = cured.vertical_modes
     ratios = (modes.rates / (2 * np.sqrt(np.maximum(modes.squares, 1e-9))))[modes.shares > 0.2]
-    assert ratios.min() == pytest.approx(0.02, rel=1e-2) and not list(undamped(cured, modes))
+    assert ratios.min() == pytest.approx(0.02, rel=1e-2) and not list(building_doubts(cured))
     bounce = np.sqrt(4 * interface.vertical_stiffness / MASS) / (2 * np.pi)
     frequencies = np.sqrt(modes.squares[modes.shares > 0.2]) / (2 * np.pi)
     assert frequencies.min() < bounce < frequencies.max()  # eccentric: bounce and rocking are coupled
