@@ -42,6 +42,8 @@ static void rim(const msfp_work *w, int j, rim_columns *rims)
             for (int c = 0; c < DOF; ++c)
                 to[c] += factor * dx[i * DOF + c];
         }
+#else
+    (void)w;
 #endif
 }
 
