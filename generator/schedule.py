@@ -264,6 +264,7 @@ def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Block
         program = programs[call.program]
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
+        assert call.decision is None or call.decision.acts or not program.tangents, call
         needed = _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
             assert getattr(blocks, list_of(place).kind) == use.block, (call, place)

@@ -47,12 +47,10 @@ void msfp_load_coordinates(const msfp_point *at, msfp_work *w);
 void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Kinematics of the moving bodies; body 0 is in `w`. */
 void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* The same with columns; those of the coordinates and of body 0 are in `w`. */
-void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Force and moment above the top plate: loads, springs, dampers, the supported mass. */
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* The same with columns. dload: columns of the load [6][MSFP_DOF], or NULL. */
-void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload);
+/* The same with columns, at a given load. */
+void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* What acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
 void msfp_load_top(const msfp_parameters *p, const msfp_point *at, double *force, double *moment,
                    double *stage MSFP_IF_TOP_ROTATION(double *upright));

@@ -152,14 +152,6 @@ MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, m
     }
 }
 
-MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
-{
-    for (int k = 1; k <= NB; ++k) {
-        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
-        msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
-    }
-}
-
 #if MSFP_TOP_ROTATION
 void msfp_support_axis(const msfp_point *at, double *upright)
 {
@@ -269,18 +261,17 @@ MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_wor
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
-MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload)
+MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
-    static const double zero[6 * DOF];
+    static const double constant[MSFP_TOP_WRENCH_SIZE * DOF]; /* columns of a load that does not move */
     double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE],
         dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
 #endif
     msfp_load_top(p, at, force, moment, stage MSFP_IF_TOP_ROTATION(upright));
-    const double *df = dload ? dload : zero, *dm = dload ? dload + FORCE * DOF : zero;
     msfp_top_wrench_tangent(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright),
-                            wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
+                            wrench, w->dbody[NB], w->dx[NB], constant, constant, dwrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
     memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);

@@ -117,8 +117,9 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
                             double *tangent)
 {
     seed_columns(w, seed);
-    msfp_kinematics_tangent(p, at, w);
-    msfp_top_tangent(p, at, w, NULL);
+    for (int k = 1; k <= NB; ++k)
+        msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
+    msfp_top_tangent(p, at, w);
     descend(p, w, tangent);
 }
 #endif
