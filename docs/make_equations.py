@@ -9,6 +9,7 @@ from msfp_gen.common.output import replacing
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
+from msfp_gen.generator.schedule import Over, momentum_balances
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
@@ -62,6 +63,25 @@ stack.
   the work [J] that friction stores and $W_d$ the work that it dissipates.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
 
+SCHEDULE = r"""## One evaluation of a stack
+
+The momentum balances (3.26)-(3.29) at given unknowns (2.119), from `generator/schedule.py`: which program runs over
+which bodies and surfaces, from the lowest up, and from which blocks to which. From the same lines the C is emitted that
+evaluates the balances and differentiates them, program by program. Bodies are numbered 1 to n as in PEER 2017/07, and
+surface $\gamma$ lies between bodies $\gamma$ and $\gamma+1$. Given are the coordinates `x`, the inertial `frame` with
+the translation of the base, `load_force` and `load_moment` on the top plate, the `unknowns` of the contacts, the state
+of `friction` and, where a mass rests on a vertical spring, its `foot_stage`. Two programs only gather:
+`rim_coordinates` the tilts of body $\gamma+1$ and their rates, `balances` the balances of a body, where with locked
+spin $\ddot\phi_k = 0$ takes the place of the axial one. The other programs follow below."""
+
+OVER = {
+    Over.BASE: "base",
+    Over.BODIES: "bodies $k = 2, \\dots, n$",
+    Over.SURFACES: "surfaces $\\gamma = 1, \\dots, n-1$",
+    Over.TOP: "top plate",
+}
+PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n"}
+
 TITLES = {
     "arms": "Distances along the axis, from (3.4)-(3.11)",
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
@@ -73,8 +93,10 @@ TITLES = {
     "top_wrench": "The top (3.28), (3.29): rig springs, supported mass and outside load",
     "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",
     "surface_local": "Contact force and slip rotation in the basis of the body below (3.12), (3.19)",
+    "slip_rotation": "Slip rotation alone (3.12), (3.19)",
     "contact": "Normal force and its position in closed form, friction (3.13)-(3.19)",
     "report_contact": "The same at given unknowns, as stated in PEER 2017/07 (3.13)-(3.19)",
+    "report_wrench": "Force and moment of a surface on the body above, contact and rim",
     "moment_to_world": "Moment about the sphere centre",
     "linear_balance": "Balance of linear momentum (3.26), (3.28): left side less right side",
     "angular_balance": "Balance of angular momentum (3.27), (3.29): left side less right side",
@@ -118,9 +140,26 @@ def program_sections() -> list[str]:
     return parts
 
 
+def place(text: str) -> str:
+    """A place of the schedule, with bodies and surfaces numbered as in PEER 2017/07."""
+    name, _, index = text.removesuffix("]").partition("[")
+    return f"`{name}[{PLACES.get(index, index)}]`" if index else f"`{name}`"
+
+
+def schedule_section() -> list[str]:
+    """The schedule of the momentum balances as a table."""
+    lines = ["| over | program | reads | writes |", "|---|---|---|---|"]
+    for one in momentum_balances(Effects()):
+        for call in one.calls:
+            reads, writes = (", ".join(map(place, places)) for places in (call.reads, call.writes))
+            program = f"`{call.program}`" + (", where it acts" if call.decision and call.decision.acts else "")
+            lines.append(f"| {OVER[one.over]} | {program} | {reads} | {writes} |")
+    return [SCHEDULE, "\n".join(lines)]
+
+
 def text() -> str:
     """The whole page."""
-    return "\n\n".join([INTRODUCTION, *assembled_section(), PROGRAMS, *program_sections()]) + "\n"
+    return "\n\n".join([INTRODUCTION, *assembled_section(), *schedule_section(), PROGRAMS, *program_sections()]) + "\n"
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 from .derive import derive
 from .latex import result_statements, to_latex
 from .program import Program
+from .schedule import momentum_balances, unrolled
 
 Values = Mapping[str, sp.Expr]
 """Stored field of a block -> its value."""
@@ -31,7 +32,6 @@ NAMES = {
     "ddtheta_1": r"\ddot{\theta}_{1}",
     "ddtheta_2": r"\ddot{\theta}_{2}",
 }
-NO_FORCE = {"Fx": sp.Integer(0), "Fz": sp.Integer(0)}
 NO_RIG = dict.fromkeys(("k", "c", "kr", "cr", "m", "jt", "ja", "h", "g", "mz", "kv", "cv", "x0x", "x0z"), sp.Integer(0))
 NO_FOOT = dict.fromkeys(("y", "y1", "beta", "mobility", "share"), sp.Integer(0))
 
@@ -95,32 +95,27 @@ def assembled() -> dict[str, sp.Expr]:
     lower = evaluate(p["arms"], d=dimensions("ell_1", "z_1", zero, R))
     plate = evaluate(p["arms"], d=dimensions("ell_2", "z_2", R, zero))
     plate |= {"m": symbol("m_2"), "jt": symbol("lambda_2"), "ja": zero, "g": symbol("g")}
-    base = evaluate(p["forward"], par=lower, u=ground_motion(), x=coordinates(1))
-    body = evaluate(p["forward"], par=plate, u=base, x=coordinates(2))
-
-    local = evaluate(p["surface_local"], b=base, a=body, x=coordinates(2), y=coordinates(1), tot=NO_FORCE, rim=NO_FORCE)
-    surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1"), "td": sp.Integer(0)}
-    touch = evaluate(
-        p["report_contact"],
-        par=surface,
-        x={"theta": symbol("thetat_1"), "N": symbol("N_1")},
-        f={"Y": symbol("Y_1")},
-        loc=local,
-    )
-    force = evaluate(p["force_to_world"], b=base, loc={"Fx": touch["px"], "Fz": touch["pz"]})
-    moment = evaluate(p["moment_to_world"], b=base, loc={"My": touch["My"]})
-    top = evaluate(
-        p["top_wrench"],
-        par=NO_RIG,
-        y=NO_FOOT,
-        b=body,
-        x=coordinates(2),
-        fe={"Fx": symbol("F_1"), "Fz": symbol("F_3")},
-        me={"My": symbol("M_2")},
-    )
-    linear = evaluate(p["linear_balance"], par=plate, b=body, lo=force, up=top)
-    angular = evaluate(p["angular_balance"], par=plate, b=body, lo=force, ml=moment, up=top, mu=top)
-    return {"E1": linear["rx"], "E3": linear["rz"], "t2": angular["ry"], "dY": touch["dY"]}
+    surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1"), "td": zero}
+    found: dict[tuple[str, int], dict[str, sp.Expr]] = {
+        ("frame", 0): ground_motion(),
+        ("x", 0): coordinates(1),
+        ("x", 1): coordinates(2),
+        ("body_parameters", 0): lower,
+        ("body_parameters", 1): plate,
+        ("surface_parameters", 0): surface,
+        ("top_parameters", 0): NO_RIG,
+        ("foot_stage", 0): NO_FOOT,
+        ("load_force", 0): {"Fx": symbol("F_1"), "Fz": symbol("F_3")},
+        ("load_moment", 0): {"My": symbol("M_2")},
+        ("unknowns", 0): {"theta": symbol("thetat_1"), "N": symbol("N_1")},
+        ("friction", 0): {"Y": symbol("Y_1")},
+    }
+    for name, reads, writes in unrolled(momentum_balances(spec.effects), spec.layout.surfaces):
+        aliases = [use.alias for use in p[name].inputs]
+        result = evaluate(p[name], **dict(zip(aliases, (found[place] for place in reads), strict=True)))
+        found |= dict.fromkeys(writes, result)  # each list takes the fields that it has
+    balances = found["balances", 1]
+    return {"E1": balances["Fx"], "E3": balances["Fz"], "t2": balances["My"], "dY": found["report_contact", 0]["dY"]}
 
 
 def readable(expression: sp.Expr) -> sp.Expr:

@@ -24,7 +24,9 @@ class Blocks:
     body: Block
     vector: Block
     moment: Block
+    wrench: Block
     local: Block
+    relative: Block
     friction: Block
     shear: Block
     stage: Block
@@ -38,7 +40,6 @@ class Blocks:
     rim: Block
     rim_coordinates: Block
     rim_wrench: Block
-    offset: Block
     gap: Block
     top_wrench: Block
     foot_before: Block
@@ -49,6 +50,7 @@ class Blocks:
     upright: Block
     linear: Block
     angular: Block
+    balances: Block
     arms: Block
     points: Block
     base_motion: Block
@@ -174,9 +176,16 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
     return {
         "vector": new("force").vector("F", "N", "force on the body above the interface", POLAR).build(),
         "moment": new("moment").vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL).build(),
+        "wrench": new("wrench")
+        .vector("F", "N", "force on the body above the interface", POLAR)
+        .vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL)
+        .build(),
         "local": new("local")
         .vector("p", "N", "contact force (normal and friction) in the basis of the body below", POLAR)
         .vector("dw", "rad/s", "omega'_above - omega'_below, same basis", AXIAL)
+        .build(),
+        "relative": new("relative")
+        .vector("dw", "rad/s", "omega'_above - omega'_below, basis of the body below", AXIAL)
         .build(),
         "friction": new("friction").scalar("Y", "-", "Y (3.18)").scalar("Z", "-", "Z (3.18)", 0).build(),
         "shear": new("shear")
@@ -269,10 +278,6 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         .vector("F", "N", "F_c on the body above, along E1, E2, E3", POLAR)
         .vector("T", "N m", "F_c x delta: moment on the slider about its sphere centre, beside that of the rim", AXIAL)
         .build(),
-        "offset": new("offset")
-        .vector("d", "m", "separation delta, basis of the body below", POLAR)
-        .vector("d1", "m/s", "rate of these components", POLAR)
-        .build(),
         "gap": new("gap").scalar("s", "m", "sliding displacement (3.20)").scalar("g", "m", "gap (3.21)").build(),
         "unilateral_depth": new("unilateral_depth")
         .scalar("depth", "m", "penetration; negative where the contact is open")
@@ -336,6 +341,10 @@ def _balances(new: Maker, uplift: bool) -> dict[str, Block]:
         .build(),
         "angular": new("angular")
         .vector("r", "N m", "(3.27), (3.29): left side less right side, along t_1, t_2, t_3", AXIAL)
+        .build(),
+        "balances": new("balances")
+        .vector("F", "N", "linear balance of a body, along E1, E2, E3", POLAR)
+        .vector("M", "N m", "angular balance, along t_1, t_2, t_3", AXIAL)
         .build(),
     }
 

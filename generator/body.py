@@ -183,6 +183,17 @@ def angular_balance(b: Blocks, massless: bool) -> Program:
     return p
 
 
+def balances(b: Blocks, spin_locked: bool) -> Program:
+    """All balances of a body. With locked spin, phi'' = 0 takes the place of the axial one, whose moment is unknown."""
+    p = Program("balances", "balances of a body (3.26)-(3.29); with locked spin phi'' in place of the axial one")
+    linear: Symbols = p.read(b.linear, "f")
+    angular: Symbols = p.read(b.angular, "m")
+    x: Symbols = p.read(b.coordinates, "x", active=("phi2",))
+    first, second, axial = angular["r"]
+    p.write(b.balances, {"F": linear["r"], "M": (first, second, x["phi2"] if spin_locked else axial)})
+    return p
+
+
 def rate_of_angular_momentum(p: Program, par: Symbols, body: Symbols) -> Vector:
     """J d omega'/dt + omega' x J omega' with J of (2.118), lambda_1 = lambda_2."""
     t3, wp, alp = body["t3"], body["wp"], body["alp"]
@@ -231,15 +242,6 @@ def to_world(b: Blocks) -> Program:
     return p
 
 
-def force_to_world(b: Blocks) -> Program:
-    """Force of an interface from the basis of the body below to E."""
-    p = Program("force_to_world", "force: from the basis of the body below to E")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
-    local: Symbols = p.read(b.vector, "loc")
-    p.write(b.vector, {"F": combine((body["t1"], body["t2"], body["t3"]), local["F"])})
-    return p
-
-
 def relative_turning(p: Program, above: Symbols, x: Symbols, lower: Symbols) -> Vector:
     """omega'_above - omega'_below in the basis of the body below: (3.12); `x`, `lower` are coordinates of the two."""
     sin_psi, cos_psi, sin_theta, cos_theta = above["sp"], above["cp"], above["st"], above["ct"]
@@ -251,6 +253,17 @@ def relative_turning(p: Program, above: Symbols, x: Symbols, lower: Symbols) -> 
 
 LEAST_FORCE = sp.Float("1e-6")
 """What a parted surface still carries [N], so that the direction of its force is defined (docs/uplift.md)."""
+
+
+def slip_rotation(b: Blocks) -> Program:
+    """Relative angular velocity at a surface in the basis of the body below it, from which the slip follows."""
+    p = Program("slip_rotation", "omega'_above - omega'_below in the basis of the body below (3.12), (3.19)")
+    above: Symbols = p.read(b.body, "a", active=("sp", "cp", "st", "ct"))
+    x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
+    lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
+    tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.relative.quantities else {}
+    p.write(b.relative, {"dw": relative_turning(p, above, x, lower), **tilt})
+    return p
 
 
 def to_local(b: Blocks, uplift: bool) -> Program:

@@ -17,7 +17,7 @@ from .blocks import Blocks
 from .functions import ArcTan2, Modulus
 from .hysteresis import Shear, friction_rates
 from .program import Program, Vector
-from .vectors import add, cross, dot, scale
+from .vectors import add, combine, cross, dot, project, scale
 
 Symbols = dict[str, Any]
 SPIN_SMOOTHING = sp.Float("0.01")
@@ -102,7 +102,7 @@ def report_contact(b: Blocks, friction_model: FrictionModel) -> Program:
     par: Symbols = p.read(b.surface_parameters, "par", active=False)
     x: Symbols = p.read(b.unknowns, "x")
     f: Symbols = p.read(b.friction, "f")
-    loc: Symbols = p.read(b.local, "loc", active=("dw",))
+    loc: Symbols = p.read(b.relative, "loc", active=("dw",))
     base = contact_basis(p, *(p.let(function(x[a])) for a in ("psi", "theta") for function in (sp.sin, sp.cos)))
     shear = Shear(f["Y"], f["Z"], (f["Y"], f["Z"]), par["td"], sp.Integer(1))
     signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
@@ -178,6 +178,40 @@ def gap(b: Blocks) -> Program:
     sine = p.let(norm(above["st"], p.let(above["sp"] * above["ct"])))
     s = p.let(par["R"] * ArcTan2(sine, p.let(above["cp"] * above["ct"])))
     p.write(b.gap, {"s": s, "g": par["sc"] - s}, tangents=False)
+    return p
+
+
+def report_wrench(b: Blocks, rims: bool) -> Program:
+    """Force and moment of a surface on the body above, of contact and rim, from the basis of the body below to E."""
+    p = Program("report_wrench", "wrench of contact and rim on the body above: from the basis of the body below to E")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
+    contact: Symbols = p.read(b.report_contact, "c", active=("p", "M"))
+    force, moment = contact["p"], contact["M"]
+    if rims:
+        rim_contact: Symbols = p.read(b.rim, "rim", active=("f", "M"))
+        force = p.let_vector(add(force, rim_contact["f"]), "F")
+        moment = p.let_vector(add(moment, rim_contact["M"]), "M")
+    basis = (body["t1"], body["t2"], body["t3"])
+    p.write(b.wrench, {"F": combine(basis, force), "M": combine(basis, moment)})
+    return p
+
+
+def rim_coordinates(b: Blocks) -> Program:
+    """What the gap of a rim depends on: the tilts of the body above, and with uplift the separation of the surface."""
+    p = Program("rim_coordinates", "coordinates on which the gap of a rim depends")
+    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3", "w"))
+    angles = ("psi", "theta", "psi1", "theta1")
+    separated = "d" in b.coordinates.quantities
+    x: Symbols = p.read(b.coordinates, "x", active=(*angles, "d", "d1") if separated else angles)
+    values = {name: x[name] for name in angles}
+    if separated:
+        basis = (body["t1"], body["t2"], body["t3"])
+        for axis in basis:
+            p.declare_rates(axis, p.let_vector(cross(body["w"], axis), "dt"))  # (2.36)
+        p.declare_rates(x["d"], x["d1"])
+        along = p.let_vector(project(basis, x["d"]), "d")
+        values |= {"d": along, "d1": p.rate_vector(along)}
+    p.write(b.rim_coordinates, values)
     return p
 
 

@@ -60,12 +60,14 @@ def derive(spec: ModelSpec) -> Equations:
         body.named_points(blocks),
         body.to_local(blocks, effects.uplift),
         contact.contact(blocks, law),
+        body.slip_rotation(blocks),
         contact.report_contact(blocks, law),
+        contact.report_wrench(blocks, effects.rims),
         body.to_world(blocks),
-        body.force_to_world(blocks),
         body.interface_force(blocks, massless),
         body.linear_balance(blocks, massless),
         body.angular_balance(blocks, massless),
+        body.balances(blocks, effects.spin == "locked"),
         body.body_energy(blocks, massless),
         top.top_wrench(blocks, effects.top_rotation),
         top.spring_stage(blocks),
@@ -81,10 +83,10 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.permits_quasistatic_steps:
         programs += [slip.slid_friction(blocks, effects.bouc_wen), slip.slip_work(blocks, effects.bouc_wen)]
     if effects.rims:
-        programs.append(contact.rim(blocks))
+        programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:
         programs += [seat.seat_depth(blocks), seat.seat_inside(blocks), seat.seat_edge(blocks)]
-        programs += [seat.offset(blocks), seat.rim_to_world(blocks)]
+        programs.append(seat.rim_to_world(blocks))
         return Equations(spec, blocks, tuple(programs))
     column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
     programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))

@@ -14,6 +14,7 @@ from msfp_gen.version import __version__
 
 from .checks import checks_context
 from .derive import Equations
+from .drivers import schedule_context, scheduled_kernels
 from .gradients import COLUMNS, contact_lists
 from .header import environment, word_enums
 from .heat import HEAT_KERNEL
@@ -29,6 +30,7 @@ FILES = (
     "msfp_symbols.h",
     "msfp_model.h",
     "msfp_kernels.h",
+    "msfp_schedule.h",
     "msfp_fields.h",
     "msfp_checks.h",
     "msfp_module.pyx",
@@ -268,6 +270,8 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
         **interface_context(spec, shape_of(spec)),
         "checks": checks_context(spec),
+        "scheduled": [function(k) for k in scheduled_kernels(equations)],
+        "schedule": schedule_context(equations),
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}

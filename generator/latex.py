@@ -86,6 +86,8 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "moment": {"M": r"M_{@,#}"},
     "rim_force": {"F": r"F_{c@,#}"},
     "local_moment": {"M": r"M_{@,#}"},
+    "relative": {"dw": r"\Delta\omega'_{@,#}"},
+    "wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
     "local": {"p": r"p_{@,#}", "dw": r"\Delta\omega'_{@,#}"},
     "friction": {"Y": r"Y_{@}", "Z": r"Z_{@}"},
     "shear": {"Y": r"g_{1@}", "Z": r"g_{2@}"},
@@ -153,7 +155,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "angular": {"r": r"\eta_{@,#}"},
 }
 # Kinds with components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
-LOCAL_KINDS = {"local", "local_moment", "rim_force", "contact", "report_contact", "rim", "angular"}
+LOCAL_KINDS = {"local", "relative", "local_moment", "rim_force", "contact", "report_contact", "rim", "angular"}
 
 # Program -> alias of an argument -> number of its body or surface.
 PLACES: dict[str, dict[str, str]] = {
@@ -171,9 +173,11 @@ PLACES: dict[str, dict[str, str]] = {
         "rim": r"\gamma",
         "out": r"\gamma",
     },
+    "slip_rotation": {"a": r"\gamma+1", "x": r"\gamma+1", "y": r"\gamma", "out": r"\gamma"},
     "contact": {"par": r"\gamma", "h": r"\gamma", "loc": r"\gamma", "g": r"\gamma", "out": r"\gamma"},
     "moment_to_world": {"b": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "report_contact": {"par": r"\gamma", "x": r"\gamma", "f": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
+    "report_wrench": {"b": r"\gamma", "c": r"\gamma", "rim": r"\gamma", "out": r"\gamma"},
     "spring_stage": {"par": "T", "f": "T", "out": "T"},
     "resting_foot": {"par": "T", "b": "n", "out": "T"},
     "foot": {"par": "T", "b": "n", "y": "T", "out": "T"},

@@ -30,6 +30,7 @@ COEFFICIENT_FIELDS = [
     Field("rise", "K", "temperature rise since the start, without the contribution of the flux of this stage"),
     Field("warming", "s^1/2", "contribution of that flux, per unit of flux; 0 where the temperature is given"),
 ]
+TILT_FIELD = Field("tilt", "-", "cosine of the angle between the axes of the two bodies")
 FLUX_FIELD = Field("flux", "K/s^1/2", "sqrt(D/pi)/k times the heat flux mu p v where the patch covers the centre")
 
 
@@ -61,7 +62,8 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
     heat = [FLUX_FIELD, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
     return replace(
         b,
-        local=with_fields(b.local, [Field("tilt", "-", "cosine of the angle between the axes of the two bodies")]),
+        local=with_fields(b.local, [TILT_FIELD]),
+        relative=with_fields(b.relative, [TILT_FIELD]),
         contact=with_fields(contact, heat),
         report_contact=with_fields(b.report_contact, [FLUX_FIELD]),
     )

@@ -17,7 +17,7 @@ import sympy as sp
 from .blocks import Blocks
 from .functions import Select, Step
 from .program import Program, Vector
-from .vectors import add, combine, cross, dot, project, scale
+from .vectors import add, combine, cross, dot, scale
 
 Symbols = dict[str, Any]
 
@@ -101,20 +101,6 @@ def seat_edge(b: Blocks) -> Program:
     depth = p.let(edge, "depth")
     normal = p.let_vector(add(scale(par["ca"], axis), scale(p.let(par["sa"] / size), across)), "n")
     return _write_force(p, b, par, depth, normal, s)
-
-
-def offset(b: Blocks) -> Program:
-    """Separation of a surface and its rate in the basis of the body below, on which the gap of its rim depends."""
-    p = Program("offset", "separation of the sphere centres in the basis of the body below")
-    body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3", "w"))
-    x: Symbols = p.read(b.coordinates, "x", active=("d", "d1"))
-    basis = (body["t1"], body["t2"], body["t3"])
-    for axis in basis:
-        p.declare_rates(axis, p.let_vector(cross(body["w"], axis), "dt"))  # (2.36)
-    p.declare_rates(x["d"], x["d1"])
-    along = p.let_vector(project(basis, x["d"]), "d")
-    p.write(b.offset, {"d": along, "d1": p.rate_vector(along)})
-    return p
 
 
 def rim_to_world(b: Blocks) -> Program:

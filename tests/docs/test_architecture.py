@@ -213,7 +213,7 @@ def test_every_package_is_on_the_map():
 LAYERS = ("equations", "steppers", "run", "port", "api")
 GRADIENTS = ("gradients", {"run.h", "gradients.h", "msfp_gradient_kernels.h"})  # beside `api`, of some models
 RUNTIME = ROOT / "msfp_gen" / "runtime"
-GENERATED = {"msfp_model.h", "msfp_kernels.h"}
+GENERATED = {"msfp_model.h", "msfp_kernels.h", "msfp_schedule.h"}
 OF_THE_TABLE = {"msfp_fields.h", "msfp_checks.h"}  # what the table of functions states about the model, and checks
 SOURCES = sorted(RUNTIME.rglob("*.[ch]"))
 
@@ -242,7 +242,7 @@ def test_names_of_runtime_files_are_unique():
 
 def test_headers_of_the_runtime_define_only_prefixed_macros():
     headers = [*RUNTIME.rglob("*.h"), *(ROOT / "templates").glob("*.h.jinja")]
-    assert len(headers) == 17
+    assert len(headers) == 18
     for path in headers:
         text = path.read_text(encoding="utf-8").replace("{{ name | upper }}", "MSFP_N_M_P")
         macros = re.findall(r"^\s*#\s*define\s+(\w+)", text, flags=re.MULTILINE)

@@ -41,16 +41,21 @@ static inline int msfp_unknown_field(int order, int i)
 
 /* The inertial frame at r_01 as the block of a body, the parent of body 0. */
 void msfp_inertial_frame(const msfp_point *at, double *body);
+/* The blocks of coordinates of all bodies. */
+void msfp_load_coordinates(const msfp_point *at, msfp_work *w);
 /* Kinematics of body 0. */
 void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Kinematics of the moving bodies; body 0 is in `w`. */
 void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* The same with columns; those of the coordinates and of body 0 are in `w`. */
-void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Force and moment above the top plate: loads, springs, dampers, the supported mass. */
 void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* The same with columns. dload: columns of the load [6][MSFP_DOF], or NULL. */
-void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload);
+/* The same with columns, at a given load. */
+void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
+/* What acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
+void msfp_load_top(const msfp_parameters *p, const msfp_point *at, double *force, double *moment,
+                   double *stage MSFP_IF_TOP_ROTATION(double *upright));
+/* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
+void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w);
 /* Whether a vertical spring or damper acts on the top plate. */
 int msfp_top_is_sprung(const msfp_parameters *p);
 /* The mass that rests on it [kg]; 0 for that of a rig. */
@@ -92,8 +97,6 @@ void msfp_split_moment_tangent(msfp_work *w, int j);
 
 /* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
-/* Columns of that force and of its moment, from the Jacobian. */
-void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment);
 /* Rim forces of all surfaces, with their Jacobians for the tangent, or NULL. */
 void msfp_rims(const msfp_parameters *p, msfp_work *w, msfp_surface_jacobians *jacobians);
 /* Moment of surface j on the body above, in the basis of the body below [N m]. */

@@ -117,6 +117,13 @@ static void load_coordinates(double *x, const double *q, const double *v, const 
 #endif
 }
 
+void msfp_load_coordinates(const msfp_point *at, msfp_work *w)
+{
+    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
+    for (int k = 1; k <= NB; ++k)
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
+}
+
 void msfp_inertial_frame(const msfp_point *at, double *body)
 {
     static const double e[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
@@ -143,20 +150,6 @@ MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, m
         load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
         msfp_forward(p->body[k], w->body[k - 1], w->x[k], w->body[k]);
     }
-}
-
-MSFP_WIDE void msfp_kinematics_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
-{
-    for (int k = 1; k <= NB; ++k) {
-        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
-        msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
-    }
-}
-
-static void load_top(const msfp_point *at, double *force, double *moment)
-{
-    msfp_force_F_put(force, at->load);
-    msfp_moment_M_put(moment, at->load + 3);
 }
 
 #if MSFP_TOP_ROTATION
@@ -218,8 +211,18 @@ void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *sta
         memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
 }
 
-/* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
-static void move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
+void msfp_load_top(const msfp_parameters *p, const msfp_point *at, double *force, double *moment,
+                   double *stage MSFP_IF_TOP_ROTATION(double *upright))
+{
+    msfp_force_F_put(force, at->load);
+    msfp_moment_M_put(moment, at->load + 3);
+    msfp_foot_stage(p, at, stage);
+#if MSFP_TOP_ROTATION
+    msfp_support_axis(at, upright);
+#endif
+}
+
+void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
 {
     const double *plate = w->body[NB];
     if (msfp_top_is_sprung(p)) {
@@ -248,32 +251,27 @@ static void split_wrench(const double *wrench, double *force, double *moment)
 MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
     double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE];
-    load_top(at, force, moment);
-    msfp_foot_stage(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
-    msfp_support_axis(at, upright);
 #endif
+    msfp_load_top(p, at, force, moment, stage MSFP_IF_TOP_ROTATION(upright));
     msfp_top_wrench(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
-    move_foot(p, stage, w);
+    msfp_move_foot(p, stage, w);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
-MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w, const double *dload)
+MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
 {
-    static const double zero[6 * DOF];
+    static const double constant[MSFP_TOP_WRENCH_SIZE * DOF]; /* columns of a load that does not move */
     double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE],
         dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
-    load_top(at, force, moment);
-    msfp_foot_stage(p, at, stage);
 #if MSFP_TOP_ROTATION
     double upright[MSFP_UPRIGHT_SIZE];
-    msfp_support_axis(at, upright);
 #endif
-    const double *df = dload ? dload : zero, *dm = dload ? dload + FORCE * DOF : zero;
+    msfp_load_top(p, at, force, moment, stage MSFP_IF_TOP_ROTATION(upright));
     msfp_top_wrench_tangent(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright),
-                            wrench, w->dbody[NB], w->dx[NB], df, dm, dwrench);
+                            wrench, w->dbody[NB], w->dx[NB], constant, constant, dwrench);
     split_wrench(wrench, w->force[NB], w->moment[NB]);
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
     memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);

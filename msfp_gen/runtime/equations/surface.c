@@ -5,17 +5,6 @@
 #include "msfp_kernels.h"
 
 #if MSFP_RIMS
-/* Inputs of the rim of surface j. */
-static void rim_coordinates(const msfp_work *w, int j, double *x)
-{
-    for (int order = 0; order < 2; ++order)
-        for (int i = 0; i < PAIR; ++i)
-            x[order * PAIR + i] = w->x[j + 1][msfp_coordinate_field(order, i)];
-#if MSFP_UPLIFT
-    msfp_offset(w->body[j], w->x[j + 1], x + 2 * PAIR);
-#endif
-}
-
 /* Whether the rim of surface j needs no evaluation: comparing cosines of the tilt avoids an arc cosine. With uplift the
  * gap follows from the separation too. */
 static int rim_is_clear(const msfp_parameters *p, const msfp_work *w, int j)
@@ -34,7 +23,7 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
     if (rim_is_clear(p, w, j))
         return;
     double x[MSFP_RIM_LOCAL], out[MSFP_RIM_SIZE];
-    rim_coordinates(w, j, x);
+    msfp_rim_coordinates(w->body[j], w->x[j + 1], x);
     if (drim) {
         double seed[MSFP_RIM_LOCAL * MSFP_RIM_LOCAL] = { 0 };
         for (int i = 0; i < MSFP_RIM_LOCAL; ++i)
@@ -67,36 +56,6 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
         body[MSFP_BODY_ST] = msfp_sin(q[j][1]);
         body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
         msfp_gap(p->surface[j], body, sliding[j]);
-    }
-}
-
-/* Columns of input i of the rim of surface j; offset: columns of its separation. */
-static const double *rim_columns(const msfp_work *w, int j, const double *offset, int i)
-{
-    if (i >= 2 * PAIR)
-        return offset + (i - 2 * PAIR) * DOF;
-    return w->dx[j + 1] + msfp_coordinate_field(i / PAIR, i % PAIR) * DOF;
-}
-
-void msfp_rim_force_tangent(const msfp_work *w, int j, const double *drim, double *dforce, double *dmoment)
-{
-    memset(dforce, 0, FORCE * DOF * sizeof *dforce);
-    memset(dmoment, 0, MOMENT * DOF * sizeof *dmoment);
-    if (!w->rim_active[j])
-        return;
-    double offset[MSFP_OFFSET_SIZE * DOF];
-#if MSFP_UPLIFT
-    double value[MSFP_OFFSET_SIZE];
-    msfp_offset_tangent(w->body[j], w->x[j + 1], value, w->dbody[j], w->dx[j + 1], offset);
-#endif
-    for (int i = 0; i < MSFP_RIM_LOCAL; ++i) {
-        const double *dx = rim_columns(w, j, offset, i);
-        for (int r = 0; r < FORCE + MOMENT; ++r) {
-            double *to = r < FORCE ? dforce + r * DOF : dmoment + (r - FORCE) * DOF;
-            const double factor = drim[r * MSFP_RIM_LOCAL + i];
-            for (int c = 0; c < DOF; ++c)
-                to[c] += factor * dx[c];
-        }
     }
 }
 

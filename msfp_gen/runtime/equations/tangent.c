@@ -102,7 +102,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_point *at, const msfp_
     add_variation(w->dbody[NB] + MSFP_BODY_ALPX * DOF, NB, variation, VARIATION_WP + MOMENT, MOMENT);
     w->dx[NB][MSFP_COORDINATES_PHI * DOF + DOF - 1] = seed->cq;
 #endif
-    msfp_top_tangent(p, at, w, NULL);
+    msfp_top_tangent(p, at, w);
     msfp_transported_wrench_tangent(w->body[NB], no_twist, w->force[NB], w->moment[NB], wrench, c->twist, w->dforce[NB],
                                     w->dmoment[NB], dwrench);
     memcpy(c->above, dwrench, sizeof c->above);

@@ -25,6 +25,28 @@ typedef struct {
     double force[NB][FORCE * DOF], moment[NB][MOMENT * DOF];
 } rim_columns;
 
+/* Those of surface j, from the Jacobian of its rim. */
+static void rim(const msfp_work *w, int j, rim_columns *rims)
+{
+    memset(rims->force[j], 0, sizeof rims->force[j]);
+    memset(rims->moment[j], 0, sizeof rims->moment[j]);
+#if MSFP_RIMS
+    double x[MSFP_RIM_LOCAL], dx[MSFP_RIM_LOCAL * DOF];
+    if (!w->rim_active[j])
+        return;
+    msfp_rim_coordinates_tangent(w->body[j], w->x[j + 1], x, w->dbody[j], w->dx[j + 1], dx);
+    for (int i = 0; i < MSFP_RIM_LOCAL; ++i)
+        for (int r = 0; r < FORCE + MOMENT; ++r) {
+            double *to = r < FORCE ? rims->force[j] + r * DOF : rims->moment[j] + (r - FORCE) * DOF;
+            const double factor = w->jacobians.rim[j][r * MSFP_RIM_LOCAL + i];
+            for (int c = 0; c < DOF; ++c)
+                to[c] += factor * dx[i * DOF + c];
+        }
+#else
+    (void)w;
+#endif
+}
+
 /* Columns of the forces of the surfaces, and of the linear balances. The kernels are linear in forces, whose values
  * therefore do not enter. */
 static void forces(const msfp_parameters *p, msfp_work *w, const rim_columns *rims, double *tangent)
@@ -69,7 +91,7 @@ static void descend(const msfp_parameters *p, msfp_work *w, double *tangent)
     double out[MSFP_ANGULAR_SIZE], dout[MSFP_ANGULAR_SIZE * DOF];
     rim_columns rims;
     for (int j = 0; j < NB; ++j)
-        msfp_rim_force_tangent(w, j, w->jacobians.rim[j], rims.force[j], rims.moment[j]);
+        rim(w, j, &rims);
     forces(p, w, &rims, tangent);
     for (int j = 0; j < NB; ++j)
         surface(w, &w->jacobians, &rims, j);
@@ -95,8 +117,9 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
                             double *tangent)
 {
     seed_columns(w, seed);
-    msfp_kinematics_tangent(p, at, w);
-    msfp_top_tangent(p, at, w, NULL);
+    for (int k = 1; k <= NB; ++k)
+        msfp_forward_tangent(p->body[k], w->body[k - 1], w->x[k], w->body[k], w->dbody[k - 1], w->dx[k], w->dbody[k]);
+    msfp_top_tangent(p, at, w);
     descend(p, w, tangent);
 }
 #endif

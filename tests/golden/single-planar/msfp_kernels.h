@@ -541,10 +541,36 @@ static inline void msfp_surface_local_tangent(const double *restrict b, const do
     }
 }
 
+/* omega'_above - omega'_below in the basis of the body below (3.12), (3.19).
+ * 0 operations; out: relative. */
+MSFP_INLINED
+static inline void msfp_slip_rotation(const double *restrict a /* body */, const double *restrict x /* coordinates */, const double *restrict y /* coordinates */, double *restrict out)
+{
+    (void)a;
+    const double x_theta1 = x[1];
+    (void)y;
+    out[0] = x_theta1; /* dwy */
+}
+
+MSFP_INLINED
+static inline void msfp_slip_rotation_tangent(const double *restrict a, const double *restrict x, const double *restrict y, double *restrict out, const double *restrict da, const double *restrict dx, const double *restrict dy, double *restrict dout)
+{
+    (void)a;
+    (void)da;
+    const double x_theta1 = x[1];
+    (void)y;
+    (void)dy;
+    out[0] = x_theta1; /* dwy */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_x_theta1 = dx[1 * MSFP_DOF + c];
+        dout[0 * MSFP_DOF + c] = d_x_theta1;
+    }
+}
+
 /* contact force and moment at given psi~, theta~, N: (3.13)-(3.19).
  * 25 operations; out: report_contact. */
 MSFP_INLINED
-static inline void msfp_report_contact(const double *restrict par /* surface_parameters */, const double *restrict x /* unknowns */, const double *restrict f /* friction */, const double *restrict loc /* local */, double *restrict out)
+static inline void msfp_report_contact(const double *restrict par /* surface_parameters */, const double *restrict x /* unknowns */, const double *restrict f /* friction */, const double *restrict loc /* relative */, double *restrict out)
 {
     const double par_sign = par[0];
     const double par_R = par[1];
@@ -554,7 +580,7 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double x_theta = x[0];
     const double x_N = x[1];
     const double f_Y = f[0];
-    const double loc_dwy = loc[2];
+    const double loc_dwy = loc[0];
     const double s_1 = msfp_sin(x_theta);
     const double s_2 = msfp_cos(x_theta);
     const double s_3 = par_R*par_sign;
@@ -587,7 +613,7 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double x_theta = x[0];
     const double x_N = x[1];
     const double f_Y = f[0];
-    const double loc_dwy = loc[2];
+    const double loc_dwy = loc[0];
     const double s_1 = msfp_sin(x_theta);
     const double s_2 = msfp_cos(x_theta);
     const double s_3 = par_R*par_sign;
@@ -615,7 +641,7 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
         const double d_x_theta = dx[0 * MSFP_DOF + c];
         const double d_x_N = dx[1 * MSFP_DOF + c];
         const double d_f_Y = df[0 * MSFP_DOF + c];
-        const double d_loc_dwy = dloc[2 * MSFP_DOF + c];
+        const double d_loc_dwy = dloc[0 * MSFP_DOF + c];
         const double d_s_1 = s_2*d_x_theta;
         const double d_s_2 = -s_1*d_x_theta;
         const double d_u_4 = -s_3*d_loc_dwy;
@@ -633,6 +659,74 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
         dout[1 * MSFP_DOF + c] = d_out_20;
         dout[2 * MSFP_DOF + c] = d_s_16;
         dout[3 * MSFP_DOF + c] = d_dY_12;
+    }
+}
+
+/* wrench of contact and rim on the body above: from the basis of the body below to E.
+ * 9 operations; out: wrench. */
+MSFP_INLINED
+static inline void msfp_report_wrench(const double *restrict b /* body */, const double *restrict c /* report_contact */, const double *restrict rim /* rim */, double *restrict out)
+{
+    const double b_t1x = b[0];
+    const double b_t1z = b[1];
+    const double b_t3x = b[2];
+    const double b_t3z = b[3];
+    const double c_px = c[0];
+    const double c_pz = c[1];
+    const double c_My = c[2];
+    const double rim_fx = rim[0];
+    const double rim_fz = rim[1];
+    const double rim_My = rim[2];
+    const double Fx_1 = c_px + rim_fx;
+    const double Fz_2 = c_pz + rim_fz;
+    const double My_3 = c_My + rim_My;
+    const double out_4 = Fx_1*b_t1x + Fz_2*b_t3x;
+    const double out_5 = Fx_1*b_t1z + Fz_2*b_t3z;
+    out[0] = out_4; /* Fx */
+    out[1] = out_5; /* Fz */
+    out[2] = My_3; /* My */
+}
+
+MSFP_INLINED
+static inline void msfp_report_wrench_tangent(const double *restrict b, const double *restrict c, const double *restrict rim, double *restrict out, const double *restrict db, const double *restrict dc, const double *restrict drim, double *restrict dout)
+{
+    const double b_t1x = b[0];
+    const double b_t1z = b[1];
+    const double b_t3x = b[2];
+    const double b_t3z = b[3];
+    const double c_px = c[0];
+    const double c_pz = c[1];
+    const double c_My = c[2];
+    const double rim_fx = rim[0];
+    const double rim_fz = rim[1];
+    const double rim_My = rim[2];
+    const double Fx_1 = c_px + rim_fx;
+    const double Fz_2 = c_pz + rim_fz;
+    const double My_3 = c_My + rim_My;
+    const double out_4 = Fx_1*b_t1x + Fz_2*b_t3x;
+    const double out_5 = Fx_1*b_t1z + Fz_2*b_t3z;
+    out[0] = out_4; /* Fx */
+    out[1] = out_5; /* Fz */
+    out[2] = My_3; /* My */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_b_t1x = db[0 * MSFP_DOF + c];
+        const double d_b_t1z = db[1 * MSFP_DOF + c];
+        const double d_b_t3x = db[2 * MSFP_DOF + c];
+        const double d_b_t3z = db[3 * MSFP_DOF + c];
+        const double d_c_px = dc[0 * MSFP_DOF + c];
+        const double d_c_pz = dc[1 * MSFP_DOF + c];
+        const double d_c_My = dc[2 * MSFP_DOF + c];
+        const double d_rim_fx = drim[0 * MSFP_DOF + c];
+        const double d_rim_fz = drim[1 * MSFP_DOF + c];
+        const double d_rim_My = drim[2 * MSFP_DOF + c];
+        const double d_Fx_1 = d_c_px + d_rim_fx;
+        const double d_Fz_2 = d_c_pz + d_rim_fz;
+        const double d_My_3 = d_c_My + d_rim_My;
+        const double d_out_4 = b_t1x*d_Fx_1 + b_t3x*d_Fz_2 + Fx_1*d_b_t1x + Fz_2*d_b_t3x;
+        const double d_out_5 = b_t1z*d_Fx_1 + b_t3z*d_Fz_2 + Fx_1*d_b_t1z + Fz_2*d_b_t3z;
+        dout[0 * MSFP_DOF + c] = d_out_4;
+        dout[1 * MSFP_DOF + c] = d_out_5;
+        dout[2 * MSFP_DOF + c] = d_My_3;
     }
 }
 
@@ -656,50 +750,6 @@ static inline void msfp_moment_to_world_tangent(const double *restrict b, const 
     for (int c = 0; c < MSFP_DOF; ++c) {
         const double d_loc_My = dloc[0 * MSFP_DOF + c];
         dout[0 * MSFP_DOF + c] = d_loc_My;
-    }
-}
-
-/* force: from the basis of the body below to E.
- * 6 operations; out: force. */
-MSFP_INLINED
-static inline void msfp_force_to_world(const double *restrict b /* body */, const double *restrict loc /* force */, double *restrict out)
-{
-    const double b_t1x = b[0];
-    const double b_t1z = b[1];
-    const double b_t3x = b[2];
-    const double b_t3z = b[3];
-    const double loc_Fx = loc[0];
-    const double loc_Fz = loc[1];
-    const double out_1 = b_t1x*loc_Fx + b_t3x*loc_Fz;
-    const double out_2 = b_t1z*loc_Fx + b_t3z*loc_Fz;
-    out[0] = out_1; /* Fx */
-    out[1] = out_2; /* Fz */
-}
-
-MSFP_INLINED
-static inline void msfp_force_to_world_tangent(const double *restrict b, const double *restrict loc, double *restrict out, const double *restrict db, const double *restrict dloc, double *restrict dout)
-{
-    const double b_t1x = b[0];
-    const double b_t1z = b[1];
-    const double b_t3x = b[2];
-    const double b_t3z = b[3];
-    const double loc_Fx = loc[0];
-    const double loc_Fz = loc[1];
-    const double out_1 = b_t1x*loc_Fx + b_t3x*loc_Fz;
-    const double out_2 = b_t1z*loc_Fx + b_t3z*loc_Fz;
-    out[0] = out_1; /* Fx */
-    out[1] = out_2; /* Fz */
-    for (int c = 0; c < MSFP_DOF; ++c) {
-        const double d_b_t1x = db[0 * MSFP_DOF + c];
-        const double d_b_t1z = db[1 * MSFP_DOF + c];
-        const double d_b_t3x = db[2 * MSFP_DOF + c];
-        const double d_b_t3z = db[3 * MSFP_DOF + c];
-        const double d_loc_Fx = dloc[0 * MSFP_DOF + c];
-        const double d_loc_Fz = dloc[1 * MSFP_DOF + c];
-        const double d_out_1 = loc_Fx*d_b_t1x + loc_Fz*d_b_t3x + b_t1x*d_loc_Fx + b_t3x*d_loc_Fz;
-        const double d_out_2 = loc_Fx*d_b_t1z + loc_Fz*d_b_t3z + b_t1z*d_loc_Fx + b_t3z*d_loc_Fz;
-        dout[0 * MSFP_DOF + c] = d_out_1;
-        dout[1 * MSFP_DOF + c] = d_out_2;
     }
 }
 
@@ -866,6 +916,41 @@ static inline void msfp_angular_balance_tangent(const double *restrict par, cons
         const double d_hdoty_7 = par_jt*d_b_alpy;
         const double d_ry_8 = -gz_3*d_b_t3x + gx_2*d_b_t3z + b_t3z*d_gx_2 - b_t3x*d_gz_3 + d_hdoty_7 - d_ml_My + d_mu_My;
         dout[0 * MSFP_DOF + c] = d_ry_8;
+    }
+}
+
+/* balances of a body (3.26)-(3.29); with locked spin phi'' in place of the axial one.
+ * 0 operations; out: balances. */
+MSFP_INLINED
+static inline void msfp_balances(const double *restrict f /* linear */, const double *restrict m /* angular */, const double *restrict x /* coordinates */, double *restrict out)
+{
+    const double f_rx = f[0];
+    const double f_rz = f[1];
+    const double m_ry = m[0];
+    (void)x;
+    out[0] = f_rx; /* Fx */
+    out[1] = f_rz; /* Fz */
+    out[2] = m_ry; /* My */
+}
+
+MSFP_INLINED
+static inline void msfp_balances_tangent(const double *restrict f, const double *restrict m, const double *restrict x, double *restrict out, const double *restrict df, const double *restrict dm, const double *restrict dx, double *restrict dout)
+{
+    const double f_rx = f[0];
+    const double f_rz = f[1];
+    const double m_ry = m[0];
+    (void)x;
+    (void)dx;
+    out[0] = f_rx; /* Fx */
+    out[1] = f_rz; /* Fz */
+    out[2] = m_ry; /* My */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_f_rx = df[0 * MSFP_DOF + c];
+        const double d_f_rz = df[1 * MSFP_DOF + c];
+        const double d_m_ry = dm[0 * MSFP_DOF + c];
+        dout[0 * MSFP_DOF + c] = d_f_rx;
+        dout[1 * MSFP_DOF + c] = d_f_rz;
+        dout[2 * MSFP_DOF + c] = d_m_ry;
     }
 }
 
@@ -1403,6 +1488,35 @@ static inline void msfp_rotation_angles(const double *restrict t /* turn */, dou
     out[6] = rate_49; /* psi2 */
     out[7] = rate_51; /* theta2 */
     out[8] = rate_54; /* phi2 */
+}
+
+/* coordinates on which the gap of a rim depends.
+ * 0 operations; out: rim_coordinates. */
+MSFP_INLINED
+static inline void msfp_rim_coordinates(const double *restrict b /* body */, const double *restrict x /* coordinates */, double *restrict out)
+{
+    (void)b;
+    const double x_theta = x[0];
+    const double x_theta1 = x[1];
+    out[0] = x_theta; /* theta */
+    out[1] = x_theta1; /* theta1 */
+}
+
+MSFP_INLINED
+static inline void msfp_rim_coordinates_tangent(const double *restrict b, const double *restrict x, double *restrict out, const double *restrict db, const double *restrict dx, double *restrict dout)
+{
+    (void)b;
+    (void)db;
+    const double x_theta = x[0];
+    const double x_theta1 = x[1];
+    out[0] = x_theta; /* theta */
+    out[1] = x_theta1; /* theta1 */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_x_theta = dx[0 * MSFP_DOF + c];
+        const double d_x_theta1 = dx[1 * MSFP_DOF + c];
+        dout[0 * MSFP_DOF + c] = d_x_theta;
+        dout[1 * MSFP_DOF + c] = d_x_theta1;
+    }
 }
 
 /* rim contact (3.20)-(3.25); applied only while the force is compressive.

@@ -538,6 +538,35 @@ static inline void msfp_moment_M_put(double *block, const double vector[3])
     block[0] = vector[1];
 }
 
+/* wrench */
+enum {
+    MSFP_WRENCH_FX = 0, /* [N] force on the body above the interface */
+    MSFP_WRENCH_FZ = 1, /* [N] force on the body above the interface */
+    MSFP_WRENCH_MY = 2, /* [N m] moment on the body above, about the sphere centre */
+    MSFP_WRENCH_SIZE = 3
+};
+static inline void msfp_wrench_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = 0.0;
+    vector[2] = block[1];
+}
+static inline void msfp_wrench_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[2];
+}
+static inline void msfp_wrench_M_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[2];
+    vector[2] = 0.0;
+}
+static inline void msfp_wrench_M_put(double *block, const double vector[3])
+{
+    block[2] = vector[1];
+}
+
 /* local */
 enum {
     MSFP_LOCAL_PX = 0, /* [N] contact force (normal and friction) in the basis of the body below */
@@ -565,6 +594,22 @@ static inline void msfp_local_dw_get(const double *block, double vector[3])
 static inline void msfp_local_dw_put(double *block, const double vector[3])
 {
     block[2] = vector[1];
+}
+
+/* relative */
+enum {
+    MSFP_RELATIVE_DWY = 0, /* [rad/s] omega'_above - omega'_below, basis of the body below */
+    MSFP_RELATIVE_SIZE = 1
+};
+static inline void msfp_relative_dw_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[0];
+    vector[2] = 0.0;
+}
+static inline void msfp_relative_dw_put(double *block, const double vector[3])
+{
+    block[0] = vector[1];
 }
 
 /* friction */
@@ -940,37 +985,6 @@ static inline void msfp_rim_wrench_T_put(double *block, const double vector[3])
     block[2] = vector[1];
 }
 
-/* offset */
-enum {
-    MSFP_OFFSET_DX = 0, /* [m] separation delta, basis of the body below */
-    MSFP_OFFSET_DZ = 1, /* [m] separation delta, basis of the body below */
-    MSFP_OFFSET_D1X = 2, /* [m/s] rate of these components */
-    MSFP_OFFSET_D1Z = 3, /* [m/s] rate of these components */
-    MSFP_OFFSET_SIZE = 4
-};
-static inline void msfp_offset_d_get(const double *block, double vector[3])
-{
-    vector[0] = block[0];
-    vector[1] = 0.0;
-    vector[2] = block[1];
-}
-static inline void msfp_offset_d_put(double *block, const double vector[3])
-{
-    block[0] = vector[0];
-    block[1] = vector[2];
-}
-static inline void msfp_offset_d1_get(const double *block, double vector[3])
-{
-    vector[0] = block[2];
-    vector[1] = 0.0;
-    vector[2] = block[3];
-}
-static inline void msfp_offset_d1_put(double *block, const double vector[3])
-{
-    block[2] = vector[0];
-    block[3] = vector[2];
-}
-
 /* gap */
 enum {
     MSFP_GAP_S = 0, /* [m] sliding displacement (3.20) */
@@ -1186,6 +1200,35 @@ static inline void msfp_angular_r_get(const double *block, double vector[3])
 static inline void msfp_angular_r_put(double *block, const double vector[3])
 {
     block[0] = vector[1];
+}
+
+/* balances */
+enum {
+    MSFP_BALANCES_FX = 0, /* [N] linear balance of a body, along E1, E2, E3 */
+    MSFP_BALANCES_FZ = 1, /* [N] linear balance of a body, along E1, E2, E3 */
+    MSFP_BALANCES_MY = 2, /* [N m] angular balance, along t_1, t_2, t_3 */
+    MSFP_BALANCES_SIZE = 3
+};
+static inline void msfp_balances_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = 0.0;
+    vector[2] = block[1];
+}
+static inline void msfp_balances_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[2];
+}
+static inline void msfp_balances_M_get(const double *block, double vector[3])
+{
+    vector[0] = 0.0;
+    vector[1] = block[2];
+    vector[2] = 0.0;
+}
+static inline void msfp_balances_M_put(double *block, const double vector[3])
+{
+    block[2] = vector[1];
 }
 
 /* arms */

@@ -1337,10 +1337,72 @@ static inline void msfp_surface_local_tangent(const double *restrict b, const do
     }
 }
 
+/* omega'_above - omega'_below in the basis of the body below (3.12), (3.19).
+ * 12 operations; out: relative. */
+MSFP_INLINED
+static inline void msfp_slip_rotation(const double *restrict a /* body */, const double *restrict x /* coordinates */, const double *restrict y /* coordinates */, double *restrict out)
+{
+    const double a_sp = a[39];
+    const double a_cp = a[40];
+    const double a_st = a[41];
+    const double a_ct = a[42];
+    const double x_psi1 = x[3];
+    const double x_theta1 = x[4];
+    const double x_phi1 = x[5];
+    const double y_phi1 = y[5];
+    const double s_1 = -a_ct*a_sp;
+    const double s_2 = a_cp*a_ct;
+    const double out_3 = a_st*x_phi1 + x_psi1;
+    const double out_4 = a_cp*x_theta1 + s_1*x_phi1;
+    const double out_5 = a_sp*x_theta1 + s_2*x_phi1 - y_phi1;
+    out[0] = out_3; /* dwx */
+    out[1] = out_4; /* dwy */
+    out[2] = out_5; /* dwz */
+}
+
+MSFP_INLINED
+static inline void msfp_slip_rotation_tangent(const double *restrict a, const double *restrict x, const double *restrict y, double *restrict out, const double *restrict da, const double *restrict dx, const double *restrict dy, double *restrict dout)
+{
+    const double a_sp = a[39];
+    const double a_cp = a[40];
+    const double a_st = a[41];
+    const double a_ct = a[42];
+    const double x_psi1 = x[3];
+    const double x_theta1 = x[4];
+    const double x_phi1 = x[5];
+    const double y_phi1 = y[5];
+    const double s_1 = -a_ct*a_sp;
+    const double s_2 = a_cp*a_ct;
+    const double out_3 = a_st*x_phi1 + x_psi1;
+    const double out_4 = a_cp*x_theta1 + s_1*x_phi1;
+    const double out_5 = a_sp*x_theta1 + s_2*x_phi1 - y_phi1;
+    out[0] = out_3; /* dwx */
+    out[1] = out_4; /* dwy */
+    out[2] = out_5; /* dwz */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_a_sp = da[39 * MSFP_DOF + c];
+        const double d_a_cp = da[40 * MSFP_DOF + c];
+        const double d_a_st = da[41 * MSFP_DOF + c];
+        const double d_a_ct = da[42 * MSFP_DOF + c];
+        const double d_x_psi1 = dx[3 * MSFP_DOF + c];
+        const double d_x_theta1 = dx[4 * MSFP_DOF + c];
+        const double d_x_phi1 = dx[5 * MSFP_DOF + c];
+        const double d_y_phi1 = dy[5 * MSFP_DOF + c];
+        const double d_s_1 = -a_sp*d_a_ct - a_ct*d_a_sp;
+        const double d_s_2 = a_ct*d_a_cp + a_cp*d_a_ct;
+        const double d_out_3 = x_phi1*d_a_st + a_st*d_x_phi1 + d_x_psi1;
+        const double d_out_4 = x_theta1*d_a_cp + x_phi1*d_s_1 + s_1*d_x_phi1 + a_cp*d_x_theta1;
+        const double d_out_5 = x_theta1*d_a_sp + x_phi1*d_s_2 + s_2*d_x_phi1 + a_sp*d_x_theta1 - d_y_phi1;
+        dout[0 * MSFP_DOF + c] = d_out_3;
+        dout[1 * MSFP_DOF + c] = d_out_4;
+        dout[2 * MSFP_DOF + c] = d_out_5;
+    }
+}
+
 /* contact force and moment at given psi~, theta~, N: (3.13)-(3.19).
  * 81 operations; out: report_contact. */
 MSFP_INLINED
-static inline void msfp_report_contact(const double *restrict par /* surface_parameters */, const double *restrict x /* unknowns */, const double *restrict f /* friction */, const double *restrict loc /* local */, const double *restrict c /* coefficient */, double *restrict out)
+static inline void msfp_report_contact(const double *restrict par /* surface_parameters */, const double *restrict x /* unknowns */, const double *restrict f /* friction */, const double *restrict loc /* relative */, const double *restrict c /* coefficient */, double *restrict out)
 {
     const double par_sign = par[0];
     const double par_R = par[1];
@@ -1354,9 +1416,9 @@ static inline void msfp_report_contact(const double *restrict par /* surface_par
     const double x_N = x[2];
     const double f_Y = f[0];
     const double f_Z = f[1];
-    const double loc_dwx = loc[3];
-    const double loc_dwy = loc[4];
-    const double loc_dwz = loc[5];
+    const double loc_dwx = loc[0];
+    const double loc_dwy = loc[1];
+    const double loc_dwz = loc[2];
     (void)c;
     const double s_1 = msfp_sin(x_psi);
     const double s_2 = msfp_cos(x_psi);
@@ -1424,9 +1486,9 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
     const double x_N = x[2];
     const double f_Y = f[0];
     const double f_Z = f[1];
-    const double loc_dwx = loc[3];
-    const double loc_dwy = loc[4];
-    const double loc_dwz = loc[5];
+    const double loc_dwx = loc[0];
+    const double loc_dwy = loc[1];
+    const double loc_dwz = loc[2];
     (void)c;
     const double s_1 = msfp_sin(x_psi);
     const double s_2 = msfp_cos(x_psi);
@@ -1505,9 +1567,9 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
         const double d_x_N = dx[2 * MSFP_DOF + c];
         const double d_f_Y = df[0 * MSFP_DOF + c];
         const double d_f_Z = df[1 * MSFP_DOF + c];
-        const double d_loc_dwx = dloc[3 * MSFP_DOF + c];
-        const double d_loc_dwy = dloc[4 * MSFP_DOF + c];
-        const double d_loc_dwz = dloc[5 * MSFP_DOF + c];
+        const double d_loc_dwx = dloc[0 * MSFP_DOF + c];
+        const double d_loc_dwy = dloc[1 * MSFP_DOF + c];
+        const double d_loc_dwz = dloc[2 * MSFP_DOF + c];
         const double d_s_1 = s_2*d_x_psi;
         const double d_s_2 = -s_1*d_x_psi;
         const double d_s_3 = s_4*d_x_theta;
@@ -1552,6 +1614,137 @@ static inline void msfp_report_contact_tangent(const double *restrict par, const
         dout[5 * MSFP_DOF + c] = d_Mz_37;
         dout[6 * MSFP_DOF + c] = d_dY_22;
         dout[7 * MSFP_DOF + c] = d_dZ_23;
+    }
+}
+
+/* wrench of contact and rim on the body above: from the basis of the body below to E.
+ * 36 operations; out: wrench. */
+MSFP_INLINED
+static inline void msfp_report_wrench(const double *restrict b /* body */, const double *restrict c /* report_contact */, const double *restrict rim /* rim */, double *restrict out)
+{
+    const double b_t1x = b[0];
+    const double b_t1y = b[1];
+    const double b_t1z = b[2];
+    const double b_t2x = b[3];
+    const double b_t2y = b[4];
+    const double b_t2z = b[5];
+    const double b_t3x = b[6];
+    const double b_t3y = b[7];
+    const double b_t3z = b[8];
+    const double c_px = c[0];
+    const double c_py = c[1];
+    const double c_pz = c[2];
+    const double c_Mx = c[3];
+    const double c_My = c[4];
+    const double c_Mz = c[5];
+    const double rim_fx = rim[0];
+    const double rim_fy = rim[1];
+    const double rim_fz = rim[2];
+    const double rim_Mx = rim[3];
+    const double rim_My = rim[4];
+    const double rim_Mz = rim[5];
+    const double Fx_1 = c_px + rim_fx;
+    const double Fy_2 = c_py + rim_fy;
+    const double Fz_3 = c_pz + rim_fz;
+    const double Mx_4 = c_Mx + rim_Mx;
+    const double My_5 = c_My + rim_My;
+    const double Mz_6 = c_Mz + rim_Mz;
+    const double out_7 = Fx_1*b_t1x + Fy_2*b_t2x + Fz_3*b_t3x;
+    const double out_8 = Fx_1*b_t1y + Fy_2*b_t2y + Fz_3*b_t3y;
+    const double out_9 = Fx_1*b_t1z + Fy_2*b_t2z + Fz_3*b_t3z;
+    const double out_10 = Mx_4*b_t1x + My_5*b_t2x + Mz_6*b_t3x;
+    const double out_11 = Mx_4*b_t1y + My_5*b_t2y + Mz_6*b_t3y;
+    const double out_12 = Mx_4*b_t1z + My_5*b_t2z + Mz_6*b_t3z;
+    out[0] = out_7; /* Fx */
+    out[1] = out_8; /* Fy */
+    out[2] = out_9; /* Fz */
+    out[3] = out_10; /* Mx */
+    out[4] = out_11; /* My */
+    out[5] = out_12; /* Mz */
+}
+
+MSFP_INLINED
+static inline void msfp_report_wrench_tangent(const double *restrict b, const double *restrict c, const double *restrict rim, double *restrict out, const double *restrict db, const double *restrict dc, const double *restrict drim, double *restrict dout)
+{
+    const double b_t1x = b[0];
+    const double b_t1y = b[1];
+    const double b_t1z = b[2];
+    const double b_t2x = b[3];
+    const double b_t2y = b[4];
+    const double b_t2z = b[5];
+    const double b_t3x = b[6];
+    const double b_t3y = b[7];
+    const double b_t3z = b[8];
+    const double c_px = c[0];
+    const double c_py = c[1];
+    const double c_pz = c[2];
+    const double c_Mx = c[3];
+    const double c_My = c[4];
+    const double c_Mz = c[5];
+    const double rim_fx = rim[0];
+    const double rim_fy = rim[1];
+    const double rim_fz = rim[2];
+    const double rim_Mx = rim[3];
+    const double rim_My = rim[4];
+    const double rim_Mz = rim[5];
+    const double Fx_1 = c_px + rim_fx;
+    const double Fy_2 = c_py + rim_fy;
+    const double Fz_3 = c_pz + rim_fz;
+    const double Mx_4 = c_Mx + rim_Mx;
+    const double My_5 = c_My + rim_My;
+    const double Mz_6 = c_Mz + rim_Mz;
+    const double out_7 = Fx_1*b_t1x + Fy_2*b_t2x + Fz_3*b_t3x;
+    const double out_8 = Fx_1*b_t1y + Fy_2*b_t2y + Fz_3*b_t3y;
+    const double out_9 = Fx_1*b_t1z + Fy_2*b_t2z + Fz_3*b_t3z;
+    const double out_10 = Mx_4*b_t1x + My_5*b_t2x + Mz_6*b_t3x;
+    const double out_11 = Mx_4*b_t1y + My_5*b_t2y + Mz_6*b_t3y;
+    const double out_12 = Mx_4*b_t1z + My_5*b_t2z + Mz_6*b_t3z;
+    out[0] = out_7; /* Fx */
+    out[1] = out_8; /* Fy */
+    out[2] = out_9; /* Fz */
+    out[3] = out_10; /* Mx */
+    out[4] = out_11; /* My */
+    out[5] = out_12; /* Mz */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_b_t1x = db[0 * MSFP_DOF + c];
+        const double d_b_t1y = db[1 * MSFP_DOF + c];
+        const double d_b_t1z = db[2 * MSFP_DOF + c];
+        const double d_b_t2x = db[3 * MSFP_DOF + c];
+        const double d_b_t2y = db[4 * MSFP_DOF + c];
+        const double d_b_t2z = db[5 * MSFP_DOF + c];
+        const double d_b_t3x = db[6 * MSFP_DOF + c];
+        const double d_b_t3y = db[7 * MSFP_DOF + c];
+        const double d_b_t3z = db[8 * MSFP_DOF + c];
+        const double d_c_px = dc[0 * MSFP_DOF + c];
+        const double d_c_py = dc[1 * MSFP_DOF + c];
+        const double d_c_pz = dc[2 * MSFP_DOF + c];
+        const double d_c_Mx = dc[3 * MSFP_DOF + c];
+        const double d_c_My = dc[4 * MSFP_DOF + c];
+        const double d_c_Mz = dc[5 * MSFP_DOF + c];
+        const double d_rim_fx = drim[0 * MSFP_DOF + c];
+        const double d_rim_fy = drim[1 * MSFP_DOF + c];
+        const double d_rim_fz = drim[2 * MSFP_DOF + c];
+        const double d_rim_Mx = drim[3 * MSFP_DOF + c];
+        const double d_rim_My = drim[4 * MSFP_DOF + c];
+        const double d_rim_Mz = drim[5 * MSFP_DOF + c];
+        const double d_Fx_1 = d_c_px + d_rim_fx;
+        const double d_Fy_2 = d_c_py + d_rim_fy;
+        const double d_Fz_3 = d_c_pz + d_rim_fz;
+        const double d_Mx_4 = d_c_Mx + d_rim_Mx;
+        const double d_My_5 = d_c_My + d_rim_My;
+        const double d_Mz_6 = d_c_Mz + d_rim_Mz;
+        const double d_out_7 = b_t1x*d_Fx_1 + b_t2x*d_Fy_2 + b_t3x*d_Fz_3 + Fx_1*d_b_t1x + Fy_2*d_b_t2x + Fz_3*d_b_t3x;
+        const double d_out_8 = b_t1y*d_Fx_1 + b_t2y*d_Fy_2 + b_t3y*d_Fz_3 + Fx_1*d_b_t1y + Fy_2*d_b_t2y + Fz_3*d_b_t3y;
+        const double d_out_9 = b_t1z*d_Fx_1 + b_t2z*d_Fy_2 + b_t3z*d_Fz_3 + Fx_1*d_b_t1z + Fy_2*d_b_t2z + Fz_3*d_b_t3z;
+        const double d_out_10 = b_t1x*d_Mx_4 + b_t2x*d_My_5 + b_t3x*d_Mz_6 + Mx_4*d_b_t1x + My_5*d_b_t2x + Mz_6*d_b_t3x;
+        const double d_out_11 = b_t1y*d_Mx_4 + b_t2y*d_My_5 + b_t3y*d_Mz_6 + Mx_4*d_b_t1y + My_5*d_b_t2y + Mz_6*d_b_t3y;
+        const double d_out_12 = b_t1z*d_Mx_4 + b_t2z*d_My_5 + b_t3z*d_Mz_6 + Mx_4*d_b_t1z + My_5*d_b_t2z + Mz_6*d_b_t3z;
+        dout[0 * MSFP_DOF + c] = d_out_7;
+        dout[1 * MSFP_DOF + c] = d_out_8;
+        dout[2 * MSFP_DOF + c] = d_out_9;
+        dout[3 * MSFP_DOF + c] = d_out_10;
+        dout[4 * MSFP_DOF + c] = d_out_11;
+        dout[5 * MSFP_DOF + c] = d_out_12;
     }
 }
 
@@ -1617,74 +1810,6 @@ static inline void msfp_moment_to_world_tangent(const double *restrict b, const 
         const double d_out_1 = loc_Mx*d_b_t1x + loc_My*d_b_t2x + loc_Mz*d_b_t3x + b_t1x*d_loc_Mx + b_t2x*d_loc_My + b_t3x*d_loc_Mz;
         const double d_out_2 = loc_Mx*d_b_t1y + loc_My*d_b_t2y + loc_Mz*d_b_t3y + b_t1y*d_loc_Mx + b_t2y*d_loc_My + b_t3y*d_loc_Mz;
         const double d_out_3 = loc_Mx*d_b_t1z + loc_My*d_b_t2z + loc_Mz*d_b_t3z + b_t1z*d_loc_Mx + b_t2z*d_loc_My + b_t3z*d_loc_Mz;
-        dout[0 * MSFP_DOF + c] = d_out_1;
-        dout[1 * MSFP_DOF + c] = d_out_2;
-        dout[2 * MSFP_DOF + c] = d_out_3;
-    }
-}
-
-/* force: from the basis of the body below to E.
- * 15 operations; out: force. */
-MSFP_INLINED
-static inline void msfp_force_to_world(const double *restrict b /* body */, const double *restrict loc /* force */, double *restrict out)
-{
-    const double b_t1x = b[0];
-    const double b_t1y = b[1];
-    const double b_t1z = b[2];
-    const double b_t2x = b[3];
-    const double b_t2y = b[4];
-    const double b_t2z = b[5];
-    const double b_t3x = b[6];
-    const double b_t3y = b[7];
-    const double b_t3z = b[8];
-    const double loc_Fx = loc[0];
-    const double loc_Fy = loc[1];
-    const double loc_Fz = loc[2];
-    const double out_1 = b_t1x*loc_Fx + b_t2x*loc_Fy + b_t3x*loc_Fz;
-    const double out_2 = b_t1y*loc_Fx + b_t2y*loc_Fy + b_t3y*loc_Fz;
-    const double out_3 = b_t1z*loc_Fx + b_t2z*loc_Fy + b_t3z*loc_Fz;
-    out[0] = out_1; /* Fx */
-    out[1] = out_2; /* Fy */
-    out[2] = out_3; /* Fz */
-}
-
-MSFP_INLINED
-static inline void msfp_force_to_world_tangent(const double *restrict b, const double *restrict loc, double *restrict out, const double *restrict db, const double *restrict dloc, double *restrict dout)
-{
-    const double b_t1x = b[0];
-    const double b_t1y = b[1];
-    const double b_t1z = b[2];
-    const double b_t2x = b[3];
-    const double b_t2y = b[4];
-    const double b_t2z = b[5];
-    const double b_t3x = b[6];
-    const double b_t3y = b[7];
-    const double b_t3z = b[8];
-    const double loc_Fx = loc[0];
-    const double loc_Fy = loc[1];
-    const double loc_Fz = loc[2];
-    const double out_1 = b_t1x*loc_Fx + b_t2x*loc_Fy + b_t3x*loc_Fz;
-    const double out_2 = b_t1y*loc_Fx + b_t2y*loc_Fy + b_t3y*loc_Fz;
-    const double out_3 = b_t1z*loc_Fx + b_t2z*loc_Fy + b_t3z*loc_Fz;
-    out[0] = out_1; /* Fx */
-    out[1] = out_2; /* Fy */
-    out[2] = out_3; /* Fz */
-    for (int c = 0; c < MSFP_DOF; ++c) {
-        const double d_b_t1x = db[0 * MSFP_DOF + c];
-        const double d_b_t1y = db[1 * MSFP_DOF + c];
-        const double d_b_t1z = db[2 * MSFP_DOF + c];
-        const double d_b_t2x = db[3 * MSFP_DOF + c];
-        const double d_b_t2y = db[4 * MSFP_DOF + c];
-        const double d_b_t2z = db[5 * MSFP_DOF + c];
-        const double d_b_t3x = db[6 * MSFP_DOF + c];
-        const double d_b_t3y = db[7 * MSFP_DOF + c];
-        const double d_b_t3z = db[8 * MSFP_DOF + c];
-        const double d_loc_Fx = dloc[0 * MSFP_DOF + c];
-        const double d_loc_Fy = dloc[1 * MSFP_DOF + c];
-        const double d_loc_Fz = dloc[2 * MSFP_DOF + c];
-        const double d_out_1 = loc_Fx*d_b_t1x + loc_Fy*d_b_t2x + loc_Fz*d_b_t3x + b_t1x*d_loc_Fx + b_t2x*d_loc_Fy + b_t3x*d_loc_Fz;
-        const double d_out_2 = loc_Fx*d_b_t1y + loc_Fy*d_b_t2y + loc_Fz*d_b_t3y + b_t1y*d_loc_Fx + b_t2y*d_loc_Fy + b_t3y*d_loc_Fz;
-        const double d_out_3 = loc_Fx*d_b_t1z + loc_Fy*d_b_t2z + loc_Fz*d_b_t3z + b_t1z*d_loc_Fx + b_t2z*d_loc_Fy + b_t3z*d_loc_Fz;
         dout[0 * MSFP_DOF + c] = d_out_1;
         dout[1 * MSFP_DOF + c] = d_out_2;
         dout[2 * MSFP_DOF + c] = d_out_3;
@@ -1996,6 +2121,56 @@ static inline void msfp_angular_balance_tangent(const double *restrict par, cons
         dout[0 * MSFP_DOF + c] = d_out_19;
         dout[1 * MSFP_DOF + c] = d_out_20;
         dout[2 * MSFP_DOF + c] = d_out_21;
+    }
+}
+
+/* balances of a body (3.26)-(3.29); with locked spin phi'' in place of the axial one.
+ * 0 operations; out: balances. */
+MSFP_INLINED
+static inline void msfp_balances(const double *restrict f /* linear */, const double *restrict m /* angular */, const double *restrict x /* coordinates */, double *restrict out)
+{
+    const double f_rx = f[0];
+    const double f_ry = f[1];
+    const double f_rz = f[2];
+    const double m_rx = m[0];
+    const double m_ry = m[1];
+    const double x_phi2 = x[8];
+    out[0] = f_rx; /* Fx */
+    out[1] = f_ry; /* Fy */
+    out[2] = f_rz; /* Fz */
+    out[3] = m_rx; /* Mx */
+    out[4] = m_ry; /* My */
+    out[5] = x_phi2; /* Mz */
+}
+
+MSFP_INLINED
+static inline void msfp_balances_tangent(const double *restrict f, const double *restrict m, const double *restrict x, double *restrict out, const double *restrict df, const double *restrict dm, const double *restrict dx, double *restrict dout)
+{
+    const double f_rx = f[0];
+    const double f_ry = f[1];
+    const double f_rz = f[2];
+    const double m_rx = m[0];
+    const double m_ry = m[1];
+    const double x_phi2 = x[8];
+    out[0] = f_rx; /* Fx */
+    out[1] = f_ry; /* Fy */
+    out[2] = f_rz; /* Fz */
+    out[3] = m_rx; /* Mx */
+    out[4] = m_ry; /* My */
+    out[5] = x_phi2; /* Mz */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_f_rx = df[0 * MSFP_DOF + c];
+        const double d_f_ry = df[1 * MSFP_DOF + c];
+        const double d_f_rz = df[2 * MSFP_DOF + c];
+        const double d_m_rx = dm[0 * MSFP_DOF + c];
+        const double d_m_ry = dm[1 * MSFP_DOF + c];
+        const double d_x_phi2 = dx[8 * MSFP_DOF + c];
+        dout[0 * MSFP_DOF + c] = d_f_rx;
+        dout[1 * MSFP_DOF + c] = d_f_ry;
+        dout[2 * MSFP_DOF + c] = d_f_rz;
+        dout[3 * MSFP_DOF + c] = d_m_rx;
+        dout[4 * MSFP_DOF + c] = d_m_ry;
+        dout[5 * MSFP_DOF + c] = d_x_phi2;
     }
 }
 
@@ -2728,6 +2903,47 @@ static inline void msfp_rotation_angles(const double *restrict t /* turn */, dou
     out[6] = rate_49; /* psi2 */
     out[7] = rate_51; /* theta2 */
     out[8] = rate_54; /* phi2 */
+}
+
+/* coordinates on which the gap of a rim depends.
+ * 0 operations; out: rim_coordinates. */
+MSFP_INLINED
+static inline void msfp_rim_coordinates(const double *restrict b /* body */, const double *restrict x /* coordinates */, double *restrict out)
+{
+    (void)b;
+    const double x_psi = x[0];
+    const double x_theta = x[1];
+    const double x_psi1 = x[3];
+    const double x_theta1 = x[4];
+    out[0] = x_psi; /* psi */
+    out[1] = x_theta; /* theta */
+    out[2] = x_psi1; /* psi1 */
+    out[3] = x_theta1; /* theta1 */
+}
+
+MSFP_INLINED
+static inline void msfp_rim_coordinates_tangent(const double *restrict b, const double *restrict x, double *restrict out, const double *restrict db, const double *restrict dx, double *restrict dout)
+{
+    (void)b;
+    (void)db;
+    const double x_psi = x[0];
+    const double x_theta = x[1];
+    const double x_psi1 = x[3];
+    const double x_theta1 = x[4];
+    out[0] = x_psi; /* psi */
+    out[1] = x_theta; /* theta */
+    out[2] = x_psi1; /* psi1 */
+    out[3] = x_theta1; /* theta1 */
+    for (int c = 0; c < MSFP_DOF; ++c) {
+        const double d_x_psi = dx[0 * MSFP_DOF + c];
+        const double d_x_theta = dx[1 * MSFP_DOF + c];
+        const double d_x_psi1 = dx[3 * MSFP_DOF + c];
+        const double d_x_theta1 = dx[4 * MSFP_DOF + c];
+        dout[0 * MSFP_DOF + c] = d_x_psi;
+        dout[1 * MSFP_DOF + c] = d_x_theta;
+        dout[2 * MSFP_DOF + c] = d_x_psi1;
+        dout[3 * MSFP_DOF + c] = d_x_theta1;
+    }
 }
 
 /* rim contact (3.20)-(3.25); applied only while the force is compressive.

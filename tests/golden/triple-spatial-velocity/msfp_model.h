@@ -591,6 +591,41 @@ static inline void msfp_moment_M_put(double *block, const double vector[3])
     block[2] = vector[2];
 }
 
+/* wrench */
+enum {
+    MSFP_WRENCH_FX = 0, /* [N] force on the body above the interface */
+    MSFP_WRENCH_FY = 1, /* [N] force on the body above the interface */
+    MSFP_WRENCH_FZ = 2, /* [N] force on the body above the interface */
+    MSFP_WRENCH_MX = 3, /* [N m] moment on the body above, about the sphere centre */
+    MSFP_WRENCH_MY = 4, /* [N m] moment on the body above, about the sphere centre */
+    MSFP_WRENCH_MZ = 5, /* [N m] moment on the body above, about the sphere centre */
+    MSFP_WRENCH_SIZE = 6
+};
+static inline void msfp_wrench_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_wrench_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_wrench_M_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_wrench_M_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
+}
+
 /* local */
 enum {
     MSFP_LOCAL_PX = 0, /* [N] contact force (normal and friction) in the basis of the body below */
@@ -624,6 +659,26 @@ static inline void msfp_local_dw_put(double *block, const double vector[3])
     block[3] = vector[0];
     block[4] = vector[1];
     block[5] = vector[2];
+}
+
+/* relative */
+enum {
+    MSFP_RELATIVE_DWX = 0, /* [rad/s] omega'_above - omega'_below, basis of the body below */
+    MSFP_RELATIVE_DWY = 1, /* [rad/s] omega'_above - omega'_below, basis of the body below */
+    MSFP_RELATIVE_DWZ = 2, /* [rad/s] omega'_above - omega'_below, basis of the body below */
+    MSFP_RELATIVE_SIZE = 3
+};
+static inline void msfp_relative_dw_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_relative_dw_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
 }
 
 /* friction */
@@ -1036,41 +1091,6 @@ static inline void msfp_rim_wrench_T_put(double *block, const double vector[3])
     block[5] = vector[2];
 }
 
-/* offset */
-enum {
-    MSFP_OFFSET_DX = 0, /* [m] separation delta, basis of the body below */
-    MSFP_OFFSET_DY = 1, /* [m] separation delta, basis of the body below */
-    MSFP_OFFSET_DZ = 2, /* [m] separation delta, basis of the body below */
-    MSFP_OFFSET_D1X = 3, /* [m/s] rate of these components */
-    MSFP_OFFSET_D1Y = 4, /* [m/s] rate of these components */
-    MSFP_OFFSET_D1Z = 5, /* [m/s] rate of these components */
-    MSFP_OFFSET_SIZE = 6
-};
-static inline void msfp_offset_d_get(const double *block, double vector[3])
-{
-    vector[0] = block[0];
-    vector[1] = block[1];
-    vector[2] = block[2];
-}
-static inline void msfp_offset_d_put(double *block, const double vector[3])
-{
-    block[0] = vector[0];
-    block[1] = vector[1];
-    block[2] = vector[2];
-}
-static inline void msfp_offset_d1_get(const double *block, double vector[3])
-{
-    vector[0] = block[3];
-    vector[1] = block[4];
-    vector[2] = block[5];
-}
-static inline void msfp_offset_d1_put(double *block, const double vector[3])
-{
-    block[3] = vector[0];
-    block[4] = vector[1];
-    block[5] = vector[2];
-}
-
 /* gap */
 enum {
     MSFP_GAP_S = 0, /* [m] sliding displacement (3.20) */
@@ -1304,6 +1324,41 @@ static inline void msfp_angular_r_put(double *block, const double vector[3])
     block[0] = vector[0];
     block[1] = vector[1];
     block[2] = vector[2];
+}
+
+/* balances */
+enum {
+    MSFP_BALANCES_FX = 0, /* [N] linear balance of a body, along E1, E2, E3 */
+    MSFP_BALANCES_FY = 1, /* [N] linear balance of a body, along E1, E2, E3 */
+    MSFP_BALANCES_FZ = 2, /* [N] linear balance of a body, along E1, E2, E3 */
+    MSFP_BALANCES_MX = 3, /* [N m] angular balance, along t_1, t_2, t_3 */
+    MSFP_BALANCES_MY = 4, /* [N m] angular balance, along t_1, t_2, t_3 */
+    MSFP_BALANCES_MZ = 5, /* [N m] angular balance, along t_1, t_2, t_3 */
+    MSFP_BALANCES_SIZE = 6
+};
+static inline void msfp_balances_F_get(const double *block, double vector[3])
+{
+    vector[0] = block[0];
+    vector[1] = block[1];
+    vector[2] = block[2];
+}
+static inline void msfp_balances_F_put(double *block, const double vector[3])
+{
+    block[0] = vector[0];
+    block[1] = vector[1];
+    block[2] = vector[2];
+}
+static inline void msfp_balances_M_get(const double *block, double vector[3])
+{
+    vector[0] = block[3];
+    vector[1] = block[4];
+    vector[2] = block[5];
+}
+static inline void msfp_balances_M_put(double *block, const double vector[3])
+{
+    block[3] = vector[0];
+    block[4] = vector[1];
+    block[5] = vector[2];
 }
 
 /* arms */

@@ -1,0 +1,89 @@
+"""A schedule against its programs: mistakes that a C compiler does not see are found before anything is emitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from msfp_gen import Effects, Layout
+from msfp_gen.generator.derive import Equations, derive
+from msfp_gen.generator.schedule import Call, Pass, calls_of, check, momentum_balances, unknowns
+from msfp_gen.specification.layout import ModelSpec
+
+EFFECTS = [
+    {},
+    {"dimension": "planar", "sliders": "massless"},
+    {"spin": "free", "rims": False},
+    {"uplift": True},
+    {"friction": "pvt"},
+    {"top_rotation": True},
+]
+
+
+def equations_of(**effects: object) -> Equations:
+    return derive(ModelSpec(Layout(3, 1, 1), Effects(**effects)))  # type: ignore[arg-type]
+
+
+def checked(equations: Equations, passes: tuple[Pass, ...]) -> None:
+    check(passes, {program.name: program for program in equations.programs}, equations.blocks)
+
+
+def changed(name: str, change: Callable[[Call], Call | None]) -> tuple[Pass, ...]:
+    """The schedule with another call of a program, or without it."""
+
+    def calls(one: Pass) -> tuple[Call, ...]:
+        made = (change(call) if call.program == name else call for call in one.calls)
+        return tuple(call for call in made if call is not None)
+
+    return tuple(replace(one, calls=calls(one)) for one in momentum_balances(Effects()))
+
+
+@pytest.mark.parametrize("effects", EFFECTS, ids=str)
+def test_schedule_fits_the_programs_of_every_model(effects: dict[str, object]) -> None:
+    equations = equations_of(**effects)
+    checked(equations, momentum_balances(equations.spec.effects))
+
+
+def test_a_place_of_another_kind_is_found() -> None:
+    swapped = changed("linear_balance", lambda call: replace(call, reads=(*call.reads[:2], "moment[k-1]", "force[k]")))
+    with pytest.raises(AssertionError, match="linear_balance"):
+        checked(equations_of(), swapped)
+
+
+def test_a_missing_input_is_found() -> None:
+    with pytest.raises(AssertionError, match="report_wrench"):
+        checked(equations_of(), changed("report_wrench", lambda call: replace(call, reads=call.reads[:2])))
+
+
+def test_what_nobody_wrote_or_wrote_elsewhere_is_found() -> None:
+    with pytest.raises(AssertionError, match="slip_rotation"):
+        checked(equations_of(), changed("slip_rotation", lambda call: replace(call, writes=("report_contact[j]",))))
+    with pytest.raises(AssertionError, match="report_contact"):
+        checked(equations_of(), changed("slip_rotation", lambda call: None))
+
+
+def test_a_derivative_that_a_program_would_lose_is_found() -> None:
+    """A program that takes for constant what moves: (3.28) with the acceleration of the body held fixed."""
+    equations = equations_of()
+    programs = {program.name: program for program in equations.programs}
+    balance = programs["linear_balance"]
+    held = [replace(use, active=frozenset()) if use.alias == "b" else use for use in balance.inputs]
+    programs["linear_balance"] = replace(balance, inputs=held)
+    with pytest.raises(AssertionError, match="linear_balance"):
+        check(momentum_balances(Effects()), programs, equations.blocks)
+
+
+def test_every_list_is_written_before_it_is_read() -> None:
+    given = {"body_parameters", "surface_parameters", "top_parameters", "frame", "x", "load_force", "load_moment"}
+    known = given | {"foot_stage", "unknowns", "friction"}
+    for call in calls_of(momentum_balances(Effects())):
+        assert {place.partition("[")[0] for place in call.reads} <= known, call
+        known |= {place.partition("[")[0] for place in call.writes}
+
+
+@pytest.mark.parametrize(("dimension", "count"), [("spatial", 12), ("planar", 6)])
+def test_unknowns_are_as_many_as_balances(dimension: str, count: int) -> None:
+    found = unknowns(equations_of(dimension=dimension).spec)
+    assert len(found) == len(set(found)) == count
