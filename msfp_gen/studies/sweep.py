@@ -170,10 +170,7 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     peaks = {
         "status": [str(row.summary["status"]) for row in rows],
         "u [mm]": [_number(row, "peak_displacement.radial", 1e3, 2) for row in rows],
-        "F [kN]": [
-            _number(row, f"{'peak_base_shear' if of_building(row.summary) else 'peak_top_force'}.radial", 1e-3, 2)
-            for row in rows
-        ],
+        "F [kN]": [_number(row, "peak_force.radial", 1e-3, 2) for row in rows],
         "rims": [str(len(row.summary.get("rims_met", ()))) for row in rows],
         "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }

@@ -60,7 +60,7 @@ def building_measures() -> dict[str, Measure]:
     """Name -> quantity that is compared for a building on bearings."""
     return {
         "peak_displacement": Measure("m", "most", lambda run: max(each.peak_displacement for each in run.bearings)),
-        "peak_base_shear": Measure("N", "most", lambda run: run.peak_force),
+        "peak_force": Measure("N", "most", lambda run: run.peak_force),
         "peak_floor_acceleration": Measure("m/s^2", "most", lambda run: run.peak_floor_acceleration),
         "peak_drift_ratio": Measure("1", "most", lambda run: run.peak_drift_ratio),
         "minimum_load_ratio": Measure("1", "least", lambda run: min(e.minimum_load_ratio for e in run.bearings)),
