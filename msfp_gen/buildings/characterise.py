@@ -123,6 +123,11 @@ class BuildingCharacterisation:
             notes=tuple(notes),
         )
 
+    @property
+    def capacity_left(self) -> float:
+        """The least of all bearings [m]."""
+        return min(bearing.capacity_left for bearing in self.bearings)
+
     def __repr__(self) -> str:
         """The main quantities in ten lines at most."""
         return "\n".join([f"Characterisation of {self.name or 'an unnamed building'}, status {self.status}",
