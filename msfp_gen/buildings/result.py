@@ -91,7 +91,7 @@ class BuildingResult(AnyResult):
     @cached_property
     def bearings(self) -> tuple[BearingResult, ...]:
         """The result of every bearing."""
-        return tuple(BearingResult(self, index) for index in range(len(self.scene.bearings)))
+        return tuple(BearingResult.of(self, index) for index in range(len(self.scene.bearings)))
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
@@ -323,12 +323,61 @@ def _squares(rows: Array, matrix: Array) -> Array:
 class BearingResult(AnyResult):
     """One bearing of a building, at the k times of its result: names and signs are those of `Result` and `History`.
 
-    building: the whole result. index: of the bearing, from 0.
+    building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0; bearing: its
+    values. time: shape (k,) [s]. base_displacement: of the ground below the bearing; displacement: across the bearing
+    and its interface, base less top, shape (k, 3) [m]. top_force, top_moment: on the building, the moment about the
+    upper end of the bearing, shape (k, 3) [N], [N m]. axial_force: compression between bearing and building, shape (k,)
+    [N]. sliding (3.20), gap to the rims (3.21), normal_force: of the surfaces, shape (k, n-1) [m], [m], [N].
+    dissipated: energy in the bearing since the start; stored: in the bearing and its interface, shape (k,) [J].
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
     building: BuildingResult
     index: int
+    scene: BuildingScene
+    bearing: Bearing
+    status: str
+    message: str
+    provenance: dict[str, str]
+    time: Array
+    base_displacement: Array
+    displacement: Array
+    top_force: Array
+    top_moment: Array
+    axial_force: Array
+    sliding: Array
+    gap: Array
+    normal_force: Array
+    dissipated: Array
+    stored: Array
+
+    @classmethod
+    def of(cls, building: BuildingResult, index: int) -> BearingResult:
+        """A bearing of a building, from 0."""
+        scene, bearing = building.scene, building.scene.bearings[index].bearing
+        base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
+        across = base - building.displacement @ scene.attachments[index, :3].T
+        sliding = building.sliding[:, index, : bearing.layout.surfaces]
+        return cls(
+            building=building,
+            index=index,
+            scene=scene,
+            bearing=bearing,
+            status=building.status,
+            message=building.message,
+            provenance=building.provenance,
+            time=building.time,
+            base_displacement=base,
+            displacement=across - across[0],
+            top_force=-wrench[:, :3],
+            top_moment=-wrench[:, 3:],
+            axial_force=building.axial_force[:, index],
+            sliding=sliding,
+            gap=bearing.arrays()["capacity"] - sliding,
+            normal_force=building.normal_force[:, index, : bearing.layout.surfaces],
+            dissipated=building.dissipated[:, index],
+            stored=building.stored[:, index],
+        )
 
     @property
     def label(self) -> str:
@@ -339,31 +388,6 @@ class BearingResult(AnyResult):
     def title(self) -> str:
         """The label, and the name of the building."""
         return f"{self.label} of {self.building.title}"
-
-    @property
-    def scene(self) -> BuildingScene:
-        """That of the building."""
-        return self.building.scene
-
-    @property
-    def status(self) -> str:
-        """How the run ended."""
-        return self.building.status
-
-    @property
-    def message(self) -> str:
-        """One line of text, "" for a run that succeeded."""
-        return self.building.message
-
-    @property
-    def provenance(self) -> dict[str, str]:
-        """Versions with which the result was computed."""
-        return self.building.provenance
-
-    @property
-    def bearing(self) -> Bearing:
-        """Its values."""
-        return self.scene.bearings[self.index].bearing
 
     @property
     def history(self) -> BearingResult:
@@ -381,23 +405,14 @@ class BearingResult(AnyResult):
         return self.bearing.layout.surfaces
 
     @property
-    def time(self) -> Array:
-        """Times, shape (k,) [s]."""
-        return self.building.time
+    def capacity(self) -> Array:
+        """Capacities of the surfaces, shape (n-1,) [m]."""
+        return self.bearing.arrays()["capacity"]
 
     @property
-    def base_displacement(self) -> Array:
-        """Displacement of the ground below the bearing, shape (k, 3) [m]."""
-        moved: Array = self.building.support[:, self.index, 0]
-        return moved
-
-    @cached_property
-    def displacement(self) -> Array:
-        """Displacement across the bearing and its interface, base less top, shape (k, 3) [m]."""
-        rows, base = self.scene.attachments[self.index, :3], self.base_displacement
-        across: Array = base - self.building.displacement @ rows.T
-        across -= across[0]
-        return across
+    def axial_load(self) -> float:
+        """Compression at rest [N]."""
+        return float(self.scene.axial_loads[self.index])
 
     @property
     def horizontal(self) -> Array:
@@ -408,59 +423,6 @@ class BearingResult(AnyResult):
     def peak_row(self) -> int:
         """Row of the largest horizontal displacement; see `first_peak`."""
         return first_peak(self.horizontal)
-
-    @property
-    def top_force(self) -> Array:
-        """Force of the bearing on the building, shape (k, 3) [N]."""
-        force: Array = -self.building.wrench[:, self.index, 1, :3]
-        return force
-
-    @property
-    def top_moment(self) -> Array:
-        """Moment of the bearing on the building about its upper end, shape (k, 3) [N m]."""
-        moment: Array = -self.building.wrench[:, self.index, 1, 3:]
-        return moment
-
-    @property
-    def axial_force(self) -> Array:
-        """Compression between bearing and building, shape (k,) [N]."""
-        return self.building.axial_force[:, self.index]
-
-    @property
-    def axial_load(self) -> float:
-        """Compression at rest [N]."""
-        return float(self.scene.axial_loads[self.index])
-
-    @property
-    def sliding(self) -> Array:
-        """Sliding displacements of the surfaces (3.20), shape (k, n-1) [m]."""
-        return self.building.sliding[:, self.index, : self.surfaces]
-
-    @property
-    def gap(self) -> Array:
-        """Gaps to the rims of the surfaces (3.21), capacity less sliding, shape (k, n-1) [m]."""
-        gap: Array = self.capacity - self.sliding
-        return gap
-
-    @property
-    def normal_force(self) -> Array:
-        """Normal forces of the surfaces, shape (k, n-1) [N]."""
-        return self.building.normal_force[:, self.index, : self.surfaces]
-
-    @property
-    def dissipated(self) -> Array:
-        """Energy dissipated in the bearing since the start, shape (k,) [J]."""
-        return self.building.dissipated[:, self.index]
-
-    @property
-    def stored(self) -> Array:
-        """Energy stored in the bearing and its interface, shape (k,) [J]."""
-        return self.building.stored[:, self.index]
-
-    @property
-    def capacity(self) -> Array:
-        """Capacities of the surfaces, shape (n-1,) [m]."""
-        return np.array([surface.capacity for surface in self.bearing.surfaces])
 
     @property
     def notes(self) -> tuple[Note, ...]:
