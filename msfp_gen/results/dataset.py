@@ -57,11 +57,10 @@ def row_variables(history: History) -> Variables:
 def named_columns(field: str, values: Any) -> Variables:
     """The variables of one field of `History`: several where each of its components has a name."""
     rows = quantities()[field]
-    dims, names = ("time", *rows.dims), rows.names or (field,)
-    split = len(names) > 1  # one variable for each component
+    names = rows.columns(field)
     for column, name in enumerate(names):
         about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
-        yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+        yield name, (("time", *rows.column_dims), values[..., column] if len(names) > 1 else values, about)
 
 
 def energy_variables(history: History) -> Variables:
@@ -102,7 +101,7 @@ DERIVED: dict[str, Any] = {}  # all variables are read
 
 def edition() -> str:
     """A digest of the names that a file of this version has: of rows, energies, counters and labels."""
-    rows = [rows.names or (field,) for field, rows in quantities().items()]
+    rows = [rows.columns(field) for field, rows in quantities().items()]
     table = [*rows, ENERGY, *LABELS.items(), [field.name for field in fields(Counters)], WORDS]
     return sha256(json.dumps([list(each) for each in table]).encode()).hexdigest()[:12]
 
@@ -162,19 +161,17 @@ def _history(root: StoredGroup, surfaces: int, arrays: Arrays) -> History:
     count = root.length("time")
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
     optional = {field.name for field in fields(History) if field.default is not MISSING}
-    found: Arrays = {}
-    for field, rows in quantities().items():
-        parts = rows.names or (field,)
-        if field in optional and not any(name in root for name in parts):
+    rows: Arrays = {}
+    for field, quantity in quantities().items():
+        if field in optional and not any(name in root for name in quantity.columns(field)):
             continue  # a quantity of an effect that the run did not model
-        dims = rows.dims[:-1] if len(parts) > 1 else rows.dims
-        shape = (count, *(sizes[dim] for dim in dims))
-        columns = [root.array(name, shape, compressed=name != "time") for name in parts]
-        arrays |= dict(zip(parts, columns, strict=True))
-        found[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+        shape = (count, *(sizes[dim] for dim in quantity.column_dims))
+        columns = {name: root.array(name, shape, compressed=name != "time") for name in quantity.columns(field)}
+        arrays |= columns
+        rows[field] = quantity.joined(list(columns.values()))
     energy = {name: root.array(f"energy_{name}", (count,)) for name in ENERGY}
     arrays |= {f"energy_{name}": values for name, values in energy.items()}
-    return History(**found, energy=energy)
+    return History(**rows, energy=energy)
 
 
 def _events(root: StoredGroup, surfaces: int, arrays: Arrays) -> tuple[Event, ...]:

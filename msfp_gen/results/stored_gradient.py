@@ -42,20 +42,18 @@ def from_group(root: StoredGroup, rows: int, surfaces: int, events: int) -> tupl
         extremes = tuple(Extremes.of_table(given) for given in json.loads(str(about[f"extremes{suffix}"])))
         if len(extremes) != count or not count:
             raise ValueError("the derivatives of the extremes are not those of the parameters")
-        found = {}
+        derivatives = {}
         for field, quantity in quantities().items():
-            parts = [f"{name}{suffix}" for name in quantity.names or (field,)]
-            if field == "time" or not any(name in group for name in parts):
-                continue
-            dims = quantity.dims[:-1] if len(parts) > 1 else quantity.dims
-            columns = [array(name, rows, *(sizes[dim] for dim in dims)) for name in parts if name in group]
-            found[field] = columns[0] if len(parts) == 1 else np.stack(columns, axis=-1)
+            names = [name for name in (f"{name}{suffix}" for name in quantity.columns(field)) if name in group]
+            if field != "time" and names:
+                shape = (rows, *(sizes[dim] for dim in quantity.column_dims))
+                derivatives[field] = quantity.joined([array(name, *shape) for name in names])
         energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
         energy = {name: array(f"energy_{name}{suffix}", rows) for name in energies}
         time, displacement, force = (
             array(f"{name}{suffix}", events, *shape) for name, shape in zip(EVENT_ARRAYS, ((), (3,), (3,)), strict=True)
         )
-        return Gradients(parameters, found, energy, time, displacement, force, extremes, error)
+        return Gradients(parameters, derivatives, energy, time, displacement, force, extremes, error)
 
     return gradients(error=gradients(ERROR) if f"extremes{ERROR}" in about else None), read
 
