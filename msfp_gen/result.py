@@ -52,7 +52,7 @@ class Result(AnyResult, RunData):
 
     def tables(self) -> list[Table]:
         """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
-        return summary_tables(self)
+        return summary_tables(self.summary, self.scene.bearing.surfaces)
 
     @cached_property
     def gradient(self) -> xr.Dataset:

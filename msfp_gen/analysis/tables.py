@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.analysis.summary import summarise
 from msfp_gen.analysis.transitions import SYMBOLS
 from msfp_gen.common.tables import Table, yes
 
 if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
     from msfp_gen.scene.bearing import Surface
 
 MEANINGS = {
@@ -22,10 +20,9 @@ MEANINGS = {
 }
 
 
-def summary_tables(result: RunData) -> list[Table]:
-    """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
-    summary = summarise(result)
-    tables = [_run_table(summary), surface_table(summary, result.scene.bearing.surfaces)]
+def summary_tables(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> list[Table]:
+    """Tables of peaks and surfaces, and of the transitions of a monotonic run. summary: as of `summary.summarise`."""
+    tables = [_run_table(summary), surface_table(summary, surfaces)]
     if "transitions" in summary:
         tables.append(transition_table(summary["transitions"]))
     return tables
