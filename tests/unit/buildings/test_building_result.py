@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import preset_run
 from support.buildings import MOTION, PLACES, frame, scene
 from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
@@ -21,6 +22,8 @@ from msfp_gen.buildings.dataset import column_names, columns_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops
 from msfp_gen.results.note import Note
+from msfp_gen.results.resample import at_times
+from msfp_gen.studies.columns import catalogue
 
 
 @cache
@@ -267,3 +270,21 @@ def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
     assert [each.motion == MOTION for each in read.scene.bearings] == [True, True, False, False]
     assert read.scene.bearings[2].motion is None and np.array_equal(read.support, found.support)
     assert read.summary == found.summary
+
+
+def test_a_bearing_at_other_times():
+    one = result().bearings[1]
+    between = at_times(one, 0.5 * (one.time[3] + one.time[4]))
+    assert between.label == one.label and between.displacement.shape == (1, 3)
+    np.testing.assert_allclose(between.displacement[0], one.displacement[3:5].mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(between.sliding[0], one.sliding[3:5].mean(axis=0), rtol=1e-12)
+
+
+def test_every_quantity_of_the_catalogue_is_in_a_result():
+    for run, counts in ((preset_run("fenz-test2"), None), (result(), (len(result().floors), len(result().storeys), 4))):
+        characterisation = run.characterise()
+        values = {name: source.value(run.summary, characterisation) for name, source in catalogue(4, counts).items()}
+        missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
+        # no friction law, no uplift; and both runs end in motion
+        optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}
+        assert missing <= optional and values["peak_force"] == characterisation.peak_force
