@@ -27,8 +27,7 @@ from msfp_gen import (
     simulate_batch,
 )
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient_error import measured_errors
-from msfp_gen.simulation.gradients import with_gradient_errors
+from msfp_gen.simulation.gradients import measured_errors, with_gradient_errors
 
 PATHS = ("bearing.surfaces[*].friction", "top.axial_load", "motion.scale")
 
