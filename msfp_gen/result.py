@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.analysis.any_result import AnyResult, Curve, Rows
+from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise import Characterisation, characterise
 from msfp_gen.analysis.gradient_summary import summarise_gradients
 from msfp_gen.analysis.summary import rows_of_bearing, summarise
@@ -47,8 +47,7 @@ class Result(AnyResult, RunData):
     @property
     def curve(self) -> Curve:
         """The hysteresis loop."""
-        force = self.history.top_force[:, :2] @ self.history.direction
-        return Curve(self.history.path[0], force, "force over displacement")
+        return hysteresis_loop(self.history, self.history.top_force)
 
     def tables(self) -> list[Table]:
         """Tables of peaks and surfaces, and of the transitions of a monotonic run."""

@@ -13,6 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.results.files import ResultFiles
+from msfp_gen.results.history import HorizontalMotion
 
 MAX_NOTES = 2  # printed; the others are counted
 MAX_POINTS = 600  # of the curve
@@ -84,6 +85,11 @@ class AnyResult(ResultFiles):
             f"<div><b>{escape(self.title)}</b><div style='display:flex;gap:1em'><table>{cells}</table>"
             f"<figure style='margin:0'>{_svg(x, y)}<figcaption>{escape(caption)}</figcaption></figure></div></div>"
         )
+
+
+def hysteresis_loop(motion: HorizontalMotion, top_force: Array) -> Curve:
+    """Force over displacement along the direction of the largest displacement. top_force: shape (T, 3) [N]."""
+    return Curve(motion.path[0], top_force[:, :2] @ motion.direction, "force over displacement")
 
 
 def _svg(x: Array, y: Array) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.analysis.any_result import AnyResult, Curve, Rows
+from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise.loops import Path
 from msfp_gen.analysis.characterise.report import Characterisation, characterise_rows
 from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run
@@ -26,7 +26,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import coordinates_of, named_columns
 from msfp_gen.results.extremes import Extremes, by_axis, largest
 from msfp_gen.results.files import KINDS, Storage, attributes_of
-from msfp_gen.results.history import Event, first_peak
+from msfp_gen.results.history import Event, HorizontalMotion
 from msfp_gen.results.note import Note
 from msfp_gen.scene.file.loader import bearing_table, plain_table
 from msfp_gen.scene.file.toml_text import dumps
@@ -320,7 +320,7 @@ def _squares(rows: Array, matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BearingResult(AnyResult):
+class BearingResult(AnyResult, HorizontalMotion):
     """One bearing of a building, at the k times of its result: names and signs are those of `Result` and `History`.
 
     building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0; bearing: its
@@ -415,16 +415,6 @@ class BearingResult(AnyResult):
         return float(self.scene.axial_loads[self.index])
 
     @property
-    def horizontal(self) -> Array:
-        """Horizontal displacement across the bearing, shape (k,) [m]."""
-        return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
-
-    @property
-    def peak_row(self) -> int:
-        """Row of the largest horizontal displacement; see `first_peak`."""
-        return first_peak(self.horizontal)
-
-    @property
     def notes(self) -> tuple[Note, ...]:
         """The notes of its monitors, in order of time."""
         own = (note for note in self.building.monitored if note.bearing == self.index + 1)
@@ -477,9 +467,8 @@ class BearingResult(AnyResult):
 
     @property
     def curve(self) -> Curve:
-        """Its orbit."""
-        x, y = self.displacement[:, :2].T
-        return Curve(x, y, "orbit")
+        """The hysteresis loop."""
+        return hysteresis_loop(self, self.top_force)
 
     def tables(self) -> list[Table]:
         """Tables of its main results and of its surfaces."""
