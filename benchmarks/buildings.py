@@ -37,8 +37,8 @@ from msfp_gen import (
     load_scene,
     presets,
 )
-from msfp_gen.buildings.compiled_run import start_run
-from msfp_gen.buildings.result import BuildingResult, result_of
+from msfp_gen.buildings.compiled_run import result_of, start_run
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.studies.accuracy.series import Series
 
@@ -109,14 +109,14 @@ def scaling() -> None:
     print("| bearings | steps | seconds | microseconds a step and bearing |\n|---|---|---|---|")
     for count in pick((4, 16, 36, 64, 100), (4,)):
         result, seconds, _ = timed(tower(count, pick(15.0, 1.0)))
-        steps = result.counts["steps"]
+        steps = result.counters["steps"]
         print(f"| {count} | {steps} | {seconds:.2f} | {1e6 * seconds / steps / count:.1f} |")
     largest_count, duration = pick(100, 4), pick(60.0, 1.0)
     for threads in (1, 2):
         result, seconds, clock = timed(tower(largest_count, duration), threads)
         largest = np.abs(result.bearing_displacement[:, :, :2]).max()
         print(
-            f"{largest_count} bearings, {duration:g} s, threads {threads}: {result.counts['steps']} steps, {seconds:.1f} s of the processors, "
+            f"{largest_count} bearings, {duration:g} s, threads {threads}: {result.counters['steps']} steps, {seconds:.1f} s of the processors, "
             f"{clock:.1f} s of the clock; bearings {1e3 * largest:.0f} mm"
         )
 
@@ -244,7 +244,7 @@ def ringing() -> None:
         for rtol in (*tolerances, reference):
             result, *_ = timed(replace(scene, solver=Solver(rtol=rtol)))
             turning = [np.abs(result.node("base")[:, order, 3:5]).max(axis=0) for order in (0, 2)]
-            found.append((*turning, result.peaks.node_acceleration, result.peaks.axial_force))
+            found.append((*turning, result.extremes.node_acceleration, result.extremes.axial_force))
         for rtol, peaks in zip(tolerances, found[:-1], strict=True):
             cells = [f"{np.abs(a - b).max() / np.abs(b).max():.1%}" for a, b in zip(peaks, found[-1], strict=True)]
             print(f"| {ratio:.1%} | {rtol:g} | " + " | ".join(cells) + " |", flush=True)

@@ -81,7 +81,7 @@ def peak_row(result: Result, closed: bool) -> str:
     cells = [
         f"`{result.scene.name}`",
         f"{u * MILLI:.2f}",
-        f"{summary['peak_top_force']['radial'] / 1e3:.2f}",
+        f"{summary['peak_force']['radial'] / 1e3:.2f}",
         f"{summary['peak_force_ratio']:.4f}",
     ]
     if closed:

@@ -37,7 +37,7 @@ PLANAR = {  # about 2 ms a run
     "effects": {"dimension": "planar", "sliders": "massless", "rims": False, "bouc_wen": "plastic"},
     "solver": {"rtol": 1e-2},
 }
-KEEP = ["peak_displacement", "peak_top_force", "peak_sliding"]
+KEEP = ["peak_displacement", "peak_force", "peak_sliding"]
 
 
 def planar(runs: int, seed: int = 1, **changes: Any) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
+    from msfp_gen.analysis.any_result import characterise
     from msfp_gen.buildings.building import Building
-    from msfp_gen.buildings.characterise import characterise
     from msfp_gen.buildings.load import changed_scene, load_scene
     from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
     from msfp_gen.buildings.soil import Soil
@@ -68,7 +68,7 @@ _MODULES = {
     "bound": "studies.bounding",
     "build_model": "model.model",
     "changed_scene": "buildings.load",
-    "characterise": "buildings.characterise",
+    "characterise": "analysis.any_result",
     "fit": "studies.calibration",
     "load_scene": "buildings.load",
     "presets": "scene.file.presets",

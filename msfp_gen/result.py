@@ -6,20 +6,26 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
+from msfp_gen.analysis.characterise import Characterisation, characterise
+from msfp_gen.analysis.gradient_summary import summarise_gradients
+from msfp_gen.analysis.summary import rows_of_bearing, summarise
+from msfp_gen.analysis.tables import summary_tables
+from msfp_gen.common.tables import Table
+from msfp_gen.results import dataset
 from msfp_gen.results.history import Counters, Event, History
 from msfp_gen.results.run_data import RunData
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from msfp_gen.analysis.characterise import Characterisation
     from msfp_gen.results.files import Storage
 
 __all__ = ["Counters", "Event", "History", "Result"]
 
 
-@dataclass(frozen=True, eq=False, init=False)
-class Result(RunData):
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Result(AnyResult, RunData):
     """The result of `simulate`; a RunError has one in `.result` if the run failed after its start.
 
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
@@ -27,24 +33,25 @@ class Result(RunData):
     options with which the result was computed. notes: messages of the monitors, in order of time (docs/effects.md).
     """
 
-    def __repr__(self) -> str:
-        """The main results in ten lines at most."""
-        from msfp_gen.analysis.brief import brief_text
-
-        return brief_text(self)
-
-    def _repr_html_(self) -> str:
-        """The main results and the hysteresis loop, for a notebook."""
-        from msfp_gen.analysis.brief import brief_html
-
-        return brief_html(self)
-
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
-        from msfp_gen.analysis.summary import summarise
-
         return summarise(self)
+
+    def main_results(self) -> Rows:
+        """Label and value of the main results."""
+        steps, wall_time = self.counters.steps, self.counters.wall_time
+        time = f"{self.history.time[-1]:.6g} s in {steps} steps, {wall_time:.3g} s"
+        return [("time", time), *rows_of_bearing(self.summary)]
+
+    @property
+    def curve(self) -> Curve:
+        """The hysteresis loop."""
+        return hysteresis_loop(self.history, self.history.top_force)
+
+    def tables(self) -> list[Table]:
+        """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
+        return summary_tables(self.summary, self.scene.bearing.surfaces)
 
     @cached_property
     def gradient(self) -> xr.Dataset:
@@ -52,9 +59,7 @@ class Result(RunData):
 
         Raises InputError where the run computed none.
         """
-        from msfp_gen.results.dataset import to_gradient_dataset
-
-        return to_gradient_dataset(self)
+        return dataset.to_gradient_dataset(self)
 
     @cached_property
     def gradient_summary(self) -> dict[str, dict[str, Any]]:
@@ -62,8 +67,6 @@ class Result(RunData):
 
         Raises InputError where the run computed none.
         """
-        from msfp_gen.analysis.gradient_summary import summarise_gradients
-
         return summarise_gradients(self)
 
     def characterise(self) -> Characterisation:
@@ -71,13 +74,9 @@ class Result(RunData):
 
         Raises InputError where the bearing did not move.
         """
-        from msfp_gen.analysis.characterise import characterise
-
         return characterise(self)
 
     @classmethod
     def storage(cls) -> Storage:
         """The functions of `results/dataset.py`."""
-        from msfp_gen.results import dataset
-
         return dataset

@@ -39,7 +39,7 @@ class SummaryGradient(dict[str, Any]):
 def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
-    Keys: peak_displacement, peak_top_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
+    Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
     maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary; and of runs with
     `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors were measured, error:
     that of each derivative, with the same keys. Raises InputError where the run computed no derivatives, and for a key
@@ -64,7 +64,7 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
     names = (*LABELS["axis"], "radial")
     found = SummaryGradient(
         peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
-        peak_top_force=dict(zip(names, slopes["top_force"].tolist(), strict=True)),
+        peak_force=dict(zip(names, slopes["top_force"].tolist(), strict=True)),
         peak_force_ratio=ratio,
         peak_sliding=slopes["sliding"].tolist(),
         minimum_gap=slopes["gap"].tolist(),

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.analysis.transitions import is_monotonic, transitions
-from msfp_gen.results.extremes import by_axis
+from msfp_gen.common.arrays import Array
+from msfp_gen.results.extremes import Extremes, by_axis
 from msfp_gen.results.history import History
 
 if TYPE_CHECKING:
+    from msfp_gen.results.files import ResultFiles
     from msfp_gen.results.run_data import RunData
 
 
@@ -23,7 +25,7 @@ def summarise(result: RunData) -> dict[str, Any]:
         name, status, message: of the run.
         notes: messages of monitors, one line each.
         duration: simulated time [s].
-        peak_displacement, peak_top_force: largest magnitude along E1, E2, E3 and in the horizontal plane (`radial`)
+        peak_displacement, peak_force: largest magnitude along E1, E2, E3 and in the horizontal plane (`radial`)
             [m], [N]. These and the other extremes are over all accepted steps, whatever the times of the rows.
         axial_load: constant axial load [N]; None without one.
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
@@ -38,31 +40,13 @@ def summarise(result: RunData) -> dict[str, Any]:
         peak_temperature: [degC], of runs with a friction law that heats.
         transitions: of monotonic runs, see `transitions.transitions`.
     """
-    history, counters = result.history, asdict(result.counters)
-    duration = float(history.time[-1] - history.time[0])
+    extremes, load, counters = result.extremes, axial_load(result), asdict(result.counters)
     wall_time = counters.pop("wall_time")
-    load = axial_load(result)
-    extremes = result.extremes
-    force = by_axis(extremes.top_force)
-    summary: dict[str, Any] = {
-        "name": result.scene.name,
-        "status": result.status,
-        "message": result.message,
-        "notes": [note.line for note in result.notes],
-        "duration": duration,
-        "peak_displacement": by_axis(extremes.displacement),
-        "peak_top_force": force,
-        "axial_load": load,
-        "peak_force_ratio": force["radial"] / load if load else None,
-        "peak_sliding": extremes.sliding.tolist(),
-        "minimum_gap": extremes.gap.tolist(),
+    summary = {
+        **summary_of_run(result, result.history.time, counters, wall_time),
+        **peaks_of_bearing(extremes, load),
         "rims_met": rims_met(result),
-        "minimum_normal_force": extremes.least_normal.tolist(),
-        "maximum_normal_force": extremes.most_normal.tolist(),
-        "energy": energy_balance(history),
-        "counters": counters,
-        "wall_time": wall_time,
-        "real_time_factor": duration / wall_time if wall_time > 0 else None,
+        "energy": energy_balance(result.history),
     }
     if extremes.least_friction is not None and extremes.most_friction is not None:
         summary["least_friction"] = extremes.least_friction.tolist()
@@ -72,6 +56,48 @@ def summarise(result: RunData) -> dict[str, Any]:
     if is_monotonic(result):
         summary["transitions"] = transitions(result, load)
     return summary
+
+
+def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int], wall_time: float) -> dict[str, Any]:
+    """The part of a summary that bearings and buildings have: name, how the run ended, its duration and its work."""
+    duration = float(time[-1] - time[0])
+    return {
+        "name": result.scene.name,
+        "status": result.status,
+        "message": result.message,
+        "notes": [note.line for note in result.notes],
+        "duration": duration,
+        "counters": dict(counters),
+        "wall_time": wall_time,
+        "real_time_factor": duration / wall_time if wall_time > 0 else None,
+    }
+
+
+def peaks_of_bearing(extremes: Extremes, load: float | None) -> dict[str, Any]:
+    """The part of a summary that all bearings have, alone or below a building. load: axial [N], where it is known."""
+    force = by_axis(extremes.top_force)
+    return {
+        "peak_displacement": by_axis(extremes.displacement),
+        "peak_force": force,
+        "axial_load": load,
+        "peak_force_ratio": force["radial"] / load if load else None,
+        "peak_sliding": extremes.sliding.tolist(),
+        "minimum_gap": extremes.gap.tolist(),
+        "minimum_normal_force": extremes.least_normal.tolist(),
+        "maximum_normal_force": extremes.most_normal.tolist(),
+    }
+
+
+def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of these peaks."""
+    ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
+    least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
+    return [
+        ("peak displacement", f"{1e3 * summary['peak_displacement']['radial']:.4g} mm"),
+        ("peak force", f"{1e-3 * summary['peak_force']['radial']:.4g} kN{ratio}"),
+        ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in summary["peak_sliding"]) + " mm, bottom first"),
+        ("normal force", f"{1e-3 * least:.4g} to {1e-3 * most:.4g} kN"),
+    ]
 
 
 def energy_balance(history: History) -> dict[str, float | None]:

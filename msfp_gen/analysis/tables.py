@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.analysis.summary import summarise
 from msfp_gen.analysis.transitions import SYMBOLS
 from msfp_gen.common.tables import Table, yes
 
 if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.scene.bearing import Surface
 
 MEANINGS = {
     "u_star": "surface 2 stops sliding",
@@ -21,17 +20,16 @@ MEANINGS = {
 }
 
 
-def summary_tables(result: RunData) -> list[Table]:
-    """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
-    summary = summarise(result)
-    tables = [_run_table(summary), _surface_table(summary, result)]
+def summary_tables(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> list[Table]:
+    """Tables of peaks and surfaces, and of the transitions of a monotonic run. summary: as of `summary.summarise`."""
+    tables = [_run_table(summary), surface_table(summary, surfaces)]
     if "transitions" in summary:
         tables.append(transition_table(summary["transitions"]))
     return tables
 
 
 def _run_table(summary: Mapping[str, Any]) -> Table:
-    displacement, force, energy = summary["peak_displacement"], summary["peak_top_force"], summary["energy"]
+    displacement, force, energy = summary["peak_displacement"], summary["peak_force"], summary["energy"]
     ratio, counters = summary["peak_force_ratio"], summary["counters"]
     over = "" if ratio is None else f", radial over axial load {ratio:.4f}"
     rows = [
@@ -59,8 +57,8 @@ SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
 }
 
 
-def _surface_table(summary: Mapping[str, Any], result: RunData) -> Table:
-    surfaces = result.scene.bearing.surfaces
+def surface_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Table:
+    """Peaks of the surfaces of a bearing."""
     values: dict[str, Any] = {
         **summary,
         "capacity": [surface.capacity for surface in surfaces],

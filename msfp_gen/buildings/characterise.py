@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import pi, sqrt
 from typing import Any
@@ -11,12 +12,8 @@ import numpy as np
 from msfp_gen.analysis.characterise import tables
 from msfp_gen.analysis.characterise.loops import Loop, Path
 from msfp_gen.analysis.characterise.report import Characterisation
-from msfp_gen.analysis.characterise.report import characterise as characterise_bearing
-from msfp_gen.buildings.data import BearingResult, BuildingData
-from msfp_gen.buildings.summary import floor_rows, storey_rows
+from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table, yes
-from msfp_gen.errors import InputError
-from msfp_gen.results.run_data import RunData
 
 NO_CYCLES = "no cycle closes in one direction: no effective stiffness and damping; the secant ones are at the peak"
 
@@ -37,6 +34,20 @@ class BearingDemand:
     maximum_load_ratio: float
     residual_displacement: float
     dissipated: float
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any], residual_displacement: float) -> BearingDemand:
+        """From the summary of a bearing."""
+        return cls(
+            summary["number"],
+            summary["name"],
+            summary["peak_displacement"]["radial"],
+            min(summary["minimum_gap"]),
+            summary["minimum_load_ratio"],
+            summary["maximum_load_ratio"],
+            residual_displacement,
+            summary["dissipated"],
+        )
 
 
 @dataclass(frozen=True)
@@ -75,6 +86,48 @@ class BuildingCharacterisation:
     bearings: tuple[BearingDemand, ...]
     notes: tuple[str, ...]
 
+    @classmethod
+    def of(
+        cls,
+        path: Path,
+        gravity: float,
+        mean_displacement: Array,
+        summary: Mapping[str, Any],
+        bearings: Sequence[BearingDemand],
+    ) -> BuildingCharacterisation:
+        """Characterise a run by its summary.
+
+        path: base shear over the mean displacement of the bearings. gravity [m/s^2]. mean_displacement: largest
+        magnitudes of that displacement along E1, E2, E3 and in the plane, shape (4,) [m].
+        """
+        cycles, stiffness, weight = tuple(loop for *_, loop in path.cycles()), path.secant_stiffness, summary["weight"]
+        notes = [] if cycles else [NO_CYCLES]
+        if not path.at_rest:
+            notes.append("the building still moves when the run ends, so that its last displacement is no residual one")
+        return cls(
+            name=summary["name"],
+            status=summary["status"],
+            direction=(float(path.direction[0]), float(path.direction[1])),
+            weight=weight,
+            peak_displacement=float(mean_displacement[3]),
+            peak_force=summary["peak_force"]["radial"],
+            secant_stiffness=stiffness,
+            secant_period=2 * pi * sqrt(weight / (gravity * stiffness)) if stiffness > 0 and gravity else None,
+            cycles=cycles,
+            residual_displacement=path.residual,
+            at_rest=path.at_rest,
+            energy_dissipated=summary["energy"]["dissipated"],
+            peak_floor_acceleration=summary["peak_floor_acceleration"]["radial"],
+            peak_drift_ratio=summary["peak_drift_ratio"],
+            bearings=tuple(bearings),
+            notes=tuple(notes),
+        )
+
+    @property
+    def capacity_left(self) -> float:
+        """The least of all bearings [m]."""
+        return min(bearing.capacity_left for bearing in self.bearings)
+
     def __repr__(self) -> str:
         """The main quantities in ten lines at most."""
         return "\n".join([f"Characterisation of {self.name or 'an unnamed building'}, status {self.status}",
@@ -83,63 +136,6 @@ class BuildingCharacterisation:
     def as_dict(self) -> dict[str, Any]:
         """Plain data, ready for JSON."""
         return asdict(self)
-
-
-def characterise(result: RunData | BuildingData | BearingResult) -> Characterisation | BuildingCharacterisation:
-    """Characterise a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
-
-    Raises InputError where nothing moved.
-    """
-    if isinstance(result, BearingResult):
-        return result.characterise()
-    if isinstance(result, BuildingData):
-        return characterise_building(result)
-    if isinstance(result, RunData):
-        return characterise_bearing(result)
-    raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
-
-
-def characterise_building(result: BuildingData) -> BuildingCharacterisation:
-    """Characterise the run of a building. Raises InputError if its bearings did not move."""
-    mean = np.mean([one.displacement for one in result.bearings], axis=0)
-    path = Path.of(result.time, mean, result.base_reaction, "the bearings")
-    cycles, stiffness = tuple(loop for *_, loop in path.cycles()), path.secant_stiffness
-    gravity, weight = result.scene.gravity, result.scene.weight
-    notes = [] if cycles else [NO_CYCLES]
-    if not path.at_rest:
-        notes.append("the building still moves when the run ends, so that its last displacement is no residual one")
-    return BuildingCharacterisation(
-        name=result.scene.name,
-        status=result.status,
-        direction=(float(path.direction[0]), float(path.direction[1])),
-        weight=weight,
-        peak_displacement=float(result.peaks.mean_displacement[3]),
-        peak_force=float(result.peaks.base_reaction[3]),
-        secant_stiffness=stiffness,
-        secant_period=2 * pi * sqrt(weight / (gravity * stiffness)) if stiffness > 0 and gravity else None,
-        cycles=cycles,
-        residual_displacement=path.residual,
-        at_rest=path.at_rest,
-        energy_dissipated=float(result.dissipated[-1].sum()),
-        peak_floor_acceleration=max(floor["peak_acceleration"]["radial"] for floor in floor_rows(result)),
-        peak_drift_ratio=max((storey["peak_drift_ratio"] for storey in storey_rows(result)), default=None),
-        bearings=tuple(map(_demand, result.bearings)),
-        notes=tuple(notes),
-    )
-
-
-def _demand(one: BearingResult) -> BearingDemand:
-    s = one.summary
-    return BearingDemand(
-        s["number"],
-        s["name"],
-        s["peak_displacement"]["radial"],
-        min(s["minimum_gap"]),
-        s["minimum_load_ratio"],
-        s["maximum_load_ratio"],
-        float(np.hypot(*one.displacement[-1, :2])),
-        s["dissipated"],
-    )
 
 
 def _rows(system: BuildingCharacterisation) -> list[tuple[str, str]]:

@@ -12,10 +12,12 @@ from typing import Protocol
 import numpy as np
 
 from msfp_gen.buildings.bearing_member import Change, Member, earlier_work
-from msfp_gen.buildings.peaks import Peaks, vectors
+from msfp_gen.buildings.extremes import BuildingExtremes, padded, vectors
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
+from msfp_gen.coupling.response import DISSIPATED
 from msfp_gen.errors import InputError
 from msfp_gen.jit.driver import load_driver
 from msfp_gen.model.compiled import AnyRun, Port
@@ -23,6 +25,7 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import next_effects
+from msfp_gen.specification.contract import WORKS, names
 
 BEARINGS_OF_A_THREAD = 8  # fewer are not worth a thread
 ENERGIES = ("damped", "received", "input")
@@ -75,9 +78,9 @@ class BuildingRun:
         return self.run.time
 
     @property
-    def peaks(self) -> Peaks:
-        """Peaks over all steps."""
-        return Peaks.of_run(self.scene, self.run.peaks, [member.shapes for member in self.members])
+    def extremes(self) -> BuildingExtremes:
+        """Extremes over all steps."""
+        return BuildingExtremes.of_run(self.scene, self.run.peaks, [member.shapes for member in self.members])
 
     def snapshot(self) -> bytes:
         """State with all rows and all changes of models."""
@@ -211,6 +214,44 @@ def unpacked(run: BuildingRun) -> dict[str, Array]:
         work = rows[f"work {index}"]
         rows[f"work {index}"] = work + earlier_work(run.changes, index, work.shape)
     return rows
+
+
+def result_of(run: BuildingRun) -> BuildingResult:
+    """The rows of a run until now."""
+    rows = unpacked(run)
+    count = len(run.members)
+    works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
+    return BuildingResult(
+        scene=run.scene,
+        time=rows["time"],
+        displacement=rows["displacement"],
+        velocity=rows["velocity"],
+        acceleration=rows["acceleration"],
+        ground=rows["ground"][:, 0],
+        wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
+        normal_force=padded([rows[f"normal {i}"] for i in range(count)], np.nan),
+        sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
+        dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
+        stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
+        damped=rows["damped"],
+        received=rows["received"],
+        input=rows["input"],
+        support=rows["ground"][:, run.scene.grounds[1]],
+        counters=run.run.counts,
+        monitored=run.notes,
+        recorded_extremes=run.extremes if len(rows["time"]) else None,
+    )
+
+
+def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
+    """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
+    upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
+    stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
+    stiffness += 2 * [interface.rotational_stiffness]
+    found: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
+    for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
+        found = found + rows[f"{name} {index}"]
+    return found
 
 
 def _threads(given: int | None, bearings: int) -> int:

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.extremes import BuildingExtremes
+from msfp_gen.buildings.extremes import shapes as shapes_of_extremes
 from msfp_gen.buildings.file import stored_bearing
-from msfp_gen.buildings.peaks import Peaks
-from msfp_gen.buildings.peaks import shapes as shapes_of_peaks
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
@@ -113,7 +112,7 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     return BuildingScene(building, bearings, motions[0], solver, duration, name, step)
 
 
-PEAKS = "peaks"  # group
+EXTREMES = "extremes"  # group
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
 GROUND = ("displacement", "velocity", "acceleration")
@@ -138,13 +137,13 @@ class Derived(NamedTuple):
     """A variable that follows from the stored ones: dimensions after time, values, unit, meaning, sign."""
 
     dims: tuple[str, ...]
-    values: Callable[[BuildingData], Array]
+    values: Callable[[Any], Array]
     unit: str
     meaning: str
     sign: str = ""
 
 
-def _nodes(order: int, result: BuildingData) -> Array:
+def _nodes(order: int, result: Any) -> Array:
     """A derivative of the motion of every node, shape (k, nodes, 6)."""
     return np.stack([result.node(node.name)[:, order] for node in result.scene.building.nodes], axis=1)
 
@@ -216,25 +215,25 @@ DERIVED = {
 }
 
 
-def _of_bearings(result: BuildingData, name: str) -> Array:
+def _of_bearings(result: Any, name: str) -> Array:
     """A quantity of every bearing, shape (k, bearings, 3)."""
     return np.stack([getattr(one, name) for one in result.bearings], axis=1)
 
 
-def to_dataset(result: BuildingData) -> xr.Dataset:
+def to_dataset(result: Any) -> xr.Dataset:
     """All variables along time; scene, status, notes of the monitors and versions in the attributes."""
     import xarray as xr
 
     values = {name: (variable, getattr(result, variable.field)[variable.part]) for name, variable in STORED.items()}
     variables = {name: _array(variable, rows) for name, (variable, rows) in values.items()}
     variables |= {name: _array(variable, variable.values(result)) for name, variable in _derived(result)}
-    counters = {**result.counts, "wall_time": result.wall_time}
+    counters = {**result.counters, "wall_time": result.wall_time}
     about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
     return xr.Dataset(variables, dict(_coordinates(result)), attrs=about)
 
 
-def _derived(result: BuildingData) -> Iterator[tuple[str, Derived]]:
+def _derived(result: Any) -> Iterator[tuple[str, Derived]]:
     """Those of storeys only where there are some."""
     for name, variable in DERIVED.items():
         if result.scene.building.columns or "storey" not in variable.dims:
@@ -260,7 +259,7 @@ def _labels(scene: BuildingScene) -> dict[str, Sequence[Any]]:
     }
 
 
-def _coordinates(result: BuildingData) -> Iterator[tuple[str, Any]]:
+def _coordinates(result: Any) -> Iterator[tuple[str, Any]]:
     meanings = {
         "freedom": "along and about E1, E2, E3",
         "coordinate": "of the building, from 0",
@@ -273,31 +272,31 @@ def _coordinates(result: BuildingData) -> Iterator[tuple[str, Any]]:
         yield dim, (dim, values, {"long_name": meanings[dim]} if dim in meanings else {})
 
 
-def groups_of(result: BuildingData) -> dict[str, xr.Dataset]:
-    """The groups of a file beside the dataset: matrices, motions of the ground, peaks."""
+def groups_of(result: Any) -> dict[str, xr.Dataset]:
+    """The groups of a file beside the dataset: matrices, motions of the ground, extremes."""
     groups = {GROUP: to_arrays(result.scene.building)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
-    return groups | ({} if result.recorded_peaks is None else {PEAKS: result.recorded_peaks.to_arrays()})
+    return groups | ({} if result.recorded_extremes is None else {EXTREMES: result.recorded_extremes.to_arrays()})
 
 
 def edition() -> str:
     """A digest of the names that a file of this version has."""
-    table = [*STORED, *(field.name for field in fields(Peaks))]
+    table = [*STORED, *(field.name for field in fields(BuildingExtremes))]
     return sha256(json.dumps(table).encode()).hexdigest()[:12]
 
 
 def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
-    """Scene, rows, peaks, counters and notes of a file, as `ResultFiles.fields_in`."""
+    """Scene, rows, extremes, counters and notes of a file, as `ResultFiles.fields_in`."""
     scene = _scene(root, about, arrays)
     rows = _rows(root, scene, arrays)
-    counts: dict[str, Any] = without(COUNTER, about)
+    counters: dict[str, Any] = without(COUNTER, about)
     return {
         "scene": scene,
         **rows,
-        "wall_time": counts.pop("wall_time"),
-        "counts": counts,
+        "wall_time": counters.pop("wall_time"),
+        "counters": counters,
         "monitored": notes_in(about),
-        "recorded_peaks": _peaks(root.group(PEAKS), scene, arrays) if PEAKS in root else None,
+        "recorded_extremes": _extremes(root.group(EXTREMES), scene, arrays) if EXTREMES in root else None,
     }
 
 
@@ -316,14 +315,14 @@ def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Bu
     return scene_from(text, matrices, motions)
 
 
-def _peaks(group: StoredGroup, scene: BuildingScene, arrays: Arrays) -> Peaks:
-    peaks = {name: group.array(name, shape) for name, shape in shapes_of_peaks(scene).items()}
-    arrays |= {f"{PEAKS}/{name}": values for name, values in peaks.items()}
-    return Peaks(**peaks)
+def _extremes(group: StoredGroup, scene: BuildingScene, arrays: Arrays) -> BuildingExtremes:
+    extremes = {name: group.array(name, shape) for name, shape in shapes_of_extremes(scene).items()}
+    arrays |= {f"{EXTREMES}/{name}": values for name, values in extremes.items()}
+    return BuildingExtremes(**extremes)
 
 
 def _rows(root: StoredGroup, scene: BuildingScene, arrays: Arrays) -> dict[str, Any]:
-    """The rows by the names that `BuildingData` has for them. Raises ValueError where they are not finite."""
+    """The rows by the names that `BuildingResult` has for them. Raises ValueError where they are not finite."""
     count, bearings = root.length("time"), len(scene.bearings)
     surfaces = np.array([one.bearing.layout.surfaces for one in scene.bearings])
     sizes = {"coordinate": len(scene.building.mass), "axis": 3, "bearing": bearings, "surface": int(surfaces.max())}

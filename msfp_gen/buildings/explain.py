@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msfp_gen.buildings.plausibility import building_doubts
-from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, remaining_loads, standing_below
+from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.tables import Table, vector
-from msfp_gen.scene import explain as one
+from msfp_gen.scene import explain as tables
 from msfp_gen.scene.effect_selection import doubtful_values
 from msfp_gen.scene.standing import unsteady
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.load import AnyScene
-    from msfp_gen.scene.top import NodeTop
 
 LISTED = 12  # frequencies of the frame that are listed
 
 
 def explain(scene: AnyScene) -> list[Table]:
     """Tables that describe a scene, of one bearing or of a building."""
-    return explain_building(scene) if isinstance(scene, BuildingScene) else one.explain(scene)
+    return explain_building(scene) if isinstance(scene, BuildingScene) else tables.explain(scene)
 
 
 def explain_building(scene: BuildingScene) -> list[Table]:
@@ -33,8 +32,8 @@ def explain_building(scene: BuildingScene) -> list[Table]:
         bearing_table(scene),
         *_kinds(scene),
         *_interfaces(scene),
-        *one.doubt_tables(_doubts(scene)),
-        *map(one.motion_table, scene.grounds[0]),
+        *tables.doubt_tables(_doubts(scene)),
+        *map(tables.motion_table, scene.grounds[0]),
         *effect_tables(scene),
         _solver(scene),
     ]
@@ -55,13 +54,14 @@ def frame_table(scene: BuildingScene) -> Table:
 
 def bearing_table(scene: BuildingScene) -> Table:
     """The bearings: kind, place, load at rest."""
-    kinds = [kind.bearing for kind, _ in grouped(scene.bearings)]
+    kinds = grouped(one.bearing for one in scene.bearings)
+    kind_of = {index: str(number) for number, members in enumerate(kinds, start=1) for index in members}
     rows = [
         (
             str(index + 1),
             each.name or "-",
             each.bearing.layout.name,
-            str(kinds.index(each.bearing) + 1),
+            kind_of[index],
             each.node,
             *(f"{x:.4g}" for x in scene.places[index]),
             f"{load * 1e-3:.4g}",
@@ -74,50 +74,39 @@ def bearing_table(scene: BuildingScene) -> Table:
 
 def effect_tables(scene: BuildingScene) -> Iterator[Table]:
     """The effects of each bearing, those with the same ones together; loads that decide are the least of them."""
-    groups: dict[object, list[int]] = {}
     remaining = remaining_loads(scene)
-    for index, selection in enumerate(scene.effect_selections):
-        asked = tuple((reason.effect, reason.chosen) for reason in selection.reasons)
-        groups.setdefault((selection.effects, asked, scene.bearings[index].bearing), []).append(index)
-    for members in groups.values():
+    keys = (
+        (selection.effects, tuple((reason.effect, reason.chosen) for reason in selection.reasons), one.bearing)
+        for selection, one in zip(scene.effect_selections, scene.bearings, strict=True)
+    )
+    for members in grouped(keys):
         decisive = min(members, key=lambda index: float(remaining[index]))  # keeps the least of its load
         selection = scene.effect_selections[decisive]
-        table = one.effect_table(selection)
+        table = tables.effect_table(selection)
         yield Table(f"{_numbers(members, len(scene.bearings))}: {table.title}", (), table.rows)
-        yield from one.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
+        yield from tables.friction_tables(selection.effects.law, scene.bearings[members[0]].bearing)
 
 
-def grouped(bearings: Sequence[BuildingBearing]) -> list[tuple[BuildingBearing, list[int]]]:
-    """The bearings of a building, each kind of values once, with the indices of those that have them."""
-    found: list[tuple[BuildingBearing, list[int]]] = []
-    for index, each in enumerate(bearings):
-        for kind, members in found:
-            if kind.bearing == each.bearing:
-                members.append(index)
-                break
-        else:
-            found.append((each, [index]))
-    return found
+def grouped(keys: Iterable[Hashable]) -> list[list[int]]:
+    """Indices of equal keys together, in the order of the first of each."""
+    groups: dict[Hashable, list[int]] = {}
+    for index, key in enumerate(keys):
+        groups.setdefault(key, []).append(index)
+    return list(groups.values())
 
 
 def _kinds(scene: BuildingScene) -> Iterator[Table]:
-    for number, (kind, members) in enumerate(grouped(scene.bearings), start=1):
-        for table in (
-            one.surface_table(kind.bearing),
-            *one.doubt_tables(doubtful_values(kind.bearing)),
-            one.body_table(kind.bearing),
-        ):
-            where = _numbers(members, len(scene.bearings))
+    for number, members in enumerate(grouped(one.bearing for one in scene.bearings), start=1):
+        bearing, where = scene.bearings[members[0]].bearing, _numbers(members, len(scene.bearings))
+        doubts = tables.doubt_tables(doubtful_values(bearing))
+        for table in (tables.surface_table(bearing), *doubts, tables.body_table(bearing)):
             yield Table(f"kind {number}, {where}: {table.title}", table.columns, table.rows)
 
 
 def _interfaces(scene: BuildingScene) -> Iterator[Table]:
-    groups: dict[NodeTop, list[int]] = {}
-    for index, each in enumerate(scene.bearings):
-        groups.setdefault(each.interface, []).append(index)
-    for interface, members in groups.items():
+    for members in grouped(one.interface for one in scene.bearings):
         where = _numbers(members, len(scene.bearings))
-        yield one.top_table(interface, f"interface to the building, {where}")
+        yield tables.top_table(scene.bearings[members[0]].interface, f"interface to the building, {where}")
 
 
 def _doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:

@@ -1,98 +1,512 @@
-"""`BuildingResult`: what the run of a building gives."""
+"""`BuildingResult`: what the run of a building gives; `BearingResult`: one of its bearings."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
-from msfp_gen.buildings.data import BuildingData
-from msfp_gen.buildings.peaks import padded
+from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
+from msfp_gen.analysis.characterise.loops import Path
+from msfp_gen.analysis.characterise.report import Characterisation, characterise_rows
+from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run
+from msfp_gen.analysis.tables import surface_table
+from msfp_gen.buildings import dataset as building_dataset
+from msfp_gen.buildings import summary as summaries
+from msfp_gen.buildings.characterise import BearingDemand, BuildingCharacterisation
+from msfp_gen.buildings.extremes import BuildingExtremes
+from msfp_gen.buildings.notes import notes_of
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
-from msfp_gen.coupling.response import DISSIPATED
-from msfp_gen.specification.contract import WORKS, names
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.results.dataset import coordinates_of, named_columns
+from msfp_gen.results.extremes import Extremes, by_axis, largest
+from msfp_gen.results.files import KINDS, Storage, attributes_of
+from msfp_gen.results.history import Event, HorizontalMotion
+from msfp_gen.results.note import Note
+from msfp_gen.scene.file.loader import bearing_table, plain_table
+from msfp_gen.scene.file.toml_text import dumps
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.characterise import BuildingCharacterisation
-    from msfp_gen.results.files import Storage
+    import xarray as xr
+
+    from msfp_gen.scene.bearing import Bearing
+
+# The variables of the dataset of one bearing that `Result.dataset` has too, and the others with unit and meaning.
+RECORDED = ("normal_force", "sliding", "gap", "base_displacement", "displacement", "top_force", "top_moment")
+MORE = {
+    "axial_force": ("N", "compression between bearing and building"),
+    "dissipated": ("J", "energy dissipated in the bearing"),
+    "stored": ("J", "energy stored in the bearing and its interface"),
+}
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
-class BuildingResult(BuildingData):
-    """The result of `simulate` of a building; a RunError has one in `.result` if the run failed after its start."""
+@dataclass(frozen=True, eq=False, repr=False)
+class BuildingResult(AnyResult):
+    """The result of `simulate` of a building; a RunError has one in `.result` if the run failed after its start.
 
-    def __repr__(self) -> str:
-        """The main results in ten lines at most."""
-        from msfp_gen.buildings.summary import brief_text
+    Motion of the building, and forces and sliding of its bearings, at k times.
 
-        return brief_text(self)
+    time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
+    the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
+    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
+    (k, bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape
+    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of each bearing, shape (k, bearings, most
+    surfaces) [N], [m], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]: dissipated:
+    in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
+    received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
+    counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the number of its
+    bearing. recorded_extremes: over all steps; None: not recorded. status: "ok" or the name of a failure; message: one
+    line of text, "" for a run that succeeded. provenance: versions with which the result was computed. wall_time [s].
+    """
 
-    def _repr_html_(self) -> str:
-        """The main results and the orbit of the bearing that moves most, for a notebook."""
-        from msfp_gen.buildings.summary import brief_html
+    source: ClassVar[str] = "msfp-gen building"
+    scene: BuildingScene
+    time: Array
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    ground: Array
+    wrench: Array
+    normal_force: Array
+    sliding: Array
+    dissipated: Array
+    stored: Array
+    damped: Array
+    received: Array
+    input: Array
+    support: Array
+    counters: dict[str, int]
+    monitored: tuple[Note, ...] = ()
+    recorded_extremes: BuildingExtremes | None = None
+    status: str = "ok"
+    message: str = ""
+    provenance: dict[str, str] = field(default_factory=dict)
+    wall_time: float = 0.0
 
-        return brief_html(self)
+    @cached_property
+    def bearings(self) -> tuple[BearingResult, ...]:
+        """The result of every bearing."""
+        return tuple(BearingResult.of(self, index) for index in range(len(self.scene.bearings)))
+
+    @cached_property
+    def notes(self) -> tuple[Note, ...]:
+        """Messages of the monitors in order of time; each names its bearing (docs/buildings.md)."""
+        error, row = self.energy_error
+        return notes_of(self.scene, self.monitored, error, float(self.time[row]))
+
+    @cached_property
+    def extremes(self) -> BuildingExtremes:
+        """Extremes over all steps, or of the rows where the run did not record them."""
+        return self.recorded_extremes or self._extremes_of_rows()
+
+    def node(self, name: str) -> Array:
+        """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m], [rad] and per s, s^2."""
+        rows = self.scene.building.node(name).rows
+        return np.stack([values @ rows.T for values in (self.displacement, self.velocity, self.acceleration)], axis=1)
+
+    @property
+    def bearing_displacement(self) -> Array:
+        """Displacement of the upper end of each bearing relative to the ground, shape (k, bearings, 3) [m]."""
+        upper: Array = np.einsum("bin,kn->kbi", self.scene.attachments[:, :3], self.displacement)
+        return upper - self.support[:, :, 0]
+
+    @property
+    def axial_force(self) -> Array:
+        """Compression between the building and each bearing, shape (k, bearings) [N]."""
+        return -self.wrench[:, :, 1, 2]
+
+    @property
+    def drift(self) -> Array:
+        """Deformation of the columns of each storey, along and about E1, E2, E3, shape (k, storeys, 6) [m], [rad]."""
+        rows = np.array([column.deformation for column in self.scene.building.columns]).reshape(-1, 6, self._size)
+        deformation: Array = np.einsum("sin,kn->ksi", rows, self.displacement)
+        return deformation
+
+    @property
+    def storey_force(self) -> Array:
+        """Force and moment that accelerate the floors above, at half height of each storey, shape (k, storeys, 6).
+
+        [N], [N m]; the first two are the storey shears. Weights are not included.
+        """
+        rows = np.array([column.inertia for column in self.scene.building.columns]).reshape(-1, 6, self._size)
+        force: Array = np.einsum("sin,kn->ksi", rows, self.acceleration)
+        return force
+
+    @property
+    def base_reaction(self) -> Array:
+        """Sum of the forces that the ground exerts on the bearings, shape (k, 3) [N]."""
+        forces: Array = self.wrench[:, :, 0, :3].sum(axis=1)
+        return forces
+
+    @property
+    def base_torsion(self) -> Array:
+        """Moment of the forces of the ground about E3 through the centre of mass at rest, shape (k,) [N m]."""
+        arms = self.scene.places - self.scene.mass_centre
+        forces = self.wrench[:, :, 0]
+        moments = arms[:, 0] * forces[..., 1] - arms[:, 1] * forces[..., 0] + forces[..., 5]
+        total: Array = moments.sum(axis=1)
+        return total
+
+    @property
+    def kinetic(self) -> Array:
+        """Kinetic energy of the building, shape (k,) [J]."""
+        return 0.5 * _squares(self.velocity, self.scene.building.mass)
+
+    @property
+    def strain(self) -> Array:
+        """Energy of deformation of the building, from the place at rest, shape (k,) [J]."""
+        return 0.5 * _squares(self.displacement, self.scene.building.stiffness)
+
+    @property
+    def _size(self) -> int:
+        return len(self.scene.building.mass)
+
+    def _extremes_of_rows(self) -> BuildingExtremes:
+        scene = self.scene
+        names = [node.name for node in scene.building.nodes]
+        nodes = np.reshape([self.node(name) for name in names], (len(names), len(self.time), 3, 6))
+        across = -np.moveaxis(self.bearing_displacement, 1, 0)
+        sliding, normal = np.nan_to_num(self.sliding), np.nan_to_num(self.normal_force)
+        force, axial = np.moveaxis(self.wrench[:, :, 1, :3], 1, 0), self.axial_force
+        base = scene.bearings[0].node
+        return BuildingExtremes(
+            node_acceleration=largest(nodes[:, :, 2, :3]),
+            node_displacement=largest(nodes[:, :, 0, :3] - self.ground[:, 0]),
+            drift=largest(np.moveaxis(self.drift[..., :3], 1, 0)),
+            storey_shear=largest(np.moveaxis(self.storey_force[..., :3], 1, 0)),
+            storey_torsion=np.abs(self.storey_force[..., 5]).max(axis=0),
+            base_twist=np.abs(self.node(base)[:, 0, 5]).max(keepdims=True),
+            mean_displacement=largest(across.mean(axis=0)),
+            base_reaction=largest(self.base_reaction),
+            base_torsion=np.abs(self.base_torsion).max(keepdims=True),
+            energy=np.array([self.kinetic.max(), self.strain.max()]),
+            bearing_displacement=largest(across),
+            top_force=largest(force),
+            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
+            sliding=sliding.max(axis=0),
+            normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
+        )
+
+    @cached_property
+    def energy_error(self) -> tuple[float, int]:
+        """Largest difference of the work on the building from its energies, over the largest of them, and its row."""
+        terms = np.stack([self.received, self.kinetic, self.strain, self.damped])
+        difference = np.abs(terms[0] - terms[1:].sum(axis=0))
+        row, scale = int(difference.argmax()), float(np.abs(terms).max())
+        return (float(difference[row]) / scale if scale else 0.0), row
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Main results in SI units, as values that JSON can hold; `buildings.summary.summarise` lists the keys."""
-        from msfp_gen.buildings.summary import summarise
+        """Main results as plain data, ready for JSON; SI units.
 
-        return summarise(self)
+        Peaks are over all steps, along E1, E2, E3 and in the plane (`radial`).
+
+        Keys that `Result.summary` has too: name, status, message, notes, duration, counters, wall_time,
+        real_time_factor; peak_displacement: across any bearing [m]; peak_force: of the ground on all bearings, the base
+        shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: bearings (from 1) of which a slider reached
+        its rim. Others:
+            weight [N].
+            peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
+            minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
+            peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey [-].
+            floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
+                [m].
+            storeys: of each, name, height [m], peak_drift [m], peak_drift_ratio [-], peak_shear [N], peak_torsion
+                [N m].
+            bearings: see `BearingResult.summary`.
+            energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
+                at the end [J]; closure_error of the balance of the building [-].
+        """
+        extremes, weight = self.extremes, self.scene.weight
+        bearings = [one.summary for one in self.bearings]
+        floors, storeys = self.floors, self.storeys
+        force = by_axis(extremes.base_reaction)
+        return {
+            **summary_of_run(self, self.time, self.counters, self.wall_time),
+            "peak_displacement": _largest([one["peak_displacement"] for one in bearings]),
+            "weight": weight,
+            "peak_force": force,
+            "peak_force_ratio": force["radial"] / weight,
+            "peak_base_torsion": float(extremes.base_torsion[0]),
+            "peak_twist": float(extremes.base_twist[0]),
+            "minimum_load_ratio": min(one["minimum_load_ratio"] for one in bearings),
+            "maximum_load_ratio": max(one["maximum_load_ratio"] for one in bearings),
+            "rims_met": [one["number"] for one in bearings if one["rims_met"]],
+            "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
+            "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
+            "floors": floors,
+            "storeys": storeys,
+            "bearings": bearings,
+            "energy": {
+                "peak_kinetic": float(extremes.energy[0]),
+                "peak_strain": float(extremes.energy[1]),
+                "damped": float(self.damped[-1]),
+                "dissipated": float(self.dissipated[-1].sum()),
+                "closure_error": self.energy_error[0],
+            },
+        }
+
+    @property
+    def floors(self) -> list[dict[str, Any]]:
+        """Peaks of every node, as in the summary."""
+        return summaries.floor_rows(self.scene.building, self.extremes)
+
+    @property
+    def storeys(self) -> list[dict[str, Any]]:
+        """Peaks of every storey, as in the summary."""
+        return summaries.storey_rows(self.scene.building, self.extremes)
+
+    def main_results(self) -> Rows:
+        """Label and value of the main results."""
+        s = self.summary
+        moved, force, acceleration = s["peak_displacement"], s["peak_force"], s["peak_floor_acceleration"]
+        drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
+        return [
+            ("time", f"{self.time[-1]:.6g} s in {self.counters['steps']} steps, {self.wall_time:.3g} s"),
+            ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * moved['radial']:.4g} mm"),
+            ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
+            (
+                "floors",
+                f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}",
+            ),
+            ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
+            ("rims met", ", ".join(self.scene.label(number - 1) for number in s["rims_met"]) or "none"),
+        ]
+
+    @property
+    def curve(self) -> Curve:
+        """The orbit of the bearing that moves most."""
+        most = self.bearings[int(self.extremes.bearing_displacement[:, 3].argmax())]
+        x, y = most.displacement[:, :2].T
+        return Curve(x, y, f"orbit of {most.label}")
+
+    def tables(self) -> list[Table]:
+        """Tables of the run with its floors, storeys and bearings."""
+        return summaries.tables(self.title, [("status", self.status_text), *self.main_results()], self.summary)
 
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
 
         Raises InputError where the bearings did not move.
         """
-        from msfp_gen.buildings.characterise import characterise_building
-
-        return characterise_building(self)
+        mean = np.mean([one.displacement for one in self.bearings], axis=0)
+        return BuildingCharacterisation.of(
+            Path.of(self.time, mean, self.base_reaction, "the bearings"),
+            self.scene.gravity,
+            self.extremes.mean_displacement,
+            self.summary,
+            [BearingDemand.of(one.summary, float(np.hypot(*one.displacement[-1, :2]))) for one in self.bearings],
+        )
 
     @classmethod
     def storage(cls) -> Storage:
         """The functions of `buildings/dataset.py`."""
-        from msfp_gen.buildings import dataset
-
-        return dataset
+        return building_dataset
 
 
-def result_of(run: BuildingRun) -> BuildingResult:
-    """The rows of a run until now."""
-    rows = unpacked(run)
-    count = len(run.members)
-    works = [dict(zip(names(WORKS), rows[f"work {i}"].T, strict=True)) for i in range(count)]
-    return BuildingResult(
-        scene=run.scene,
-        time=rows["time"],
-        displacement=rows["displacement"],
-        velocity=rows["velocity"],
-        acceleration=rows["acceleration"],
-        ground=rows["ground"][:, 0],
-        wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
-        normal_force=padded([rows[f"normal {i}"] for i in range(count)], np.nan),
-        sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
-        dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
-        stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
-        damped=rows["damped"],
-        received=rows["received"],
-        input=rows["input"],
-        support=rows["ground"][:, run.scene.grounds[1]],
-        counts=run.run.counts,
-        monitored=run.notes,
-        recorded_peaks=run.peaks if len(rows["time"]) else None,
-    )
+def _largest(peaks: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: max(one[key] for one in peaks) for key in peaks[0]}
 
 
-def _stored(run: BuildingRun, rows: dict[str, Array], index: int) -> Array:
-    """Energy of a bearing and of the springs of its interface, less that in friction, shape (k,) [J]."""
-    upper, interface = rows[f"wrench {index}"][:, 1], run.scene.bearings[index].interface
-    stiffness = [interface.stiffness, interface.stiffness, interface.vertical_stiffness]
-    stiffness += 2 * [interface.rotational_stiffness]
-    found: Array = 0.5 * (upper[:, :5] ** 2 / stiffness).sum(axis=1)
-    for name in ("kinetic", "potential", "rim_stored", "seat_stored"):
-        found = found + rows[f"{name} {index}"]
-    return found
+def _squares(rows: Array, matrix: Array) -> Array:
+    """x^T A x of every row x, shape (k,)."""
+    products: Array = ((rows @ matrix) * rows).sum(axis=1)
+    return products
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BearingResult(AnyResult, HorizontalMotion):
+    """One bearing of a building, at the k times of its result: names and signs are those of `Result` and `History`.
+
+    building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0; bearing: its
+    values. time: shape (k,) [s]. base_displacement: of the ground below the bearing; displacement: across the bearing
+    and its interface, base less top, shape (k, 3) [m]. top_force, top_moment: on the building, the moment about the
+    upper end of the bearing, shape (k, 3) [N], [N m]. axial_force: compression between bearing and building, shape (k,)
+    [N]. sliding (3.20), gap to the rims (3.21), normal_force: of the surfaces, shape (k, n-1) [m], [m], [N].
+    dissipated: energy in the bearing since the start; stored: in the bearing and its interface, shape (k,) [J].
+    """
+
+    source: ClassVar[str] = "msfp-gen bearing"
+    building: BuildingResult
+    index: int
+    scene: BuildingScene
+    bearing: Bearing
+    status: str
+    message: str
+    provenance: dict[str, str]
+    time: Array
+    base_displacement: Array
+    displacement: Array
+    top_force: Array
+    top_moment: Array
+    axial_force: Array
+    sliding: Array
+    gap: Array
+    normal_force: Array
+    dissipated: Array
+    stored: Array
+
+    @classmethod
+    def of(cls, building: BuildingResult, index: int) -> BearingResult:
+        """A bearing of a building, from 0."""
+        scene, bearing = building.scene, building.scene.bearings[index].bearing
+        base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
+        across = base - building.displacement @ scene.attachments[index, :3].T
+        sliding = building.sliding[:, index, : bearing.layout.surfaces]
+        return cls(
+            building=building,
+            index=index,
+            scene=scene,
+            bearing=bearing,
+            status=building.status,
+            message=building.message,
+            provenance=building.provenance,
+            time=building.time,
+            base_displacement=base,
+            displacement=across - across[0],
+            top_force=-wrench[:, :3],
+            top_moment=-wrench[:, 3:],
+            axial_force=building.axial_force[:, index],
+            sliding=sliding,
+            gap=bearing.arrays()["capacity"] - sliding,
+            normal_force=building.normal_force[:, index, : bearing.layout.surfaces],
+            dissipated=building.dissipated[:, index],
+            stored=building.stored[:, index],
+        )
+
+    @property
+    def label(self) -> str:
+        """What messages call the bearing: its number from 1, and its name."""
+        return self.scene.label(self.index)
+
+    @property
+    def title(self) -> str:
+        """The label, and the name of the building."""
+        return f"{self.label} of {self.building.title}"
+
+    @property
+    def history(self) -> BearingResult:
+        """Its rows, by the names of `History`: this view itself."""
+        return self
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """None: the run of a building does not record them."""
+        return ()
+
+    @property
+    def surfaces(self) -> int:
+        """Number of surfaces, n - 1."""
+        return self.bearing.layout.surfaces
+
+    @property
+    def capacity(self) -> Array:
+        """Capacities of the surfaces, shape (n-1,) [m]."""
+        return self.bearing.arrays()["capacity"]
+
+    @property
+    def axial_load(self) -> float:
+        """Compression at rest [N]."""
+        return float(self.scene.axial_loads[self.index])
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """The notes of its monitors, in order of time."""
+        own = (note for note in self.building.monitored if note.bearing == self.index + 1)
+        return tuple(sorted(own, key=lambda note: note.time))
+
+    @property
+    def model_changes(self) -> tuple[Note, ...]:
+        """The notes of its monitors after which it continued with another model; `action` says with which effects."""
+        return tuple(note for note in self.notes if note.action)
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """Extremes over all steps."""
+        peaks, index = self.building.extremes, self.index
+        sliding, normal = peaks.sliding[index, : self.surfaces], peaks.normal_force[index, :, : self.surfaces]
+        gap = self.capacity - sliding
+        return Extremes(peaks.bearing_displacement[index], peaks.top_force[index], sliding, gap, *normal)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Main results as plain data, SI units; peaks are over all steps, lists for the surfaces, bottom first.
+
+        Keys that `Result.summary` has too: peak_displacement and peak_force along E1, E2, E3 and radial [m], [N];
+        axial_load at rest [N], and peak_force_ratio over it [-]; peak_sliding and minimum_gap [m]; rims_met (surfaces);
+        minimum_normal_force and maximum_normal_force [N]. Others: number (from 1), name, layout, position;
+        minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at the end [J].
+        """
+        least, most = self.building.extremes.axial_force[self.index] / self.axial_load
+        return {
+            "number": self.index + 1,
+            "name": self.scene.bearings[self.index].name,
+            "layout": self.bearing.layout.name,
+            "position": self.scene.places[self.index].tolist(),
+            **peaks_of_bearing(self.extremes, self.axial_load),
+            "minimum_load_ratio": float(least),
+            "maximum_load_ratio": float(most),
+            "rims_met": (np.flatnonzero(self.extremes.gap <= 0) + 1).tolist(),
+            "dissipated": float(self.dissipated[-1]),
+        }
+
+    def main_results(self) -> Rows:
+        """Label and value of the main results."""
+        s = self.summary
+        x, y = s["position"]
+        return [
+            ("bearing", f"{s['layout']} at ({x:g}, {y:g}) m"),
+            *rows_of_bearing(s),
+            ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
+        ]
+
+    @property
+    def curve(self) -> Curve:
+        """The hysteresis loop."""
+        return hysteresis_loop(self, self.top_force)
+
+    def tables(self) -> list[Table]:
+        """Tables of its main results and of its surfaces."""
+        rows = [("status", self.status_text), *self.main_results()]
+        return [Table(self.title, (), rows), surface_table(self.summary, self.bearing.surfaces)]
+
+    @classmethod
+    def storage(cls) -> Storage:
+        """It has none of its own: the file of the building is read."""
+        raise InputError(f"this is the result of {KINDS[cls.source]}")
+
+    def derived_and_groups(self) -> tuple[tuple[str, ...], dict[str, xr.Dataset]]:
+        """Its file has only the dataset, for other programs."""
+        return (), {}
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Its rows as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
+        import xarray as xr
+
+        rows = [item for name in RECORDED for item in named_columns(name, getattr(self, name))]
+        more = {
+            name: (("time",), getattr(self, name), {"units": unit, "long_name": meaning})
+            for name, (unit, meaning) in MORE.items()
+        }
+        one = self.scene.bearings[self.index]
+        parts = {"bearing": bearing_table(one.bearing), "interface": plain_table(one.interface)}
+        text = dumps({"axial_load": self.axial_load, **parts})
+        about = attributes_of(self, "", text, self.notes, {}) | {"bearing": self.label}
+        return xr.Dataset(dict(rows) | more, coordinates_of(self.time, self.surfaces), about)
+
+    def characterise(self) -> Characterisation:
+        """Effective stiffness, damping and remaining capacity, as `Result.characterise`; N of the period is at rest.
+
+        What the rows of a building do not have (slip velocities) is None, and the notes say so. Raises InputError where
+        the bearing did not move.
+        """
+        path = Path.of(self.time, self.displacement, self.top_force)
+        return characterise_rows(
+            self.title, self.status, path, self.bearing, self.axial_load, self.gap, self.dissipated, self.extremes
+        )

@@ -147,9 +147,7 @@ def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None
     if as_json:
         say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
-    from msfp_gen.buildings.summary import summary_tables
-
-    show(summary_tables(result))
+    show(result.tables())
     for line in (entry.line for entry in result.notes):
         note(line)
 

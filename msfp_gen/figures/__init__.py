@@ -43,7 +43,7 @@ from msfp_gen.results.sign import using_sign
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.data import BuildingData
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.results.run_data import RunData
 
 __all__ = [
@@ -96,7 +96,7 @@ FIGURES: dict[str, Callable[[RunData, str | Path | None], Figure]] = {
 }
 
 # Figures of the run of a building, likewise.
-BUILDING_FIGURES: dict[str, Callable[[BuildingData, str | Path | None], Figure]] = {
+BUILDING_FIGURES: dict[str, Callable[[BuildingResult, str | Path | None], Figure]] = {
     "overview": plot_building,
     "plan": plot_plan,
     "profile": plot_profile,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from msfp_gen.buildings.summary import floor_rows, storey_rows
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.style import (
     COLOURS,
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.data import BuildingData
+    from msfp_gen.buildings.result import BuildingResult
 
 ORBIT = 0.42  # radius of the largest orbit in the plan, over the least distance of two bearings
 ROUND = (1, 2, 5)  # magnifications are these times a power of ten
@@ -44,7 +43,7 @@ G = 9.80665  # of accelerations in figures [m/s^2]
 AXES = range(3)
 
 
-def plot_plan(result: BuildingData, path: str | Path | None = None) -> Figure:
+def plot_plan(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Plan with the orbit of every bearing, magnified, its peak, and the centre of mass.
 
     Raises InputError for a path that cannot be written.
@@ -55,7 +54,7 @@ def plot_plan(result: BuildingData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def plot_profile(result: BuildingData, path: str | Path | None = None) -> Figure:
+def plot_profile(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Peaks over the height: floor accelerations, drifts of the storeys, storey shears over the weight.
 
     Raises InputError for a path that cannot be written.
@@ -66,7 +65,7 @@ def plot_profile(result: BuildingData, path: str | Path | None = None) -> Figure
     return figure
 
 
-def plot_floor_spectra(result: BuildingData, path: str | Path | None = None) -> Figure:
+def plot_floor_spectra(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Response spectra of the accelerations of all floors and of the ground, 5 % damping, along E1, E2 and E3.
 
     Raises InputError for a path that cannot be written.
@@ -94,7 +93,7 @@ def plot_floor_spectra(result: BuildingData, path: str | Path | None = None) -> 
     return figure
 
 
-def plot_axial_forces(result: BuildingData, path: str | Path | None = None) -> Figure:
+def plot_axial_forces(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Axial force of every bearing: over time, over that at rest, and the range of each.
 
     Raises InputError for a path that cannot be written.
@@ -107,7 +106,7 @@ def plot_axial_forces(result: BuildingData, path: str | Path | None = None) -> F
     return figure
 
 
-def plot_building(result: BuildingData, path: str | Path | None = None) -> Figure:
+def plot_building(result: BuildingResult, path: str | Path | None = None) -> Figure:
     """Overview: plan with orbits, profiles over the height, range of the axial force of every bearing.
 
     Raises InputError for a path that cannot be written.
@@ -122,7 +121,7 @@ def plot_building(result: BuildingData, path: str | Path | None = None) -> Figur
     return figure
 
 
-def draw_plan(axes: Axes, result: BuildingData) -> None:
+def draw_plan(axes: Axes, result: BuildingResult) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
     scene, bearings = result.scene, result.bearings
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
@@ -158,9 +157,9 @@ def draw_plan(axes: Axes, result: BuildingData) -> None:
 PROFILES = ("Peak floor acceleration", "Peak drift of the storeys", "Peak storey shear over the weight")
 
 
-def draw_profile(row: list[Axes], result: BuildingData) -> None:
+def draw_profile(row: list[Axes], result: BuildingResult) -> None:
     """Three panels over the height: accelerations of floors, drift ratios and shears of storeys, along E1 and E2."""
-    floors, storeys = floor_rows(result), storey_rows(result)
+    floors, storeys = result.floors, result.storeys
     heights = [each["height"] for each in floors]
     ground = np.abs(result.ground[:, 2]).max(axis=0)
     for axis in AXES:
@@ -187,7 +186,7 @@ def draw_profile(row: list[Axes], result: BuildingData) -> None:
         axes.set_yticks(heights, [f"{each['name']}\n{each['height']:g}" for each in floors])
 
 
-def draw_axial_history(axes: Axes, result: BuildingData) -> None:
+def draw_axial_history(axes: Axes, result: BuildingResult) -> None:
     """Axial force over that at rest over time, the bearings with the least and the largest value highlighted."""
     ratio = result.axial_force / result.scene.axial_loads
     chosen = dict.fromkeys((int(ratio.min(axis=0).argmin()), int(ratio.max(axis=0).argmax())))
@@ -203,7 +202,7 @@ def draw_axial_history(axes: Axes, result: BuildingData) -> None:
     axes.legend(loc="upper right", ncols=2)
 
 
-def draw_axial_ranges(axes: Axes, result: BuildingData) -> None:
+def draw_axial_ranges(axes: Axes, result: BuildingResult) -> None:
     """Least, greatest and resting axial force of every bearing [kN]."""
     scene, force = result.scene, 1e-3 * result.axial_force
     number = np.arange(len(scene.bearings))
@@ -220,13 +219,13 @@ def draw_axial_ranges(axes: Axes, result: BuildingData) -> None:
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), ncols=2, borderaxespad=0.0)
 
 
-def title_of(result: BuildingData) -> str:
+def title_of(result: BuildingResult) -> str:
     """Name of the run; of a failed one with the time that it reached."""
     name = result.scene.name or "unnamed building"
     return name if result.succeeded else f"{name}, run failed ({result.status}) at t = {result.time[-1]:.4g} s"
 
 
-def _overview_title(result: BuildingData) -> str:
+def _overview_title(result: BuildingResult) -> str:
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
     shear = float(np.hypot(*result.base_reaction[:, :2].T).max()) / result.scene.weight
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.building import draw_axial_history, magnification, title_of
 from msfp_gen.figures.film import WIDE, Film, Layout, even
@@ -42,7 +42,7 @@ STATES = {"carries load": STEEL[0], "rim contact": COLOURS[1], "lifted off": "wh
 Move = tuple[Callable[[int], None], list[Any]]
 
 
-def building_film(result: BuildingData, times: Array, azimuth: float | None) -> Film:
+def building_film(result: BuildingResult, times: Array, azimuth: float | None) -> Film:
     """The movie of a building at these times [s], its first elevation along `azimuth` [rad]; None: along E1."""
     frames = at_times(result, times)
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
@@ -150,7 +150,7 @@ def _state_entries() -> list[Any]:
     return [Line2D([], [], label=f"bearing {name}", markerfacecolor=colour, **style) for name, colour in STATES.items()]
 
 
-def _draw_plan(axes: Axes, result: BuildingData, frame: MovingFrame) -> Move:
+def _draw_plan(axes: Axes, result: BuildingResult, frame: MovingFrame) -> Move:
     """Paths of the upper ends of the bearings in plan, with the slab above them."""
     whole = MovingFrame(result, frame.factor)
     for index in range(whole.uppers.shape[1]):
@@ -173,7 +173,7 @@ def _draw_plan(axes: Axes, result: BuildingData, frame: MovingFrame) -> Move:
     return move, [slab, dots]
 
 
-def _draw_loops(axes: Axes, result: BuildingData, time: Array) -> Move:
+def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> Move:
     """Base shear over the mean displacement of the bearings, along both axes."""
     dots = []
     reach = [float(np.ptp(_loop(result, axis)[0])) for axis in range(2)]
@@ -197,14 +197,14 @@ def _draw_loops(axes: Axes, result: BuildingData, time: Array) -> Move:
     return move, dots
 
 
-def _loop(result: BuildingData, axis: int) -> tuple[Array, Array]:
+def _loop(result: BuildingResult, axis: int) -> tuple[Array, Array]:
     """Mean displacement [mm] and base shear over the weight along an axis, in the sign of the figures."""
     mean = np.mean([one.displacement[:, axis] for one in result.bearings], axis=0)
     shear = sum(one.top_force[:, axis] for one in result.bearings) / result.scene.weight
     return displacement(mean), shown_sign().factor * np.asarray(shear)
 
 
-def _draw_forces(axes: Axes, result: BuildingData, time: Array) -> Move:
+def _draw_forces(axes: Axes, result: BuildingResult, time: Array) -> Move:
     """Axial forces of the bearings over time, and the instant of the frame."""
     draw_axial_history(axes, result)
     axes.legend(loc="upper right", ncols=1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from msfp_gen.common.arrays import Array
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.data import BuildingData
+    from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.buildings.scene import BuildingScene
 
 EDGE = 0.06  # of a floor beyond the outermost bearings, over the size of the plan
@@ -48,7 +48,7 @@ class MovingFrame:
     Displacements are `factor` times as large as the frame; rotations are small, so both follow the same line.
     """
 
-    def __init__(self, result: BuildingData, factor: float) -> None:
+    def __init__(self, result: BuildingResult, factor: float) -> None:
         self.result, self.factor = result, factor
         scene = self.scene = result.scene
         self.depth = DEPTH * size_of(scene)

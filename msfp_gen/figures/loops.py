@@ -11,7 +11,7 @@ import numpy as np
 
 from msfp_gen.analysis.summary import axial_load
 from msfp_gen.analysis.transitions import SYMBOLS, is_monotonic, transitions
-from msfp_gen.buildings.data import BearingResult
+from msfp_gen.buildings.result import BearingResult
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,

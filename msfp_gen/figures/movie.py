@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.data import BuildingData
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output, replacing
 from msfp_gen.errors import InputError
@@ -47,7 +47,7 @@ AROUND, TALLEST = 1.55, 4.5  # height of title, legend and labels of the section
 
 
 def animate(
-    result: RunData | BuildingData,
+    result: RunData | BuildingResult,
     path: str | Path,
     *,
     seconds: float = 8.0,
@@ -84,13 +84,13 @@ def animate(
     if frames_per_second < 1:
         raise InputError(f"frames_per_second = {frames_per_second}: give at least 1")
     positive("seconds", seconds)
-    rows = result.time if isinstance(result, BuildingData) else result.history.time
+    rows = result.time if isinstance(result, BuildingResult) else result.history.time
     first, last = (float(rows[0]) if start is None else start), (float(rows[-1]) if end is None else end)
     if first >= last:
         raise InputError(f"start = {first:g} s: give a time before the end of the movie, {last:g} s")
     checked_times(rows, (first, last))
     times = np.linspace(first, last, max(2, round(seconds * frames_per_second)))
-    if isinstance(result, BuildingData):
+    if isinstance(result, BuildingResult):
         film = building_film(result, times, azimuth)
     else:
         film = stack_film(result, times, azimuth)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from msfp_gen.buildings.data import BearingResult
+    from msfp_gen.buildings.result import BearingResult
     from msfp_gen.results.run_data import RunData
 
     OneBearing = RunData | BearingResult

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.buildings.summary import summary_tables
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.report.frames import FEWEST, packed
@@ -94,7 +93,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
 
 def summary_page(result: BuildingResult) -> list[Table]:
     """Tables of the run, without times of the machine."""
-    first, *others = summary_tables(result)
+    first, *others = result.tables()
     rows = [row for row in first.rows if row[0] != "time"]
     return [Table("the run", (), [("time simulated", f"{result.time[-1]:.6g} s"), *rows]), *others]
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
-from msfp_gen.results import stored_gradient
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import COUNTER, REMEDY, WORDS, Arrays, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.gradient import ERROR, SERIES, Gradients
+from msfp_gen.results.gradient import ENERGIES, ERROR, SERIES, WITH_INTEGRALS, Gradients
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import Attribute, StoredGroup
+from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.contract import EVENT_KINDS, names
 
@@ -57,11 +57,10 @@ def row_variables(history: History) -> Variables:
 def named_columns(field: str, values: Any) -> Variables:
     """The variables of one field of `History`: several where each of its components has a name."""
     rows = quantities()[field]
-    dims, names = ("time", *rows.dims), rows.names or (field,)
-    split = len(names) > 1  # one variable for each component
+    names = rows.columns(field)
     for column, name in enumerate(names):
         about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
-        yield name, (dims[:-1], values[..., column], about) if split else (dims, values, about)
+        yield name, (("time", *rows.column_dims), values[..., column] if len(names) > 1 else values, about)
 
 
 def energy_variables(history: History) -> Variables:
@@ -102,7 +101,7 @@ DERIVED: dict[str, Any] = {}  # all variables are read
 
 def edition() -> str:
     """A digest of the names that a file of this version has: of rows, energies, counters and labels."""
-    rows = [rows.names or (field,) for field, rows in quantities().items()]
+    rows = [rows.columns(field) for field, rows in quantities().items()]
     table = [*rows, ENERGY, *LABELS.items(), [field.name for field in fields(Counters)], WORDS]
     return sha256(json.dumps([list(each) for each in table]).encode()).hexdigest()[:12]
 
@@ -128,16 +127,51 @@ def _gradients(
     root: StoredGroup, history: History, events: int, about: dict[str, Attribute], arrays: Arrays
 ) -> Gradients | None:
     """The derivatives with respect to parameters, where the file has some."""
-    if stored_gradient.GROUP not in root:
+    if GRADIENT not in root:
         return None
-    found, read = stored_gradient.from_group(root, len(history.time), history.surfaces, events)
+    group, count = root.group(GRADIENT), len(history.time)
+    read = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
+    parameters = tuple(_parameter(table) for table in json.loads(str(read["parameters"])))
+    sizes = dict.fromkeys(STACK, history.surfaces) | {name: len(labels) for name, labels in LABELS.items()}
+    about |= {f"{GRADIENT}/{name}": value for name, value in read.items()}
+
+    def array(name: str, *shape: int) -> Array:
+        values: Array = group.array(name, (len(parameters), *shape))
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} of the gradient is not finite")
+        arrays[f"{GRADIENT}/{name}"] = values
+        return values
+
+    def gradients(suffix: str = "", error: Gradients | None = None) -> Gradients:
+        extremes = tuple(Extremes.of_table(table) for table in json.loads(str(read[f"extremes{suffix}"])))
+        if len(extremes) != len(parameters) or not extremes:
+            raise ValueError("the derivatives of the extremes are not those of the parameters")
+        rows = {}
+        for field, quantity in quantities().items():
+            names = [name for name in (f"{name}{suffix}" for name in quantity.columns(field)) if name in group]
+            if field != "time" and names:
+                shape = (count, *(sizes[dim] for dim in quantity.column_dims))
+                rows[field] = quantity.joined([array(name, *shape) for name in names])
+        energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
+        energy = {name: array(f"energy_{name}{suffix}", count) for name in energies}
+        time, displacement, force = (
+            array(f"event_{name}{suffix}", events, *(len(LABELS[dim]) for dim in EVENTS[name][0]))
+            for name in EVENT_DERIVATIVES
+        )
+        return Gradients(parameters, rows, energy, time, displacement, force, extremes, error)
+
+    derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in read else None)
     needed = {field for field, _ in SERIES.values() if getattr(history, field) is not None}
-    if missing := sorted(needed - found.rows.keys()):
+    if missing := sorted(needed - derivatives.rows.keys()):
         raise ValueError(f"the gradient has no {missing[0]}")
-    for name, value in read.items():
-        place: dict[str, Any] = arrays if isinstance(value, np.ndarray) else about
-        place[f"{stored_gradient.GROUP}/{name}"] = value
-    return found
+    return derivatives
+
+
+def _parameter(table: dict[str, Any]) -> Parameter:
+    parameter = Parameter(**(table | {"index": tuple(table["index"])}))
+    if not np.isfinite(parameter.value):
+        raise ValueError(f"the value of {parameter.path} is not finite")
+    return parameter
 
 
 def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Scene:
@@ -162,19 +196,17 @@ def _history(root: StoredGroup, surfaces: int, arrays: Arrays) -> History:
     count = root.length("time")
     sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
     optional = {field.name for field in fields(History) if field.default is not MISSING}
-    found: Arrays = {}
-    for field, rows in quantities().items():
-        parts = rows.names or (field,)
-        if field in optional and not any(name in root for name in parts):
+    rows: Arrays = {}
+    for field, quantity in quantities().items():
+        if field in optional and not any(name in root for name in quantity.columns(field)):
             continue  # a quantity of an effect that the run did not model
-        dims = rows.dims[:-1] if len(parts) > 1 else rows.dims
-        shape = (count, *(sizes[dim] for dim in dims))
-        columns = [root.array(name, shape, compressed=name != "time") for name in parts]
-        arrays |= dict(zip(parts, columns, strict=True))
-        found[field] = columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+        shape = (count, *(sizes[dim] for dim in quantity.column_dims))
+        columns = {name: root.array(name, shape, compressed=name != "time") for name in quantity.columns(field)}
+        arrays |= columns
+        rows[field] = quantity.joined(list(columns.values()))
     energy = {name: root.array(f"energy_{name}", (count,)) for name in ENERGY}
     arrays |= {f"energy_{name}": values for name, values in energy.items()}
-    return History(**found, energy=energy)
+    return History(**rows, energy=energy)
 
 
 def _events(root: StoredGroup, surfaces: int, arrays: Arrays) -> tuple[Event, ...]:
@@ -204,6 +236,8 @@ def _extremes(given: dict[str, list[float]], surfaces: int) -> Extremes:
 
 
 PARAMETER = "parameter"
+GRADIENT = "gradient"  # group of the file
+EVENT_DERIVATIVES = ("time", "displacement", "top_force")  # in the order of `Gradients`
 
 
 def gradients_of(result: RunData) -> Gradients:
@@ -261,7 +295,7 @@ def _energies(gradients: Gradients) -> Variables:
 
 
 def _event_derivatives(gradients: Gradients) -> Variables:
-    for field in ("time", "displacement", "top_force"):
+    for field in EVENT_DERIVATIVES:
         dims, _, unit, meaning = EVENTS[field]
         name = f"event_{field}"
         yield name, ((PARAMETER, "event", *dims), getattr(gradients, name), _derivative(unit, meaning))
@@ -282,4 +316,4 @@ def groups_of(result: RunData) -> dict[str, xr.Dataset]:
     from msfp_gen.scene.file.stored_motion import GROUP, needs_pieces, to_pieces
 
     motion = {GROUP: to_pieces(result.scene.motion)} if needs_pieces(result.scene) else {}
-    return motion | ({} if result.gradients is None else {stored_gradient.GROUP: gradient_group(result)})
+    return motion | ({} if result.gradients is None else {GRADIENT: gradient_group(result)})

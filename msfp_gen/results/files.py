@@ -102,6 +102,14 @@ class ResultFiles(ABC):
         def status(self) -> str:
             """How the run ended."""
 
+        @property
+        def message(self) -> str:
+            """One line of text, "" for a run that succeeded."""
+
+        @property
+        def notes(self) -> tuple[Note, ...]:
+            """Messages of the monitors."""
+
     @property
     def title(self) -> str:
         """What the result is of, for the head of a table."""

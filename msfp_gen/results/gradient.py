@@ -36,7 +36,7 @@ class Gradients:
         energy: the same of energies, shape (k, T): of those that the state determines, or also of the integrals.
         event_time, event_displacement, event_top_force: shape (k, e), (k, e, 3), (k, e, 3).
         extremes: k of them, of `RunData.extremes`.
-        error: errors of all of these, measured where a rim was met (`results.gradient_error`); None: not measured.
+        error: errors of all of these, measured where a rim was met (`simulation.gradients`); None: not measured.
     """
 
     parameters: tuple[Parameter, ...]

@@ -6,9 +6,10 @@ dataset in `dataset.py` are based on them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Literal, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Literal, get_origin, get_type_hints
 
 import numpy as np
 
@@ -65,9 +66,53 @@ class Rows:
     meaning: str
     names: tuple[str, ...] = ()
 
+    def columns(self, field: str) -> tuple[str, ...]:
+        """Names of its variables in the dataset. field: of `History`."""
+        return self.names or (field,)
+
+    @property
+    def column_dims(self) -> tuple[str, ...]:
+        """Dimensions of each of these after time."""
+        return self.dims[:-1] if len(self.names) > 1 else self.dims
+
+    def joined(self, columns: Sequence[Array]) -> Array:
+        """The array of these variables."""
+        return np.stack(columns, axis=-1) if len(self.names) > 1 else columns[0]
+
+
+class HorizontalMotion:
+    """What follows from the displacement across a bearing, shape (T, 3) [m]."""
+
+    if TYPE_CHECKING:  # a field of the subclasses, whose order is that of the dataset
+        displacement: Array
+
+    @property
+    def horizontal(self) -> Array:
+        """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
+        return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
+
+    @property
+    def peak_row(self) -> int:
+        """Row of the largest horizontal displacement; see `first_peak`."""
+        return first_peak(self.horizontal)
+
+    @property
+    def direction(self) -> Array:
+        """Unit vector of the largest horizontal displacement, shape (2,); E1 if the bearing did not move."""
+        peak: Array = self.displacement[self.peak_row, :2]
+        size = float(np.hypot(*peak))
+        return peak / size if size else np.array([1.0, 0.0])
+
+    @property
+    def path(self) -> tuple[Array, Array]:
+        """Horizontal displacement along and transverse to this direction, shape (T,) each [m]."""
+        e1, e2 = self.direction
+        along, across = (self.displacement[:, :2] @ np.array(axis) for axis in ([e1, e2], [-e2, e1]))
+        return along, across
+
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(HorizontalMotion):
     """The T rows of a run.
 
     Every quantity has T entries along its first dimension. The dimensions `body` (bodies 2..n) and `surface` have n - 1
@@ -128,30 +173,6 @@ class History:
     def surfaces(self) -> int:
         """Number of surfaces, n - 1."""
         return int(self.normal_force.shape[1])
-
-    @property
-    def horizontal(self) -> Array:
-        """Horizontal displacement across the bearing, ndarray, shape (T,), [m]."""
-        return np.hypot(self.displacement[:, 0], self.displacement[:, 1])
-
-    @property
-    def peak_row(self) -> int:
-        """Row of the largest horizontal displacement; see `first_peak`."""
-        return first_peak(self.horizontal)
-
-    @property
-    def direction(self) -> Array:
-        """Unit vector of the largest horizontal displacement, shape (2,); E1 if the bearing did not move."""
-        peak: Array = self.displacement[self.peak_row, :2]
-        size = float(np.hypot(*peak))
-        return peak / size if size else np.array([1.0, 0.0])
-
-    @property
-    def path(self) -> tuple[Array, Array]:
-        """Horizontal displacement along and transverse to this direction, shape (T,) each [m]."""
-        e1, e2 = self.direction
-        along, across = (self.displacement[:, :2] @ np.array(axis) for axis in ([e1, e2], [-e2, e1]))
-        return along, across
 
     def arrays(self) -> dict[str, Array]:
         """The arrays of this run by field, without those that are None."""

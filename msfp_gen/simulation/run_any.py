@@ -7,8 +7,8 @@ from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, overload
 
-from msfp_gen.buildings.compiled_run import BuildingRun, start_run
-from msfp_gen.buildings.result import BuildingResult, result_of
+from msfp_gen.buildings.compiled_run import BuildingRun, result_of, start_run
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError

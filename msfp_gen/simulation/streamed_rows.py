@@ -1,23 +1,33 @@
-"""The rows of all segments of a run whose rows are on disk, and the result file that is written from them."""
+"""The rows of all segments of a run whose rows are on disk, and the result file that is written from them.
+
+The file is written block by block. It holds what `to_netcdf` writes: variables, attributes and digest are the same.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import io
+import os
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import reduce
+from hashlib import file_digest
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import replacing
+from msfp_gen.results.dataset import energy_variables, row_variables, to_dataset
 from msfp_gen.results.extremes import Extremes
+from msfp_gen.results.files import DIGEST, digest_of_dataset
 from msfp_gen.results.history import History
-from msfp_gen.results.joining import Joint, concatenated
+from msfp_gen.results.joining import Joint, concatenated, taken
 from msfp_gen.results.row_unpacking import finite_rows, history_of
-from msfp_gen.results.streaming import write_blocks
-from msfp_gen.results.thinning import blocks, thinned
+from msfp_gen.results.run_data import RunData
+from msfp_gen.results.stored_group import ArrayDigest, seal
+from msfp_gen.results.thinning import BLOCK, blocks, thinned
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.segment import Segment, start_temperatures
 
@@ -84,3 +94,106 @@ class _SegmentRows:
     def _rows(self, start: int, end: int) -> Array:
         stored = self._stored.read(start, min(end, self._stored.count))
         return np.concatenate([stored, self._held]) if end > self._stored.count else stored
+
+
+def write_blocks(result: RunData, path: Path, count: int, blocks: Iterable[History]) -> None:
+    """Write a result with other rows than its own, completely or not at all.
+
+    result: scene, events, status and the rest. count: number of all rows. blocks: these rows in order. Raises OSError
+    where the disk is full.
+    """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    from msfp_gen.scene.file.stored_motion import COMPRESSED, GROUP, needs_pieces, to_pieces
+
+    first = to_dataset(replace(result, history=taken(result.history, slice(0, 1))))
+    pieces = to_pieces(result.scene.motion) if needs_pieces(result.scene) else None
+    along_time = {str(name): v for name, v in first.variables.items() if "time" in v.dims}
+    encoding: dict[str, dict[str, Any]] = {
+        name: {"chunksizes": (min(count, BLOCK), *variable.shape[1:])} for name, variable in along_time.items()
+    }
+    for name in encoding.keys() - {"time"}:
+        encoding[name] |= {"zlib": True, "complevel": 1}
+    with replacing(path) as temporary, _Disk(temporary) as disk:
+        with h5netcdf.File(disk, "w") as file:
+            first.dump_to_store(H5NetCDFStore(file), encoding=encoding, unlimited_dims=["time"])
+            if pieces is not None:
+                pieces.dump_to_store(H5NetCDFStore(file, group=GROUP), encoding=COMPRESSED)
+            file.resize_dimension("time", count)
+            digests = _write_rows(file, disk, blocks)
+            file.attrs[DIGEST] = digest_of_dataset(first, {} if pieces is None else {GROUP: pieces}, digests)
+        disk.finish()
+
+
+def _write_rows(file: Any, disk: _Disk, blocks: Iterable[History]) -> dict[str, ArrayDigest]:
+    """Write all rows; the digest of each variable."""
+    digests: dict[str, ArrayDigest] = {}
+    start = 0
+    for block in blocks:
+        end = start + len(block.time)
+        columns = {name: values for name, (_, values, _) in [*row_variables(block), *energy_variables(block)]}
+        for name, values in ({"time": block.time} | columns).items():
+            file[name][start:end] = values
+            digests.setdefault(name, ArrayDigest()).add(values)
+        disk.raise_failure()
+        start = end
+    return digests
+
+
+class _Disk(io.FileIO):
+    """A file for HDF5, which ends the process where a write fails or where it reads otherwise than it wrote.
+
+    A failure is kept and raised between the blocks. Until then what HDF5 writes is kept in memory.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self._failure: OSError | None = None
+        self._kept: list[tuple[int, bytes]] = []  # place and bytes of every write after a failure
+
+    def write(self, data: Any) -> int:
+        """Write all bytes, in memory from a failure on."""
+        view, start, done = memoryview(data).cast("B"), self.tell(), 0
+        try:
+            while self._failure is None and done < len(view):
+                done += super().write(view[done:])
+        except OSError as error:
+            self._failure = error
+        if self._failure is not None:
+            self._kept.append((start + done, bytes(view[done:])))
+        return len(view)
+
+    def readinto(self, buffer: Any) -> int:
+        """Read as many bytes as fit; after a failure those that were kept, and zeros where nothing was written."""
+        view, start = memoryview(buffer).cast("B"), self.tell()
+        count = super().readinto(view) or 0
+        if self._failure is None:
+            return count
+        view[count:] = bytes(len(view) - count)
+        for place, data in self._kept:
+            low, high = max(place, start), min(place + len(data), start + len(view))
+            if low < high:
+                view[low - start : high - start] = data[low - place : high - place]
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Change the size of the file; after a failure nothing."""
+        try:
+            return self.tell() if self._failure else super().truncate(size)
+        except OSError as error:
+            self._failure = error
+            return self.tell()
+
+    def raise_failure(self) -> None:
+        """Raise the OSError of an earlier write."""
+        if self._failure is not None:
+            raise self._failure
+
+    def finish(self) -> None:
+        """Seal the file and flush it to the disk; raises OSError where that fails or an earlier write did."""
+        self.raise_failure()
+        self.seek(0)
+        self.write(seal(file_digest(self, "sha256")))
+        self.raise_failure()
+        os.fsync(self.fileno())

@@ -1,52 +1,119 @@
-"""Columns of tables of runs: names, units, and where a summary has their values."""
+"""Quantities of runs for tables, studies and bounds: names, units, and where summary or characterisation have them."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple
 
-# Column -> (unit, path in the summary). A path that ends in * gives one column for each surface, bottom first.
-COLUMNS = {
-    "status": ("", "status"),
-    "message": ("", "message"),
-    "duration": ("s", "duration"),
-    "peak_displacement": ("m", "peak_displacement.radial"),
-    "peak_top_force": ("N", "peak_top_force.radial"),
-    "peak_force_ratio": ("", "peak_force_ratio"),
-    "peak_sliding": ("m", "peak_sliding.*"),
-    "minimum_gap": ("m", "minimum_gap.*"),
-    "minimum_normal_force": ("N", "minimum_normal_force.*"),
-    "maximum_normal_force": ("N", "maximum_normal_force.*"),
-    "rims_met": ("", "rims_met"),
-    "peak_input_energy": ("J", "energy.peak_input"),
-    "closure_error": ("", "energy.closure_error"),
-    "steps": ("", "counters.steps"),
-    "wall_time": ("s", "wall_time"),
+
+class Quantity(NamedTuple):
+    """A quantity of a run.
+
+    path: dotted, in the summary, or in the characterisation where `characterised`; `.*` stands for each surface, floor,
+    storey or bearing, bottom first or in the order of the file, and gives a column for each. governs: whether its
+    largest or its least value governs a design; "" if neither does. at_rest: defined where the run ends at rest.
+    """
+
+    unit: str
+    path: str
+    governs: Literal["most", "least", ""] = ""
+    characterised: bool = False
+    at_rest: bool = False
+
+
+RUN = {
+    "status": Quantity("", "status"),
+    "message": Quantity("", "message"),
+    "duration": Quantity("s", "duration"),
+    "peak_displacement": Quantity("m", "peak_displacement.radial", "most"),
+    "peak_force": Quantity("N", "peak_force.radial", "most"),
+    "peak_force_ratio": Quantity("", "peak_force_ratio"),
+    "rims_met": Quantity("", "rims_met"),
+    "closure_error": Quantity("", "energy.closure_error"),
+    "steps": Quantity("", "counters.steps"),
+    "wall_time": Quantity("s", "wall_time"),
+    "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
+    "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True),
+    "residual_displacement": Quantity("m", "residual_displacement", "most", characterised=True, at_rest=True),
 }
-# The same of a building; `.*.` stands for each floor, storey or bearing, from below or in the order of the file.
-BUILDING_COLUMNS = {
-    "status": ("", "status"),
-    "message": ("", "message"),
-    "duration": ("s", "duration"),
-    "peak_displacement": ("m", "peak_displacement.radial"),
-    "peak_base_shear": ("N", "peak_base_shear.radial"),
-    "base_shear_ratio": ("", "base_shear_ratio"),
-    "peak_base_torsion": ("N m", "peak_base_torsion"),
-    "peak_floor_acceleration": ("m/s^2", "peak_floor_acceleration.radial"),
-    "peak_vertical_acceleration": ("m/s^2", "peak_floor_acceleration.E3"),
-    "peak_drift_ratio": ("", "peak_drift_ratio"),
-    "minimum_load_ratio": ("", "minimum_load_ratio"),
-    "maximum_load_ratio": ("", "maximum_load_ratio"),
-    "rims_met": ("", "rims_met"),
-    "floor_acceleration": ("m/s^2", "floors.*.peak_acceleration.radial"),
-    "storey_drift_ratio": ("", "storeys.*.peak_drift_ratio"),
-    "storey_shear": ("N", "storeys.*.peak_shear.radial"),
-    "bearing_displacement": ("m", "bearings.*.peak_displacement.radial"),
-    "bearing_load_ratio": ("", "bearings.*.minimum_load_ratio"),
-    "closure_error": ("", "energy.closure_error"),
-    "wall_time": ("s", "wall_time"),
+BEARING = RUN | {
+    "axial_load": Quantity("N", "axial_load"),
+    "peak_input_energy": Quantity("J", "energy.peak_input"),
+    "dissipated_share": Quantity("", "energy.dissipated_share"),
+    "peak_sliding": Quantity("m", "peak_sliding.*"),
+    "minimum_gap": Quantity("m", "minimum_gap.*"),
+    "minimum_normal_force": Quantity("N", "minimum_normal_force.*"),
+    "maximum_normal_force": Quantity("N", "maximum_normal_force.*"),
+    "least_friction": Quantity("", "least_friction.*"),
+    "most_friction": Quantity("", "most_friction.*"),
+    "peak_temperature": Quantity("degC", "peak_temperature.*"),
+    # of cycles, their mean
+    "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
+    "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
+    "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
+    "zero_displacement_force": Quantity("N", "envelope.zero_displacement_force.mean", characterised=True),
+    "maximum_uplift": Quantity("m", "maximum_uplift", "most", characterised=True),
+    "capacity_left": Quantity("m", "surfaces.*.capacity_left", "least", characterised=True),
+    "peak_velocity": Quantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),
+    "peak_heat_flux": Quantity("W/m^2", "surfaces.*.peak_heat_flux", "most", characterised=True),
 }
+BUILDING = RUN | {
+    "peak_base_torsion": Quantity("N m", "peak_base_torsion"),
+    "peak_floor_acceleration": Quantity("m/s^2", "peak_floor_acceleration.radial", "most"),
+    "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3"),
+    "peak_drift_ratio": Quantity("", "peak_drift_ratio", "most"),
+    "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least"),
+    "maximum_load_ratio": Quantity("", "maximum_load_ratio", "most"),
+    "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial"),
+    "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio"),
+    "storey_shear": Quantity("N", "storeys.*.peak_shear.radial"),
+    "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial"),
+    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio"),
+    "secant_period": Quantity("s", "secant_period", characterised=True),
+    "capacity_left": Quantity("m", "capacity_left", "least", characterised=True),
+}
+
+
+class Source(NamedTuple):
+    """A quantity, or that of one surface, floor, storey or bearing, by its place from 0."""
+
+    quantity: Quantity
+    place: int | None = None
+
+    @property
+    def compared(self) -> bool:
+        """Whether `bound` compares it."""
+        return self.quantity.characterised or bool(self.quantity.governs)
+
+    def value(self, summary: Mapping[str, Any], characterisation: Any) -> Any:
+        """Its value; None where the run has none. characterisation: None where it is not needed, or not possible."""
+        quantity = self.quantity
+        if quantity.at_rest and not getattr(characterisation, "at_rest", False):
+            return None
+        value = value_at(characterisation if quantity.characterised else summary, quantity.path)
+        if self.place is None or value is None:
+            return value
+        return value[self.place] if self.place < len(value) else None
+
+
+@lru_cache(maxsize=16)
+def catalogue(surfaces: int, building: tuple[int, int, int] | None) -> dict[str, Source]:
+    """Column -> where it comes from, of a bearing or of a building.
+
+    surfaces: the most of any bearing. building: numbers of floors, storeys and bearings.
+    """
+    counts = dict(zip(("floors", "storeys", "bearings"), building or (), strict=False))
+    sources: dict[str, Source] = {}
+    for name, quantity in (BEARING if building is None else BUILDING).items():
+        head, several, _ = quantity.path.partition(".*")
+        if several:
+            numbers = range(counts.get(head, surfaces))
+            sources |= {f"{name}_{index + 1}": Source(quantity, index) for index in numbers}
+        else:
+            sources[name] = Source(quantity)
+    return sources
 
 
 def of_building(summary: Mapping[str, Any]) -> bool:
@@ -54,15 +121,15 @@ def of_building(summary: Mapping[str, Any]) -> bool:
     return "bearings" in summary
 
 
-def summary_value(summary: Mapping[str, Any], path: str) -> Any:
-    """The value of a summary at a dotted path, None where it has none; `*` gives a list of the values of all rows."""
-    value: Any = summary
-    head, each, rest = path.partition(".*")
+def value_at(table: Any, path: str) -> Any:
+    """The value at a dotted path of keys or attributes, None without it; `*` gives a list of the values of all rows."""
+    value = table
+    head, several, rest = path.partition(".*")
     for part in head.split("."):
-        value = value.get(part) if isinstance(value, Mapping) else None
-    if not each or value is None:
+        value = value.get(part) if isinstance(value, Mapping) else getattr(value, part, None)
+    if not several or value is None:
         return value
-    return [summary_value(row, rest.lstrip(".")) for row in value] if rest else value
+    return [value_at(row, rest.lstrip(".")) for row in value] if rest else value
 
 
 def plain_cell(value: Any) -> Any:

@@ -15,7 +15,7 @@ from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
-from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, of_building, plain_cell, summary_value
+from msfp_gen.studies.columns import BEARING, BUILDING, Quantity, of_building, plain_cell, value_at
 from msfp_gen.studies.study.axes import Axis, located
 from msfp_gen.studies.study.scene_factory import Recipe, SceneFactory, motion_of
 
@@ -142,8 +142,8 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
         ("scene", ""): [row.source for row in rows],
         **{(path, ""): [plain_cell(row.varied.get(path)) for row in rows] for path in varied},
     }
-    for name, (unit, path) in _known(rows).items():
-        values = [summary_value(row.summary, path) for row in rows]
+    for name, (unit, path, *_) in _known(rows).items():
+        values = [value_at(row.summary, path) for row in rows]
         if ".*" not in path:
             table[name, unit] = [plain_cell(value) for value in values]
             continue
@@ -152,10 +152,11 @@ def _columns(rows: Sequence[Row]) -> dict[tuple[str, str], list[Any]]:
     return {**table, ("file", ""): [row.file for row in rows]}
 
 
-def _known(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
-    """The columns that some of the rows have."""
+def _known(rows: Sequence[Row]) -> dict[str, Quantity]:
+    """The quantities of the summary that some of the rows have."""
     kinds = {of_building(row.summary) for row in rows}
-    return {**(COLUMNS if False in kinds else {}), **(BUILDING_COLUMNS if True in kinds else {})}
+    quantities = {**(BEARING if False in kinds else {}), **(BUILDING if True in kinds else {})}
+    return {name: quantity for name, quantity in quantities.items() if not quantity.characterised}
 
 
 def sweep_table(rows: Sequence[Row]) -> Table:
@@ -170,10 +171,7 @@ def sweep_table(rows: Sequence[Row]) -> Table:
     peaks = {
         "status": [str(row.summary["status"]) for row in rows],
         "u [mm]": [_number(row, "peak_displacement.radial", 1e3, 2) for row in rows],
-        "F [kN]": [
-            _number(row, f"{'peak_base_shear' if of_building(row.summary) else 'peak_top_force'}.radial", 1e-3, 2)
-            for row in rows
-        ],
+        "F [kN]": [_number(row, "peak_force.radial", 1e-3, 2) for row in rows],
         "rims": [str(len(row.summary.get("rims_met", ()))) for row in rows],
         "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }
@@ -192,7 +190,7 @@ def sweep_table(rows: Sequence[Row]) -> Table:
 
 def _number(row: Row, path: str, scale: float, digits: int) -> str:
     """A value of a summary for the terminal; a run that failed before its first row has none."""
-    value = summary_value(row.summary, path)
+    value = value_at(row.summary, path)
     return "-" if value is None else f"{value * scale:.{digits}f}"
 
 

@@ -55,7 +55,7 @@ def test_the_table_as_parquet_holds_numbers_and_units(tmp_path: Any) -> None:
     table = parquet.read_table(path)
     assert table["bearing.friction"].to_pylist() == ["[0.05, 0.02, 0.02, 0.08]", "0.04"]
     assert table["solver.rtol"].to_pylist() == [0.01, 0.01]
-    assert table.schema.field("peak_top_force").metadata == {b"units": b"N"}
+    assert table.schema.field("peak_force").metadata == {b"units": b"N"}
 
 
 def test_json_carries_the_varied_values(capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,7 +169,7 @@ def test_a_run_without_rows_is_a_row_of_the_table(
     assert len(list((tmp_path / "runs").iterdir())) == 2
     rows = list(csv.DictReader((tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["status"] for row in rows] == ["ok", "newton", "ok"]
-    assert rows[1]["message"].endswith("jammed") and rows[1]["peak_top_force [N]"] == rows[1]["file"] == ""
+    assert rows[1]["message"].endswith("jammed") and rows[1]["peak_force [N]"] == rows[1]["file"] == ""
 
 
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:

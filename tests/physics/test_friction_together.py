@@ -84,7 +84,7 @@ def test_sliders_without_mass(word: str) -> None:
     assert massless.succeeded and massless.summary["energy"]["closure_error"] < 1e-3
     for name in ("least_friction", "most_friction"):
         assert massless.summary[name] == pytest.approx(inertial.summary[name], rel=2e-3)
-    force = [run.summary["peak_top_force"]["radial"] for run in (massless, inertial)]
+    force = [run.summary["peak_force"]["radial"] for run in (massless, inertial)]
     assert force[0] == pytest.approx(force[1], rel=1e-3)
 
 

@@ -150,7 +150,7 @@ def test_peaks_of_the_summary() -> None:
     for parameter in parameters_of(scene, list(paths)):
         step = step_of(parameter, paths[parameter.path])
         runs = [simulate(changed_parameters(scene, {parameter: v})).summary for v in values_around(parameter, step)]
-        for name in ("peak_displacement", "peak_top_force"):
+        for name in ("peak_displacement", "peak_force"):
             found, _ = derivative([np.array(list(run[name].values())) for run in runs], step)
             given = np.array(list(slopes[parameter.path][name].values()))
             assert np.abs(given - found).max() <= 1e-5 * np.abs(found).max(), (parameter.path, name)

@@ -19,7 +19,7 @@ def cheap_study(**changes: Any) -> dict[str, Any]:
             "friction": {"multiplies": "bearing.friction", "distribution": "uniform", "low": 0.8, "high": 1.2},
         },
         "sampling": {"samples": 6, "seed": 3},
-        "keep": ["peak_displacement", "peak_top_force", "peak_sliding", "rims_met"],
+        "keep": ["peak_displacement", "peak_force", "peak_sliding", "rims_met"],
         "chunk": 4,
         **changes,
     }

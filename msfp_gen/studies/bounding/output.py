@@ -32,7 +32,7 @@ SHOWN = {
     "N/m": ("kN/m", 1e-3),
     "m/s": ("mm/s", 1e3),
     "W/m^2": ("kW/m2", 1e-3),
-    "1": ("%", 100.0),
+    "": ("%", 100.0),
 }
 # In the order of drawing: the nominal loop lies on top. Solid lines, since repeated cycles would fill dashes.
 LINE_STYLES: dict[str, dict[str, Any]] = {
@@ -54,9 +54,9 @@ def write_quantities(bounds: Bounds, path: str | Path) -> Path:
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    units, quantities, governing = bounds.measures, bounds.quantities(), bounds.governing()
+    sources, quantities, governing = bounds.compared, bounds.quantities(), bounds.governing()
     columns: dict[tuple[str, str], list[Any]] = {
-        ("quantity", ""): [f"{name} [{units[name].unit}]" for name in quantities],
+        ("quantity", ""): [f"{name} [{sources[name].quantity.unit or 1}]" for name in quantities],
         **{(case, ""): [values[case] for values in quantities.values()] for case in CASES},
         ("governs", ""): [governing.get(name, "") for name in quantities],
     }
@@ -100,11 +100,12 @@ def _lambda_table(bounds: Bounds) -> Table:
 
 
 def _quantity_table(bounds: Bounds) -> Table:
-    units, governing = bounds.measures, bounds.governing()
+    sources, governing = bounds.compared, bounds.governing()
     rows = []
     for name, values in bounds.quantities().items():
         if any(value is not None for value in values.values()):
-            unit, scale = SHOWN.get(units[name].unit, (units[name].unit, 1.0))
+            unit = sources[name].quantity.unit
+            unit, scale = SHOWN.get(unit, (unit, 1.0))
             cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
             rows.append((f"{name.replace('_', ' ')} [{unit}]", *cells, governing.get(name, "")))
     return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)

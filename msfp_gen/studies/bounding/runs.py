@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.characterise import BuildingCharacterisation
@@ -17,6 +17,7 @@ from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
+from msfp_gen.studies.columns import Source, catalogue
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import Characterisation
@@ -37,75 +38,11 @@ WIDER: dict[str, tuple[str, Any]] = {
 Progress = Callable[[float, float], None]
 
 
-class Measure(NamedTuple):
-    """A quantity that is compared.
-
-    Attributes:
-        unit: SI unit.
-        governs: whether its largest or its least value governs a design; "" if neither does.
-        read: its value from a characterisation; None if it is not defined.
-    """
-
-    unit: str
-    governs: Literal["most", "least", ""]
-    read: Callable[[Any], float | None]
-
-
-def measures_of(scene: AnyScene) -> dict[str, Measure]:
-    """The quantities that are compared for a scene."""
-    return measures(len(scene.bearing.surfaces)) if isinstance(scene, Scene) else building_measures()
-
-
-def building_measures() -> dict[str, Measure]:
-    """Name -> quantity that is compared for a building on bearings."""
-    return {
-        "peak_displacement": Measure("m", "most", lambda run: max(each.peak_displacement for each in run.bearings)),
-        "peak_base_shear": Measure("N", "most", lambda run: run.peak_force),
-        "peak_floor_acceleration": Measure("m/s^2", "most", lambda run: run.peak_floor_acceleration),
-        "peak_drift_ratio": Measure("1", "most", lambda run: run.peak_drift_ratio),
-        "minimum_load_ratio": Measure("1", "least", lambda run: min(e.minimum_load_ratio for e in run.bearings)),
-        "maximum_load_ratio": Measure("1", "most", lambda run: max(e.maximum_load_ratio for e in run.bearings)),
-        "capacity_left": Measure("m", "least", lambda run: min(each.capacity_left for each in run.bearings)),
-        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
-        "secant_period": Measure("s", "", lambda run: run.secant_period),
-        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
-        "energy_dissipated": Measure("J", "", lambda run: run.energy_dissipated),
-    }
-
-
-def measures(surfaces: int) -> dict[str, Measure]:
-    """Name -> quantity that is compared, for a stack with this number of surfaces; loop properties are cycle means."""
-    whole = {
-        "peak_displacement": Measure("m", "most", lambda run: run.peak_displacement),
-        "peak_force": Measure("N", "most", lambda run: run.peak_force),
-        "secant_stiffness": Measure("N/m", "", lambda run: run.secant_stiffness),
-        "effective_stiffness": Measure("N/m", "", _mean("effective_stiffness")),
-        "effective_period": Measure("s", "", _mean("effective_period")),
-        "energy_dissipated": Measure("J", "", _mean("energy_dissipated")),
-        "effective_damping": Measure("1", "", _mean("effective_damping")),
-        "zero_displacement_force": Measure("N", "", _mean("zero_displacement_force")),
-        "residual_displacement": Measure("m", "most", lambda run: run.residual_displacement if run.at_rest else None),
-        "maximum_uplift": Measure("m", "most", lambda run: run.maximum_uplift),
-    }
-    kinds: dict[str, tuple[str, Literal["most", "least"]]] = {
-        "capacity_left": ("m", "least"),
-        "peak_velocity": ("m/s", "most"),
-        "peak_heat_flux": ("W/m^2", "most"),
-    }
-    each = {
-        f"{name}_{surface}": Measure(unit, governs, _of_surface(name, surface))
-        for name, (unit, governs) in kinds.items()
-        for surface in range(1, surfaces + 1)
-    }
-    return whole | each
-
-
-def _mean(name: str) -> Callable[[Characterisation], float | None]:
-    return lambda run: run.envelope[name].mean if name in run.envelope else None
-
-
-def _of_surface(name: str, surface: int) -> Callable[[Characterisation], float | None]:
-    return lambda run: getattr(run.surfaces[surface - 1], name)
+def compared_quantities(scene: AnyScene) -> dict[str, Source]:
+    """The quantities that are compared for a scene; loop properties of a bearing are cycle means."""
+    building = None if isinstance(scene, Scene) else (0, 0, 0)
+    sources = catalogue(len(_typical(scene).surfaces), building)
+    return {name: source for name, source in sources.items() if source.compared}
 
 
 @dataclass(frozen=True)
@@ -157,27 +94,30 @@ class Bounds:
         return len(self.bearing.surfaces)
 
     @property
-    def measures(self) -> dict[str, Measure]:
+    def compared(self) -> dict[str, Source]:
         """Name -> quantity that is compared."""
-        return measures_of(self.cases[0].scene)
+        return compared_quantities(self.cases[0].scene)
 
     def quantities(self) -> dict[str, dict[str, float | None]]:
         """Quantity -> case -> value in SI; None where a run failed or the quantity is not defined in it."""
         return {
             name: {
-                case.name: None if case.characterisation is None else measure.read(case.characterisation)
+                case.name: None
+                if case.result is None or case.characterisation is None
+                else source.value(case.result.summary, case.characterisation)
                 for case in self.cases
             }
-            for name, measure in self.measures.items()
+            for name, source in self.compared.items()
         }
 
     def governing(self) -> dict[str, str]:
         """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
-        worst, kinds = {}, self.measures
+        worst = {}
         for name, values in self.quantities().items():
             known = {case: value for case, value in values.items() if value is not None}
-            if kinds[name].governs and len(known) == len(values) and len(set(known.values())) > 1:
-                pick = max if kinds[name].governs == "most" else min
+            governs = self.compared[name].quantity.governs
+            if governs and len(known) == len(values) and len(set(known.values())) > 1:
+                pick = max if governs == "most" else min
                 worst[name] = pick(known, key=known.__getitem__)
         return worst
 

@@ -42,9 +42,9 @@ KEYS = {
     "chunk": "a number of runs",
     "about": "written by msfp-gen",
 }
-DEFAULT_KEEP = ("peak_displacement", "peak_top_force", "peak_sliding", "rims_met")
+DEFAULT_KEEP = ("peak_displacement", "peak_force", "peak_sliding", "rims_met")
 BUILDING_KEEP = (
-    "peak_displacement", "peak_base_shear", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
+    "peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
 )  # fmt: skip
 _CHUNK = Quantity("", least=1, whole=True)
 

@@ -18,8 +18,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.history import LABELS, STACK, quantities
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
-from msfp_gen.studies.bounding.runs import Measure, building_measures, measures
-from msfp_gen.studies.columns import BUILDING_COLUMNS, COLUMNS, plain_cell, summary_value
+from msfp_gen.studies.columns import Quantity, Source, catalogue, plain_cell
 
 # Word in a formula -> what it takes of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {
@@ -42,16 +41,9 @@ _OVER_STEPS = {
     ("most", "temperature"): "temperature",
 }
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
-# Quantities of the summary beside the columns of a sweep: name -> (unit, path).
-_MORE = {
-    "axial_load": ("N", "axial_load"),
-    "dissipated_share": ("", "energy.dissipated_share"),
-    "peak_temperature": ("degC", "peak_temperature.*"),
-    "least_friction": ("", "least_friction.*"),
-    "most_friction": ("", "most_friction.*"),
-}
 CAPACITY_USED = "capacity_used"  # 1 - least gap / capacity: 1 where a slider meets its rim
 TEXTS = ("rims_met",)
+_CAPACITY_USED = Quantity("", CAPACITY_USED)
 _LEFT_OUT = ("status", "message")  # every row has them
 _OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}
 
@@ -62,15 +54,6 @@ class Column(NamedTuple):
     name: str
     unit: str
     text: bool = False
-
-
-class Source(NamedTuple):
-    """Where a quantity comes from: unit, path in the summary, index of the surface; or a measure of cycles."""
-
-    unit: str
-    path: str = ""
-    surface: int | None = None
-    measure: Measure | None = None
 
 
 @dataclass(frozen=True)
@@ -94,10 +77,14 @@ class Keep:
     building: tuple[int, int, int] | None = None
     building_columns: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def known(self) -> dict[str, Source]:
         """Column -> where it comes from, of everything that can be kept."""
-        return catalogue(self.surfaces, self.building)
+        sources = catalogue(self.surfaces, self.building)
+        sources = {name: source for name, source in sources.items() if name not in _LEFT_OUT}
+        if self.building is None:
+            sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.surfaces)}
+        return sources
 
     @property
     def history(self) -> Collection[str]:
@@ -147,7 +134,7 @@ def _columns(keep: Keep) -> tuple[Column, ...]:
             words = sorted({re.sub(r"_\d+$", "", key) for key in known})
             hint = suggestion(name, words) or f"; the quantities are {', '.join(words)}"
             raise InputError(f"keep: {name!r} is no quantity{hint}")
-        columns += [Column(key, known[key].unit, key in TEXTS) for key in each]
+        columns += [Column(key, known[key].quantity.unit, key in TEXTS) for key in each]
     for name, text in keep.formulas:
         _tree(keep, name, text)
         columns.append(Column(name, ""))
@@ -178,28 +165,6 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
 
 
 @lru_cache(maxsize=16)
-def catalogue(surfaces: int, building: tuple[int, int, int] | None) -> dict[str, Source]:
-    """Column -> where it comes from, of a bearing or a building; those of the summary come first.
-
-    surfaces: the most of any bearing. building: numbers of floors, storeys and bearings.
-    """
-    counts = dict(zip(("floors", "storeys", "bearings"), building or (), strict=False))
-    sources: dict[str, Source] = {}
-    for name, (unit, path) in ({**COLUMNS, **_MORE} if building is None else BUILDING_COLUMNS).items():
-        head, several, _ = path.partition(".*")
-        if several:
-            numbers = range(counts.get(head, surfaces))
-            sources |= {f"{name}_{index + 1}": Source(unit, path, index) for index in numbers}
-        elif name not in _LEFT_OUT:
-            sources[name] = Source(unit, path)
-    if building is None:
-        sources |= {f"{CAPACITY_USED}_{k + 1}": Source("", CAPACITY_USED, k) for k in range(surfaces)}
-    for name, measure in (measures(surfaces) if building is None else building_measures()).items():
-        sources.setdefault(name, Source("" if measure.unit == "1" else measure.unit, measure=measure))
-    return sources
-
-
-@lru_cache(maxsize=16)
 def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Column of a history, named as in an exported file -> field of `History`, and index after time."""
     numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
@@ -227,20 +192,13 @@ class _Reader:
         self.problem = ""
         self._keep = keep
         self._known = keep.known
-        self._found: Any = None
 
     def value(self, name: str) -> Any:
         """The value of a quantity; None where the run has none."""
         source = self._known[name]
-        if source.measure is not None:
-            return self._of_characterisation(source)
-        if source.path == CAPACITY_USED:
-            return self._capacity_used(source.surface or 0)
-        try:
-            value = summary_value(self.result.summary, source.path)
-            value = value if source.surface is None or value is None else value[source.surface]
-        except IndexError:  # a model without the quantity, or a bearing with fewer surfaces
-            return None
+        if source.quantity is _CAPACITY_USED:
+            return self._capacity_used(source.place or 0)
+        value = source.value(self.result.summary, self._characterisation if source.quantity.characterised else None)
         if name in TEXTS:
             return plain_cell(value)
         return None if value is None else _finite(value)
@@ -278,17 +236,11 @@ class _Reader:
         capacity = float(surfaces[surface].capacity)
         return 1.0 - float(self.result.summary["minimum_gap"][surface]) / capacity
 
-    def _of_characterisation(self, source: Source) -> float | None:
-        assert source.measure is not None
-        if self._found is None and not self.problem:
-            try:
-                self._found = self.result.characterise()
-            except InputError as error:
-                self.problem = f"not characterised: {error}"
-        if self._found is None:
-            return None
+    @cached_property
+    def _characterisation(self) -> Any:
+        """None, and the problem, where it is not possible."""
         try:
-            value: float | None = source.measure.read(self._found)
-        except IndexError:
+            return self.result.characterise()
+        except InputError as error:
+            self.problem = f"not characterised: {error}"
             return None
-        return None if value is None else _finite(value)

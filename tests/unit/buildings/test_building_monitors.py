@@ -25,7 +25,7 @@ def unforeseen(monkeypatch: pytest.MonkeyPatch) -> None:
 def same(one: BuildingResult, other: BuildingResult) -> bool:
     names = ("time", "displacement", "acceleration", "wrench", "dissipated", "stored", "input", "received")
     rows = all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
-    peaks = zip(vars(one.peaks).values(), vars(other.peaks).values(), strict=True)
+    peaks = zip(vars(one.extremes).values(), vars(other.extremes).values(), strict=True)
     return rows and all(np.array_equal(*pair) for pair in peaks) and one.monitored == other.monitored
 
 
@@ -77,8 +77,8 @@ def test_changes_of_models_and_peaks_are_in_the_file(tmp_path):
     assert {note.action for note in notes} == {"uplift = True"}
     read = BuildingResult.from_netcdf(found.to_netcdf(tmp_path / "out.nc"))
     assert same(found, read) and read.summary == found.summary and read.notes == found.notes
-    rows = replace(found, recorded_peaks=None, monitored=())
-    assert BuildingResult.from_netcdf(rows.to_netcdf(tmp_path / "rows.nc")).recorded_peaks is None
+    rows = replace(found, recorded_extremes=None, monitored=())
+    assert BuildingResult.from_netcdf(rows.to_netcdf(tmp_path / "rows.nc")).recorded_extremes is None
 
 
 @pytest.mark.parametrize("fixed", [Effects(), Auto(uplift=False)], ids=["effects", "auto"])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import preset_run
 from support.buildings import MOTION, PLACES, frame, scene
 from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
@@ -19,9 +20,10 @@ from msfp_gen.analysis.characterise import loops
 from msfp_gen.analysis.characterise.tables import characterisation_tables, csv_rows
 from msfp_gen.buildings.dataset import column_names, columns_of
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.buildings.summary import summary_tables
 from msfp_gen.figures import plot_loops
 from msfp_gen.results.note import Note
+from msfp_gen.results.resample import at_times
+from msfp_gen.studies.columns import catalogue
 
 
 @cache
@@ -46,12 +48,14 @@ def result() -> BuildingResult:
 def test_few_lines():
     lines = repr(result()).splitlines()
     assert len(lines) <= 10 and lines[0] == "Result of frame" and "status" in lines[1]
-    steps = result().counts["steps"]
+    steps = result().counters["steps"]
     assert steps != len(result().time) - 1 and f"s in {steps} steps" in lines[2]
     html = result()._repr_html_()
     assert "<polyline" in html and "orbit of bearing" in html and "base shear" in html
-    assert repr(result().bearings[1]).startswith("Bearing 2 (B), 5_2_2 at (-3, 2) m")
-    assert all(table.text for table in summary_tables(result()))
+    lines = repr(result().bearings[1]).splitlines()
+    assert len(lines) <= 10 and lines[0] == "Result of bearing 2 (B) of frame" and "5_2_2 at (-3, 2) m" in lines[2]
+    assert "<polyline" in result().bearings[1]._repr_html_()
+    assert all(table.text for run in (result(), result().bearings[1]) for table in run.tables())
 
 
 def test_summary_is_that_of_the_rows():
@@ -60,8 +64,8 @@ def test_summary_is_that_of_the_rows():
     weight = made().axial_loads.sum()
     assert s["weight"] == pytest.approx(weight, rel=1e-9)
     shear = np.hypot(*found.base_reaction[:, :2].T).max()
-    assert 1.05 * shear > s["peak_base_shear"]["radial"] > (1 - 1e-12) * shear  # sums in another order
-    assert s["base_shear_ratio"] == s["peak_base_shear"]["radial"] / s["weight"]
+    assert 1.05 * shear > s["peak_force"]["radial"] > (1 - 1e-12) * shear  # sums in another order
+    assert s["peak_force_ratio"] == s["peak_force"]["radial"] / s["weight"]
     roof = found.node("floor 3")[:, 2, :2]
     acceleration = np.hypot(*roof.T).max()
     assert s["floors"][3]["peak_acceleration"]["radial"] > (1 - 1e-12) * acceleration  # C rounds the root otherwise
@@ -93,12 +97,12 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
         if name in alone.dataset:
             assert variable.dims == alone.dataset[name].dims and variable.attrs == alone.dataset[name].attrs
     assert np.array_equal(one.dataset["top_force"], one.top_force) and one.dataset.sizes["surface"] == 4
-    shared = {"peak_displacement", "peak_top_force", "peak_force_ratio", "axial_load", "peak_sliding", "minimum_gap"}
+    shared = {"peak_displacement", "peak_force", "peak_force_ratio", "axial_load", "peak_sliding", "minimum_gap"}
     shared |= {"rims_met", "minimum_normal_force", "maximum_normal_force"}
     assert shared <= one.summary.keys() & alone.summary.keys()
     found = characterise(one)
     assert found.as_dict().keys() == alone.characterise().as_dict().keys()
-    assert found.peak_force == one.summary["peak_top_force"]["radial"] and found.secant_stiffness > 0
+    assert found.peak_force == one.summary["peak_force"]["radial"] and found.secant_stiffness > 0
     assert found.surfaces[0].capacity_left == one.summary["minimum_gap"][0] and "slip velocities" in found.notes[-1]
     assert all(table.text for table in characterisation_tables(found)) and csv_rows(found)
     path = one.save(tmp_path / "one.csv")
@@ -216,7 +220,7 @@ def test_characterisation_of_the_isolation_system():
     assert found.cycles == () and "no cycle closes" in found.notes[0] and len(found.bearings) == 4
     assert len(repr(found).splitlines()) <= 10
     assert json.dumps(found.as_dict(), allow_nan=False)
-    assert found.secant_stiffness > 0 and found.peak_force == result().summary["peak_base_shear"]["radial"]
+    assert found.secant_stiffness > 0 and found.peak_force == result().summary["peak_force"]["radial"]
     with pytest.raises(InputError, match="did not move"):
         characterise(replace(result(), displacement=0 * result().displacement, support=0 * result().support))
 
@@ -266,3 +270,21 @@ def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
     assert [each.motion == MOTION for each in read.scene.bearings] == [True, True, False, False]
     assert read.scene.bearings[2].motion is None and np.array_equal(read.support, found.support)
     assert read.summary == found.summary
+
+
+def test_a_bearing_at_other_times():
+    one = result().bearings[1]
+    between = at_times(one, 0.5 * (one.time[3] + one.time[4]))
+    assert between.label == one.label and between.displacement.shape == (1, 3)
+    np.testing.assert_allclose(between.displacement[0], one.displacement[3:5].mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(between.sliding[0], one.sliding[3:5].mean(axis=0), rtol=1e-12)
+
+
+def test_every_quantity_of_the_catalogue_is_in_a_result():
+    for run, counts in ((preset_run("fenz-test2"), None), (result(), (len(result().floors), len(result().storeys), 4))):
+        characterisation = run.characterise()
+        values = {name: source.value(run.summary, characterisation) for name, source in catalogue(4, counts).items()}
+        missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
+        # no friction law, no uplift; and both runs end in motion
+        optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}
+        assert missing <= optional and values["peak_force"] == characterisation.peak_force

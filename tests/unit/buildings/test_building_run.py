@@ -11,8 +11,8 @@ import pytest
 from support.buildings import BEARING, INTERFACE, LOAD, MOTION, frame, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, InputError, Motion, RunError, simulate
-from msfp_gen.buildings.compiled_run import start_run
-from msfp_gen.buildings.result import BuildingResult, result_of
+from msfp_gen.buildings.compiled_run import result_of, start_run
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.simulation import run_any
 from msfp_gen.simulation.run_any import simulate_building
 
@@ -26,7 +26,7 @@ def same(one: BuildingResult, other: BuildingResult) -> bool:
 
 def test_results_do_not_depend_on_the_number_of_threads():
     one, three = simulate(EVENTFUL, threads=1), simulate(EVENTFUL, threads=3)
-    assert same(one, three) and one.counts == three.counts
+    assert same(one, three) and one.counters == three.counters
 
 
 @pytest.mark.parametrize("effects", [None, Effects(uplift=True)], ids=["default", "uplift"])
@@ -34,14 +34,14 @@ def test_a_restored_run_continues_bit_by_bit(effects):
     made = replace(EVENTFUL, bearings=[replace(each, effects=effects) for each in EVENTFUL.bearings], duration=0.3)
     whole = simulate_building(made)
     begun = start_run(made)
-    begun.run.advance(whole.counts["steps"] // 2)
+    begun.run.advance(whole.counters["steps"] // 2)
     snapshot = begun.run.snapshot()
     begun.run.advance(3)
     later = start_run(made, threads=2)
     later.run.restore(snapshot)
     while later.run.advance(7):
         pass
-    assert same(result_of(later), whole) and later.run.counts == whole.counts
+    assert same(result_of(later), whole) and later.run.counts == whole.counters
 
 
 def test_an_interrupted_run_is_resumed_bit_by_bit(tmp_path):
@@ -105,7 +105,7 @@ def test_rows_lie_at_even_times_and_steps_end_at_samples():
     record = Motion.from_acceleration(0.007 * np.arange(30), np.random.default_rng(1).normal(size=(30, 3)))
     result = simulate(replace(EVENTFUL, motion=record, duration=None, output_step=0.02))
     assert result.time == pytest.approx([*0.02 * np.arange(11), 0.203])
-    assert result.counts["steps"] >= 29 + 10
+    assert result.counters["steps"] >= 29 + 10
 
 
 def test_a_motion_of_its_own_moves_one_support():

@@ -84,7 +84,7 @@ def test_a_failed_run_names_the_bearing_and_keeps_its_rows(effects, status):
 def test_the_number_of_steps_is_limited():
     with pytest.raises(RunError, match=r"^building: stopped at t = ") as caught:
         simulate(scene(frame(), solver=Solver(max_steps=5)))
-    assert caught.value.status == "steps" and caught.value.result.counts["steps"] == 5
+    assert caught.value.status == "steps" and caught.value.result.counters["steps"] == 5
 
 
 @pytest.mark.parametrize(

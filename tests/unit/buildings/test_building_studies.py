@@ -78,9 +78,9 @@ def test_bounds_multiply_the_properties_of_every_bearing(path: Path, tmp_path: P
         for one, given in zip(case.scene.bearings, scene.bearings, strict=True):
             wanted = [s.friction * f for s, f in zip(given.bearing.surfaces, factors[case.name], strict=True)]
             assert [surface.friction for surface in one.bearing.surfaces] == pytest.approx(wanted)
-    shears = [case.result.summary["peak_base_shear"]["radial"] for case in found.cases]
-    assert shears[0] < shears[1] < shears[2] and found.quantities()["peak_base_shear"]["upper"] == shears[2]
-    assert found.governing()["peak_base_shear"] == "upper"
+    shears = [case.result.summary["peak_force"]["radial"] for case in found.cases]
+    assert shears[0] < shears[1] < shears[2] and found.quantities()["peak_force"]["upper"] == shears[2]
+    assert found.governing()["peak_force"] == "upper"
     assert json.dumps(found.as_dict(), allow_nan=False) and all(table.text for table in bounding_tables(found))
     plot_bounds(found, tmp_path / "bounds.png")
     rows = list(csv.reader(write_quantities(found, tmp_path / "bounds.csv").read_text(encoding="utf-8").splitlines()))
@@ -103,10 +103,10 @@ def test_a_sweep_of_the_command_line(path: Path, tmp_path: Path, capsys: pytest.
     assert "F [kN]" in capsys.readouterr().out and len(list(folder.iterdir())) == 2
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     assert [row[FRICTION] for row in rows] == ["0.02", "0.06"]
-    peak = alone(path.parent, 0.06).summary["peak_base_shear"]["radial"]
-    assert float(rows[1]["peak_base_shear [N]"]) == peak > float(rows[0]["peak_base_shear [N]"])
+    peak = alone(path.parent, 0.06).summary["peak_force"]["radial"]
+    assert float(rows[1]["peak_force [N]"]) == peak > float(rows[0]["peak_force [N]"])
     assert {"floor_acceleration_1 [m/s^2]", "bearing_displacement_3 [m]"} <= set(rows[0])
-    assert not any(name.startswith("peak_top_force") for name in rows[0])
+    assert not any(name.startswith("peak_sliding") for name in rows[0])
     assert main(["batch", str(path), "--vary", "building.bearing[7].name='x'"]) == 2
     assert "there are 3 of them" in capsys.readouterr().err
 
@@ -114,10 +114,10 @@ def test_a_sweep_of_the_command_line(path: Path, tmp_path: Path, capsys: pytest.
 STUDY = """
 name = "friction of a slab"
 scene = "slab.toml"
-keep = ["peak_base_shear", "bearing_displacement"]
+keep = ["peak_force", "bearing_displacement"]
 
 [quantities]
-ratio = "peak_base_shear / 441000"
+ratio = "peak_force / 441000"
 slab = "peak(node_acceleration_base_u1) / 9.81"
 corner = "last(axial_force_2) - least(axial_force_2)"
 left = "least( sliding_3_4 ) + most(bearing_displacement_3_E1)"
@@ -152,12 +152,12 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     rows = parquet.read_table(next((tmp_path / "runs").glob("part-*.parquet"))).to_pydict()
     run = simulate(scene)
     wanted = run.summary
-    assert rows["peak_base_shear"][1] == wanted["peak_base_shear"]["radial"] > rows["peak_base_shear"][0]
+    assert rows["peak_force"][1] == wanted["peak_force"]["radial"] > rows["peak_force"][0]
     assert rows["bearing_displacement_3"][1] == wanted["bearings"][2]["peak_displacement"]["radial"]
     assert rows["slab"][1] == np.abs(run.node("base")[:, 2, 0]).max() / 9.81
     assert rows["corner"][1] == run.axial_force[-1, 1] - run.axial_force[:, 1].min() > 0
     assert rows["left"][1] == run.sliding[:, 2, 3].min() + run.bearings[2].displacement[:, 0].max() > 0
-    assert rows["ratio"][1] == pytest.approx(rows["peak_base_shear"][1] / 441000)
+    assert rows["ratio"][1] == pytest.approx(rows["peak_force"][1] / 441000)
 
 
 @pytest.mark.parametrize(
@@ -165,8 +165,8 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     [
         ("bearing[*]", "bearing[5]", r"axes\.mu.*there are 3 of them; give an index from 0 to 2"),
         ("surfaces = [1, 4]", "surfaces = [7]", "this bearing has surfaces 1 to 4"),
-        ('"peak_base_shear",', '"peak_top_force",', "'peak_top_force' is no quantity"),
-        ("peak_base_shear / 441000", "peak(displacement_E1)", "'displacement_E1' is no column of a history"),
+        ('"peak_force",', '"peak_sliding",', "'peak_sliding' is no quantity"),
+        ("peak_force / 441000", "peak(displacement_E1)", "'displacement_E1' is no column of a history"),
         ("node_acceleration_base_u1", "node_acceleration_base_u7", "did you mean 'node_acceleration_base_u"),
         ("sliding_3_4", "sliding_4_4", "'sliding_4_4' is no column of a history"),
         ('"building.interface.vertical_stiffness"', '"building.interfaces.stiffness"', "interfaces: unknown key"),
@@ -184,7 +184,7 @@ def test_commands_take_a_building(path: Path, tmp_path: Path, capsys: pytest.Cap
     out = tmp_path / "out.nc"
     assert main(["run", str(path), "-o", str(out), "--plot", str(tmp_path / "plot.png"), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed["peak_base_shear"] == BuildingResult.from_netcdf(out).summary["peak_base_shear"]
+    assert printed["peak_force"] == BuildingResult.from_netcdf(out).summary["peak_force"]
     assert main(["explain", str(path)]) == 0 and "all bearings: effects selected" in capsys.readouterr().out
     assert main(["characterise", str(out)]) == 0 and "isolation system of slab" in capsys.readouterr().out
     assert main(["plot", str(out), "--figure", "plan", "-o", str(tmp_path / "plan.svg")]) == 0

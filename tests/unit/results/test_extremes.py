@@ -12,7 +12,7 @@ from support import preset_run, scene_of
 from msfp_gen import Motion, Result, simulate
 from msfp_gen.results.extremes import Extremes
 
-PEAKS = ("peak_displacement", "peak_top_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
+PEAKS = ("peak_displacement", "peak_force", "peak_sliding", "minimum_gap", "minimum_normal_force")
 
 
 def summary_of(name: str, output_step: float | None, **effects: object) -> dict[str, object]:

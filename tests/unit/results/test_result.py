@@ -152,7 +152,7 @@ def test_summary_knows_the_answers():
     assert summary["name"] == "fenz-test5" and summary["status"] == "ok" and summary["duration"] == 20.0
     assert summary["peak_displacement"] == pytest.approx({"E1": 0.14, "E2": 0, "E3": 0, "radial": 0.14}, rel=1e-3)
     peak = np.abs(rows.top_force[:, 0]).max()
-    assert summary["peak_top_force"]["radial"] == peak
+    assert summary["peak_force"]["radial"] == peak
     assert summary["peak_force_ratio"] == pytest.approx(peak / LOAD)
     assert summary["peak_sliding"] == rows.sliding.max(axis=0).tolist()
     assert summary["rims_met"] == [1, 4] and min(summary["minimum_gap"]) == pytest.approx(-1e-4)

@@ -168,5 +168,5 @@ def test_a_peak_inside_a_step_has_its_derivative():
     rows = np.hypot(*result.history.top_force[:, :2].T)
     assert np.ptp(np.diff(result.history.time)) < 1e-12 and result.extremes.top_force[3] > 1.0005 * rows.max()
     more, less = (simulate(scene((1 + d) * 60e3)).extremes.top_force[3] for d in (1e-4, -1e-4))
-    slope = result.gradient_summary["load.scale"]["peak_top_force"]["radial"]
+    slope = result.gradient_summary["load.scale"]["peak_force"]["radial"]
     assert slope == pytest.approx((more - less) / 2e-4, rel=1e-6)

@@ -17,7 +17,7 @@ from support.resuming import assert_same, interrupted, stopping_at
 from msfp_gen import Auto, InputError, Load, Motion, RunError, Scene, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
 from msfp_gen.result import Result
-from msfp_gen.results import streaming, thinning
+from msfp_gen.results import thinning
 from msfp_gen.results.thinning import thinned_history
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.parts import Stop
@@ -35,7 +35,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows go to disk and from there to the file in many blocks."""
     monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
     monkeypatch.setattr(simulation, "ROWS_HELD", 16)
-    monkeypatch.setattr(streaming, "BLOCK", PIECE)
+    monkeypatch.setattr(streamed_rows, "BLOCK", PIECE)
     monkeypatch.setattr(streamed_rows, "blocks", lambda count, rows: thinning.blocks(count, rows, PIECE))
 
 
@@ -285,8 +285,8 @@ import resource, sys
 from pathlib import Path
 from msfp_gen.result import Result
 from msfp_gen.results.joining import taken
-from msfp_gen.results.streaming import write_blocks
 from msfp_gen.results.thinning import blocks
+from msfp_gen.simulation.streamed_rows import write_blocks
 path = Path(sys.argv[1])
 result = Result.from_netcdf(path)
 count, size = len(result.history.time), path.stat().st_size

@@ -19,8 +19,9 @@ from msfp_gen.motions.records.spectrum import MEASURES
 from msfp_gen.scene.file.loader import scene_from_table, toml_file
 from msfp_gen.scene.file.motion_tables import RecordMotion
 from msfp_gen.studies import load_study
+from msfp_gen.studies.columns import catalogue
 from msfp_gen.studies.study.loader import example_text
-from msfp_gen.studies.study.quantities import Keep, catalogue
+from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.sampling import METHODS, Distribution, Sampling
 
 
@@ -177,20 +178,20 @@ def test_every_sampling_has_its_number_of_rows(method: str) -> None:
 
 def test_quantities_are_those_of_the_summary_the_characterisation_and_formulas() -> None:
     text = {
-        "ratio": "peak_top_force / 112e3 * friction",
+        "ratio": "peak_force / 112e3 * friction",
         "least_force": "least(normal_force_1)",
         "end": "last(displacement_E1)",
     }
-    keep = ["peak_top_force", "peak_sliding", "minimum_gap_2", "effective_damping", "rims_met", "capacity_used"]
+    keep = ["peak_force", "peak_sliding", "minimum_gap_2", "effective_damping", "rims_met", "capacity_used"]
     study = load_study(cheap_study(keep=keep, quantities=text, scene="fenz-test2"))
     result = simulate(study.scene(1))
     found, problem = study.keep.values(result, {"friction": 2.0})
     summary, cycles = result.summary, result.characterise()
-    assert not problem and found["peak_top_force"] == summary["peak_top_force"]["radial"]
+    assert not problem and found["peak_force"] == summary["peak_force"]["radial"]
     assert [found[f"peak_sliding_{k}"] for k in (1, 2, 3, 4)] == list(summary["peak_sliding"])
     assert found["minimum_gap_2"] == summary["minimum_gap"][1] and found["rims_met"] == ""
     assert found["effective_damping"] == cycles.envelope["effective_damping"].mean
-    assert found["ratio"] == pytest.approx(found["peak_top_force"] / 112e3 * 2.0)
+    assert found["ratio"] == pytest.approx(found["peak_force"] / 112e3 * 2.0)
     assert found["least_force"] == result.history.normal_force[:, 0].min()
     assert found["end"] == result.history.displacement[-1, 0]
     capacity = result.scene.bearing.surfaces[3].capacity
@@ -210,7 +211,7 @@ def test_extremes_of_formulas_are_over_all_steps_where_a_run_records_them() -> N
     few = simulate(replace(study.scene(1), output_step=2.0))
     found, _ = study.keep.values(few, {})
     assert found["least_force"] == found["minimum_normal_force_1"] < few.history.normal_force[:, 0].min()
-    assert found["force"] == few.summary["peak_top_force"]["E1"] > abs(few.history.top_force[:, 0]).max()
+    assert found["force"] == few.summary["peak_force"]["E1"] > abs(few.history.top_force[:, 0]).max()
     assert found["far"] == few.summary["peak_sliding"][3] >= few.history.sliding[:, 3].max()
     assert found["tilt"] == abs(few.history.tilt_angles[:, 0, 0]).max()
 
@@ -280,7 +281,7 @@ WRONG = {
         {"keep": ["peak_displacment"]},
         "keep: 'peak_displacment' is no quantity; did you mean 'peak_displacement'",
     ),
-    "formula": ({"quantities": {"x": "peak_top_force +"}}, "quantities.x"),
+    "formula": ({"quantities": {"x": "peak_force +"}}, "quantities.x"),
     "formula of nothing": ({"quantities": {"x": "nothing * 2"}}, "quantities.x = .*'nothing' is no quantity"),
     "history": ({"quantities": {"x": "peak(normal_forse_1)"}}, "quantities.x: 'normal_forse_1' is no column"),
     "limit": ({"limits": {"run_seconds": -1}}, "limits.run_seconds = -1: give a finite number above 0"),
@@ -295,7 +296,7 @@ WRONG = {
         r"axes.a.sets = 'motion.scale': \[records\] gives the motion",
     ),
     "power of two": ({"sampling": {"method": "sobol-sequence", "samples": 6}}, "sampling.samples = 6: .*give 4 or 8"),
-    "same name": ({"quantities": {"friction": "1 * peak_top_force"}}, "friction: this name occurs twice"),
+    "same name": ({"quantities": {"friction": "1 * peak_force"}}, "friction: this name occurs twice"),
 }
 
 

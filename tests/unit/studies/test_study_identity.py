@@ -169,7 +169,7 @@ def frame_files(folder: Path) -> None:
             "mass": {"sets": "building.mass", "values": ["mass.mtx", "mass.npz"]},
             "bounds": {"factors": "factors.toml"},
         },
-        "keep": ["peak_base_shear"],
+        "keep": ["peak_force"],
         "chunk": 6,
     }
     (folder / "study.toml").write_text(dumps(study), encoding="utf-8")

@@ -55,7 +55,7 @@ def random_study(rng: np.random.Generator, folder: Path) -> Path:
     scene |= {"bearing": pivot if rng.random() < 0.5 else "fenz-tfp"}
     scene |= {"motion": {"kind": "record", "file": "a.csv", "correct": False}}
     chosen = [AXES[index] for index in rng.choice(len(AXES), rng.integers(1, 3), replace=False)]
-    table: Table = {"scene": scene, "keep": ["peak_displacement", "peak_top_force"], "chunk": int(rng.integers(1, 4))}
+    table: Table = {"scene": scene, "keep": ["peak_displacement", "peak_force"], "chunk": int(rng.integers(1, 4))}
     if rng.random() < 0.5:
         chosen = [axis for axis in chosen if not axis.get("sets", "").startswith("motion")]
         motions = [{"file": f"{name}.csv", "correct": False} for name in ("a", "b")]
@@ -99,8 +99,8 @@ def check(name: str, seeds: range, folder: Path) -> None:
             for run in range(1, study.runs + 1):
                 summary = simulate(study.scene(run)).summary
                 row = rows.iloc[run - 1]
-                found = row.peak_displacement, row.peak_top_force
-                assert found == tuple(summary[key]["radial"] for key in ("peak_displacement", "peak_top_force")), seed
+                found = row.peak_displacement, row.peak_force
+                assert found == tuple(summary[key]["radial"] for key in ("peak_displacement", "peak_force")), seed
 
 
 def test_studies_on_the_same_threads_are_their_runs(tmp_path: Path) -> None:

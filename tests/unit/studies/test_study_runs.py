@@ -45,10 +45,10 @@ def test_rows_are_those_of_simulate(tmp_path: Path) -> None:
     for run in (1, 8):
         summary = simulate(study.scene(run)).summary
         row = rows.iloc[run - 1]
-        assert row.peak_top_force == summary["peak_top_force"]["radial"] and row.rims_met == ""
+        assert row.peak_force == summary["peak_force"]["radial"] and row.rims_met == ""
         assert [row[f"peak_sliding_{k}"] for k in range(1, 5)] == list(summary["peak_sliding"])
     part = pq.read_schema(next(tmp_path.glob("part-*.parquet")))
-    assert part.field("peak_top_force").metadata == {b"units": b"N"}
+    assert part.field("peak_force").metadata == {b"units": b"N"}
     assert [field.name for field in part][:5] == ["run", "rtol", "friction", "status", "message"]
 
 

@@ -1,4 +1,4 @@
-"""Peaks of a building over all steps of its run, which do not depend on the times of the rows."""
+"""Extremes of a building over all steps of its run, which do not depend on the times of the rows."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in th
 
 
 @dataclass(frozen=True, eq=False)
-class Peaks:
-    """Peaks of a run.
+class BuildingExtremes:
+    """Extremes of the run of a building.
 
     Of vectors, shape (..., 4), the largest magnitude along E1, E2, E3 and in the horizontal plane: node_acceleration
     [m/s^2]; node_displacement, relative to the ground, drift of the storeys and mean_displacement of the bearings [m];
@@ -49,8 +49,8 @@ class Peaks:
     normal_force: Array
 
     @classmethod
-    def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> Peaks:
-        """Peaks that the compiled run recorded (`msfp_building.h`). kept: numbers of the rows of each bearing."""
+    def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:
+        """Extremes that the compiled run recorded (`msfp_building.h`). kept: numbers of the rows of each bearing."""
         nodes, storeys = len(scene.building.nodes), len(scene.building.columns)
         vectors = {
             "node_acceleration": nodes,
@@ -114,7 +114,7 @@ def shapes(scene: BuildingScene) -> dict[str, tuple[int, ...]]:
 
 
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
-    """The vectors of a building of which the compiled run keeps peaks, in the order of `Peaks.of_run`.
+    """The vectors of a building of which the compiled run keeps peaks, in the order of `BuildingExtremes.of_run`.
 
     The order of the derivative of the coordinates that each is of; its rows, shape (vectors, 3, n); the shares of the
     motions of the ground that are taken off it, shape (vectors, grounds).

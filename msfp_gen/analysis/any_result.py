@@ -1,0 +1,123 @@
+"""`AnyResult`: what results of a bearing, of a building and of one of its bearings offer beside rows and files."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.tables import Table
+from msfp_gen.errors import InputError
+from msfp_gen.results.files import ResultFiles
+from msfp_gen.results.history import HorizontalMotion
+
+MAX_NOTES = 2  # printed; the others are counted
+MAX_POINTS = 600  # of the curve
+WIDTH, HEIGHT, MARGIN = 320, 200, 8  # of the curve [px]
+Rows = list[tuple[str, str]]  # label and value
+
+
+class Curve(NamedTuple):
+    """A curve in few lines of HTML: points x, y, ndarrays, shape (k,), and what they are."""
+
+    x: Array
+    y: Array
+    caption: str
+
+
+class AnyResult(ResultFiles):
+    """Summary, printed text, tables and characterisation of a result.
+
+    counters: of the work of the solver. notes: messages of the monitors, in order of time (docs/effects.md).
+    """
+
+    @cached_property
+    @abstractmethod
+    def summary(self) -> dict[str, Any]:
+        """Main results in SI units, as values that JSON can hold."""
+
+    @abstractmethod
+    def characterise(self) -> Any:
+        """Effective properties and demands. Raises InputError where nothing moved."""
+
+    @abstractmethod
+    def tables(self) -> list[Table]:
+        """The main results as tables for the console."""
+
+    @abstractmethod
+    def main_results(self) -> Rows:
+        """Label and value of the main results, seven rows at most."""
+
+    @property
+    @abstractmethod
+    def curve(self) -> Curve:
+        """The curve that says most about the run."""
+
+    @property
+    def status_text(self) -> str:
+        """How the run ended, with the message of a run that failed."""
+        return self.status + (f": {self.message}" if self.message else "")
+
+    def printed_rows(self) -> Rows:
+        """Label and value of the main results after the status, with the first notes."""
+        notes = [note.line for note in self.notes]
+        more = f"; {len(notes) - MAX_NOTES} more in .notes" if len(notes) > MAX_NOTES else ""
+        shown = [("notes", "; ".join(notes[:MAX_NOTES]) + more)] if notes else []
+        return [("status", self.status_text), *self.main_results(), *shown]
+
+    def __repr__(self) -> str:
+        """The main results in ten lines at most."""
+        rows = [f"  {label:<18}{_one_line(value)}" for label, value in self.printed_rows()]
+        return "\n".join([f"Result of {self.title}", *rows])
+
+    def _repr_html_(self) -> str:
+        """The main results as a table beside a curve, for a notebook."""
+        cells = "".join(
+            f"<tr><th>{escape(label)}</th><td>{escape(_one_line(value))}</td></tr>"
+            for label, value in self.printed_rows()
+        )
+        x, y, caption = self.curve
+        return (
+            f"<div><b>{escape(self.title)}</b><div style='display:flex;gap:1em'><table>{cells}</table>"
+            f"<figure style='margin:0'>{_svg(x, y)}<figcaption>{escape(caption)}</figcaption></figure></div></div>"
+        )
+
+
+def hysteresis_loop(motion: HorizontalMotion, top_force: Array) -> Curve:
+    """Force over displacement along the direction of the largest displacement. top_force: shape (T, 3) [N]."""
+    return Curve(motion.path[0], top_force[:, :2] @ motion.direction, "force over displacement")
+
+
+def _svg(x: Array, y: Array) -> str:
+    rows = np.unique(np.linspace(0, len(x) - 1, min(MAX_POINTS, len(x))).astype(int))
+    x, y = _scaled(x[rows], WIDTH), HEIGHT - _scaled(y[rows], HEIGHT)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return (
+        f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="loop">'
+        f'<polyline points="{points}" fill="none" stroke="currentColor" stroke-width="1"/></svg>'
+    )
+
+
+def _scaled(values: Array, size: float) -> Array:
+    """Values mapped to a margin inside 0 ... `size`."""
+    low, spread = float(values.min()), float(np.ptp(values)) or 1.0
+    scaled: Array = MARGIN + (values - low) / spread * (size - 2 * MARGIN)
+    return scaled
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def characterise(result: Any) -> Any:
+    """The characterisation of a run, of one bearing or of a building; docs/characterise.md and docs/buildings.md.
+
+    Raises InputError where nothing moved.
+    """
+    if not isinstance(result, AnyResult):
+        raise InputError(f"result: this is a {type(result).__name__}; give the result of simulate(scene)")
+    return result.characterise()

@@ -1,0 +1,55 @@
+"""Extremes of a building over all steps."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from support.buildings import BEARING, frame, scene
+
+from msfp_gen import Motion, Solver, simulate
+from msfp_gen.buildings.extremes import BuildingExtremes
+
+ROUNDING = 1e-12  # of sums of some ten terms that differ in the order of addition
+EVENTFUL = scene(frame(), duration=0.8)
+
+
+def test_peaks_do_not_depend_on_the_rows():
+    fine, coarse = (
+        simulate(replace(EVENTFUL, output_step=step, solver=Solver(rtol=1e-5, max_step=1e-3))) for step in (1e-3, 0.1)
+    )
+    assert len(coarse.time) == 9
+    for one in fields(BuildingExtremes):
+        expected = getattr(fine.extremes, one.name)
+        assert getattr(coarse.extremes, one.name) == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max()), (
+            one.name
+        )
+    short = replace(coarse, recorded_extremes=None).extremes
+    # A row is within the peaks but for its last digits: its sum is NumPy's, that of the peaks is the run's.
+    assert np.all(short.node_acceleration <= (1 + ROUNDING) * coarse.extremes.node_acceleration)
+    assert np.any(short.node_acceleration < 0.8 * coarse.extremes.node_acceleration)
+    assert coarse.summary["floors"][-1]["peak_acceleration"]["E1"] == coarse.extremes.node_acceleration[-1, 0]
+    assert coarse.summary["peak_force"]["radial"] == coarse.extremes.base_reaction[3]
+    assert short.base_reaction[3] <= (1 + ROUNDING) * coarse.extremes.base_reaction[3]
+    found = coarse.characterise()
+    assert found.peak_force == coarse.extremes.base_reaction[3] and found.peak_drift_ratio > 0
+    assert found.bearings[1].minimum_load_ratio == coarse.extremes.axial_force[1, 0] / coarse.scene.axial_loads[1]
+
+
+def test_peaks_are_those_of_rows_at_every_step():
+    """The compiled sums against those of the result, also with a motion of its own below one bearing."""
+    times = np.linspace(0.0, 1.0, 101)
+    path = np.zeros((101, 3))
+    path[:, :2] = 0.02 * np.sin(np.pi * times)[:, None] ** 4 * [1.0, 0.5]
+    bearings = [*EVENTFUL.bearings[:3], replace(EVENTFUL.bearings[3], motion=Motion.from_arrays(times, path))]
+    made = replace(EVENTFUL, bearings=bearings, duration=0.5, output_step=1e-3, solver=Solver(max_step=1e-3))
+    found = simulate(made)
+    rows, surfaces = replace(found, recorded_extremes=None).extremes, BEARING.layout.surfaces
+    assert found.extremes.normal_force.shape == (4, 2, surfaces)
+    for one in fields(BuildingExtremes):
+        recorded, of_rows = getattr(found.extremes, one.name), getattr(rows, one.name)
+        assert recorded == pytest.approx(of_rows, rel=1e-2, abs=1e-3 * np.abs(of_rows).max()), one.name
+        assert np.count_nonzero(recorded) == recorded.size or one.name in ("node_displacement", "node_acceleration")
+    assert np.all(found.extremes.normal_force[:, 0] <= rows.normal_force[:, 0])
+    assert np.all(found.extremes.normal_force[:, 1] >= rows.normal_force[:, 1])
