@@ -1,25 +1,163 @@
-"""Commands that simulate: run, demo."""
+"""Commands that simulate: run, with its options of checkpoints and of a requested error; demo."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msfp_gen.cli.checkpoint_options import NO_CHECKPOINT, CheckpointFile, CheckpointOptions, Every, ResumeFile
-from msfp_gen.cli.console import Output, SceneName, choices_of, note, number, say, show
-from msfp_gen.cli.error_options import Budget, ErrorTarget, Explain, TargetError
-from msfp_gen.cli.inputs import figures_of, one_bearing, run_scene
+from msfp_gen.cli.console import Output, Progress, SceneName, choices_of, note, number, parser_of, say, show
+from msfp_gen.cli.inputs import build, figures_of, one_bearing, run_scene
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
+from msfp_gen.common.quantities import to_si
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.load import AnyScene
     from msfp_gen.cli.inputs import AnyResult
+    from msfp_gen.scene.scene import Scene
+    from msfp_gen.studies.accuracy.error_target import Within
+
+CheckpointFile = Annotated[
+    Path | None,
+    typer.Option("--checkpoint", metavar="FILE", help="Save the state of the run to this file at intervals."),
+]
+Every = Annotated[
+    float | None, typer.Option(parser=number, metavar="SECONDS", help="Wall time between two checkpoints; default 60.")
+]
+ResumeFile = Annotated[
+    Path | None, typer.Option("--resume", metavar="FILE", help="Continue the run from this checkpoint.")
+]
+
+
+@dataclass(frozen=True)
+class CheckpointOptions:
+    """Options of checkpoints.
+
+    Attributes:
+        path: file of the checkpoint; None without checkpoints.
+        every: wall time between two checkpoints [s]; None for the default.
+        resume: whether the run continues from the file.
+    """
+
+    path: Path | None = None
+    every: float | None = None
+    resume: bool = False
+
+    @classmethod
+    def of(cls, checkpoint: Path | None, every: float | None, resume: Path | None) -> CheckpointOptions:
+        """From the command line. Raises InputError for options that contradict each other."""
+        if checkpoint is not None and resume is not None:
+            raise InputError(f"--checkpoint = {str(checkpoint)!r}: --resume continues to write its own file; give one")
+        if every is not None and checkpoint is None and resume is None:
+            raise InputError(f"--every = {every:g}: there is no checkpoint to write; give --checkpoint FILE")
+        return cls(checkpoint if resume is None else resume, every, resume is not None)
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments for `simulate`."""
+        if self.path is None:
+            return {}
+        return {"checkpoint": self.path, "resume": self.resume} | ({} if self.every is None else {"every": self.every})
+
+    def hint(self, failure: RunError) -> str:
+        """Text for the message of an interrupted run: how to continue it."""
+        return f"; continue with --resume {self.path}" if failure.status == "interrupted" and self._files else ""
+
+    @contextmanager
+    def hint_on_write_error(self) -> Iterator[None]:
+        """Add to an error of writing, such as a full disk, that the checkpoint still holds the run."""
+        try:
+            yield
+        except OSError as error:
+            if not self._files:
+                raise
+            raise RunError(f"{error}; the run is not lost: make room and give --resume {self.path}") from error
+
+    def remove_files(self) -> None:
+        """Remove the checkpoint, after all output is written."""
+        from msfp_gen.simulation.checkpoint import kept_rows
+
+        for file in [*self._files, *([] if self.path is None else kept_rows(self.path))]:
+            file.unlink(missing_ok=True)
+
+    @property
+    def _files(self) -> list[Path]:
+        """Existing files of the checkpoint: one per segment of the run."""
+        from msfp_gen.simulation.checkpoint import checkpoint_files  # imported late: --help shall not import NumPy
+
+        return [] if self.path is None else checkpoint_files(self.path)
+
+
+NO_CHECKPOINT = CheckpointOptions()
+
+
+def _share(text: str) -> float:
+    return to_si(text, "") if text.strip().endswith("%") else float(text)
+
+
+TargetError = Annotated[
+    float | None,
+    typer.Option(
+        "--error",
+        parser=parser_of(_share, "share or percentage"),
+        metavar="SHARE",
+        help="Bound of the relative error, such as 0.5%: take the cheapest tolerance that meets it.",
+    ),
+]
+Explain = Annotated[bool, typer.Option("--explain", help="With --error: print the tolerances tried, and the reasons.")]
+Budget = Annotated[
+    float | None,
+    typer.Option(parser=number, metavar="SECONDS", help="With --error: wall time of the search; default 120."),
+]
+
+
+@dataclass(frozen=True)
+class ErrorTarget:
+    """Options of a run to a requested error: relative error [-], explanation, wall time of the search [s]."""
+
+    error: float
+    explain: bool
+    budget: float
+
+    @classmethod
+    def of(
+        cls, error: float | None, explain: bool, budget: float | None, others: Mapping[str, Any]
+    ) -> ErrorTarget | None:
+        """From the command line; None without --error. Raises InputError for options that contradict each other.
+
+        others: values of the options that cannot be combined with --error.
+        """
+        from msfp_gen.studies.accuracy.error_target import BUDGET, check_target
+
+        if error is None:
+            for name, given in (("--explain", explain), ("--budget", budget is not None)):
+                if given:
+                    raise InputError(f"{name} belongs to --error: give both, such as --error 0.5%")
+            return None
+        for name, value in others.items():
+            if value is not None:
+                raise InputError(f"--error = {error:g}: cannot be combined with {name}; give one of them")
+        found = cls(error, explain, BUDGET if budget is None else budget)
+        check_target(found.error, found.budget)
+        return found
+
+    def simulate(self, scene: Scene) -> Within:
+        """Run the scene to the requested error."""
+        from msfp_gen.studies.accuracy import simulate_within
+        from msfp_gen.studies.accuracy.error_target import with_all_effects
+
+        for each in (scene, with_all_effects(scene)):  # of the run, and of its reference run
+            build(each)
+        with Progress(scene.name or "run") as progress:
+            return simulate_within(scene, self.error, budget=self.budget, explain=self.explain, progress=progress)
+
 
 DEMO = ("ridgecrest-ccc", "fenz-test5")
 

@@ -13,7 +13,7 @@ from support.synthetic import loops, ramp
 
 from msfp_gen.cli import main
 from msfp_gen.cli.console import Progress
-from msfp_gen.cli.running import DEMO, _report
+from msfp_gen.cli.run_commands import DEMO, _report
 from msfp_gen.errors import CompileError, RunError
 from msfp_gen.jit.build import BuildInfo
 from msfp_gen.result import Result
