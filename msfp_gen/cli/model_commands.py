@@ -39,8 +39,7 @@ def generate(
     """Derive and compile the equations of a stack layout (a library for C and Fortran: export)."""
     spec = ModelSpec(Layout(n, m, p), effects)
     from msfp_gen.embedding import check_guide, write_guide
-    from msfp_gen.jit.build import generate_to, prepare
-    from msfp_gen.jit.tables import build_table
+    from msfp_gen.jit.build import build_table, generate_to, prepare
 
     if output is not None:
         check_guide(output)
@@ -72,8 +71,7 @@ def presets() -> None:
 @app.command(epilog="Example:\n\n\b\n  msfp-gen doctor")
 def doctor() -> None:
     """Check Python, libraries, compiler and cache."""
-    from msfp_gen.jit.doctor import diagnose
-    from msfp_gen.jit.tables import check_table
+    from msfp_gen.jit.doctor import check_table, diagnose
 
     checks = diagnose()
     show([check_table(checks)])

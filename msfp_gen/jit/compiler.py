@@ -26,8 +26,35 @@ from typing import NamedTuple
 
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.output import write_bytes, write_text
-from msfp_gen.errors import CompileError
-from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
+from msfp_gen.errors import CompileError, InputError
+
+COMPILER, CFLAGS = "CC", "MSFP_GEN_CFLAGS"
+# With these a compiler assumes that no number is infinite or NaN and drops the checks for them.
+FORBIDDEN = ("-Ofast", "-ffast-math", "-ffinite-math-only")
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of an environment variable. Raises InputError where a quote is not closed, or a flag is forbidden."""
+    text = os.environ.get(name, "")
+    try:
+        found = tuple(shlex.split(text))
+    except ValueError as error:
+        raise InputError(f"{name} = {text!r}: {str(error).lower()}; quote it as for a shell") from None
+    if bad := [flag for flag in found if flag in FORBIDDEN]:
+        raise InputError(
+            f"{name} = {text!r}: {bad[0]} removes the checks that every number is finite; leave it out "
+            "(-O3 and -march=native may stay)"
+        )
+    return found
+
+
+def user_flags() -> tuple[str, ...]:
+    """The words of MSFP_GEN_CFLAGS; none where these are refused, which `find_compiler` then reports."""
+    try:
+        return words(CFLAGS)
+    except InputError:
+        return ()
+
 
 LOG_NAME = "build.log"
 EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]

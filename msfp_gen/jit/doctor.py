@@ -7,12 +7,13 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.build import load_extension
 from msfp_gen.jit.cache import cache_root
@@ -176,3 +177,12 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 def _dotted(numbers: tuple[int, ...]) -> str:
     return ".".join(map(str, numbers))
+
+
+def check_table(checks: Iterable[Check]) -> Table:
+    """Result of `msfp-gen doctor`, one row per check."""
+    rows = [
+        (check.name, *(("ok", check.detail) if check.ok else ("MISSING", f"{check.detail}; {check.remedy}")))
+        for check in checks
+    ]
+    return Table("msfp-gen doctor", (), rows)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION
-from msfp_gen.jit.compiler import ZIG_OPTIONS, Compiler, find_compiler, zig_program
-from msfp_gen.jit.options import words
+from msfp_gen.jit.compiler import ZIG_OPTIONS, Compiler, find_compiler, words, zig_program
 
 EXPORTS = "msfp.map"  # what a shared library for Linux shows: one function of each model
 WINDOWS_IMPORT = "libmsfp.dll.a"

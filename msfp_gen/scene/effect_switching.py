@@ -23,7 +23,7 @@ from msfp_gen.scene.friction_parameters import checked_range, heated_contacts, t
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
     from msfp_gen.scene.solver import Solver
 
 # The effects that a model needs after a monitor has tripped.
@@ -111,7 +111,7 @@ def next_effects(scene: Requested, ending: Ending) -> Effects | None:
     return extended
 
 
-def all_effects(scene: SceneParts) -> Effects:
+def all_effects(scene: SceneFields) -> Effects:
     """The effects of a scene if nothing is left to monitors: every effect that one of them may add is modelled.
 
     Those of which the scene fixes a field stay as they are, and so does a friction law without further parameters.
@@ -144,7 +144,7 @@ def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:
 NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
 
 
-def _significant_rise(scene: SceneParts, effects: Effects, selection: EffectSelection) -> float:
+def _significant_rise(scene: SceneFields, effects: Effects, selection: EffectSelection) -> float:
     """Temperature rise at which the monitor of heat trips [K]; see `thermal_softening`."""
     softening = thermal_softening(effects.law, scene.bearing)
     change = selection.error if effects.friction == "pv" else NOTED_SOFTENING
@@ -152,7 +152,11 @@ def _significant_rise(scene: SceneParts, effects: Effects, selection: EffectSele
 
 
 def monitor_options(
-    scene: SceneParts, effects: Effects, selection: EffectSelection, stops: tuple[str, ...], noted: tuple[str, ...] = ()
+    scene: SceneFields,
+    effects: Effects,
+    selection: EffectSelection,
+    stops: tuple[str, ...],
+    noted: tuple[str, ...] = (),
 ) -> dict[str, Any]:
     """Monitors of everything that the model leaves out, and their limits, as arguments of the compiled run.
 

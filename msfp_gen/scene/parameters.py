@@ -18,7 +18,7 @@ from msfp_gen.common.fields import Quantity, errors_at, ruled_fields
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion

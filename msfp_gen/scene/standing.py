@@ -18,7 +18,7 @@ from msfp_gen.scene.top import MassTop, RigTop, load_values
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
 
 MARGIN = 2.0  # of the stiffness over what the load at rest needs, below which there is a note
 
@@ -79,7 +79,7 @@ def unsteady(path: str, given: float, needed: float) -> Iterator[tuple[int, floa
         yield 0, given, f"{path} = {given:g}: {reason}; give more than {needed:.4g} [N m/rad], several times as much"
 
 
-def standing_of(scene: SceneParts) -> tuple[str, float, float, float] | None:
+def standing_of(scene: SceneFields) -> tuple[str, float, float, float] | None:
     """Path, value given, value needed and load of the plate of a scene at its start; None: no spring could hold it."""
     top, load = scene.top, -float(load_values(scene.top)[2])
     if not isinstance(top, RigTop | MassTop):

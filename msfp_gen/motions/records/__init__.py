@@ -14,9 +14,8 @@ from msfp_gen.motions.records.channel import Channel, assemble_record
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
 from msfp_gen.motions.records.peer import read_peer
 from msfp_gen.motions.records.record import Record
-from msfp_gen.motions.records.scaling import ScaleTo, asce7_spectrum, prepared
+from msfp_gen.motions.records.scaling import ScaledSuite, ScaleTo, asce7_spectrum, prepared, scaled_suite
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
-from msfp_gen.motions.records.suite import ScaledSuite, scaled_suite
 from msfp_gen.motions.records.table import Table, read_table, write_csv
 from msfp_gen.motions.records.text import Lines, lines_of, read_lines
 

@@ -19,8 +19,8 @@ from msfp_gen.scene.file import catalogue, schema
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces, resolved
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
 from msfp_gen.scene.file.toml_text import dumps, plain_values
-from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout

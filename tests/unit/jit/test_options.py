@@ -13,7 +13,7 @@ from support import ROOT, fake_model
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler, doctor
-from msfp_gen.jit.options import FORBIDDEN, words
+from msfp_gen.jit.compiler import FORBIDDEN, words
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())

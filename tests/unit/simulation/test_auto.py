@@ -31,7 +31,7 @@ from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import REQUIRED_EFFECTS, Ending, _extended, all_effects, next_effects
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.simulate import RunSequence
