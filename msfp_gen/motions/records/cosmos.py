@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
-from msfp_gen.motions.records.text import Lines
+from msfp_gen.motions.records.text import Lines, word
 
 FORMAT = "COSMOS V1, V2"
 _TITLE = re.compile(r"\(Format v\d+\.\d+ with (\d{1,3}) text lines\)", re.I)
@@ -72,8 +72,8 @@ def _channel(lines: Lines, top: int) -> tuple[Channel, int]:
         values * factor,
         label,
         unit,
-        _word(_START, text),
-        _word(_STATION, text),
+        word(_START, text),
+        word(_STATION, text),
     ), after + 1
 
 
@@ -102,7 +102,3 @@ def _direction(lines: Lines, head: range) -> tuple[int | str, str]:
                 return (UP if found[3].lower() == "up" else DOWN), found[3]
     code = next((m[1].upper() for i in head if (m := _SCNL.search(lines[i]))), "")
     return _LETTERS.get(code, UNKNOWN), code or UNKNOWN
-
-
-def _word(pattern: re.Pattern[str], text: list[str]) -> str:
-    return next((m[1] for line in text if (m := pattern.search(line))), "")

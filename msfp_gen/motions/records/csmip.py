@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
-from msfp_gen.motions.records.text import Lines
+from msfp_gen.motions.records.text import Lines, search, word
 
 FORMAT = "CSMIP V1, V2"
 _TITLES = ("uncorrected accelerogram data", "corrected accelerogram")
@@ -57,16 +57,16 @@ def _channel(lines: Lines, top: int) -> tuple[list[Channel], int]:
         )
     index = _first_data_line(lines, top)
     head = [lines[i] for i in range(top, index)]
-    label = _search(_CHANNEL, head)
+    label = search(_CHANNEL, head)
     if label is None:
         lines.fail(top, "no 'Chan n: <azimuth> Deg' or 'Chan n: Up' in this channel's header")
     shared: dict[str, Any] = {
         "direction": int(label[3]) % 360 if label[3] else _DIRECTIONS.get(label[2].lower(), UNKNOWN),
         "label": " ".join(label[2].split()),
-        "start": _word(_START, head),
-        "station": _word(_STATION, head),
+        "start": word(_START, head),
+        "station": word(_STATION, head),
     }
-    count = _search(_COUNT, head)
+    count = search(_COUNT, head)
     channels = []
     while found := _RAW.match(lines[index]) or _CORRECTED.match(lines[index]):
         if count is not None and count[1] != found["points"]:
@@ -106,12 +106,3 @@ def _series(lines: Lines, top: int, found: re.Match[str], shared: dict[str, Any]
     layout = (int(columns), int(width)) if columns else _DEFAULT_LAYOUT
     values, after = lines.block(top + 1, int(found["points"]), layout)
     return Channel(lines.path, top, quantity, time_step=step, values=values * factor, unit=unit, **shared), after
-
-
-def _search(pattern: re.Pattern[str], head: list[str]) -> re.Match[str] | None:
-    return next((m for line in head if (m := pattern.search(line))), None)
-
-
-def _word(pattern: re.Pattern[str], head: list[str]) -> str:
-    found = _search(pattern, head)
-    return found[1] if found else ""

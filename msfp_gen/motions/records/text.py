@@ -6,6 +6,7 @@ import gzip
 import io
 import re
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NoReturn
 
@@ -183,6 +184,17 @@ def lines_of(path: Path, content: bytes) -> Lines:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     return Lines(path, text)
+
+
+def search(pattern: re.Pattern[str], head: Iterable[str]) -> re.Match[str] | None:
+    """The first match of a pattern in lines of a header."""
+    return next((match for line in head if (match := pattern.search(line))), None)
+
+
+def word(pattern: re.Pattern[str], head: Iterable[str]) -> str:
+    """The first group of this match; empty where there is none."""
+    match = search(pattern, head)
+    return match[1] if match else ""
 
 
 def column(values: list[float]) -> Array:

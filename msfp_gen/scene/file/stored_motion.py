@@ -15,8 +15,7 @@ import numpy as np
 
 from msfp_gen.common.fields import Notes
 from msfp_gen.errors import InputError
-from msfp_gen.motions.motion import Motion
-from msfp_gen.motions.trajectory import CHANNELS
+from msfp_gen.motions.motion import CHANNELS, Motion
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces
 
