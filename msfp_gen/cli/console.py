@@ -102,8 +102,8 @@ def scenes(incomplete: str) -> list[tuple[str, str]]:
     presets = [(name, line) for name, line in known.items() if name.startswith(incomplete)]
     folder, _, start = incomplete.rpartition("/")
     files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
-    found = [path for path in files if path.is_dir() or path.suffix == ".toml"]
-    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in found]
+    paths = [path for path in files if path.is_dir() or path.suffix == ".toml"]
+    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in paths]
 
 
 SceneName = Annotated[

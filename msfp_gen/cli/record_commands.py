@@ -115,15 +115,15 @@ def suite(
     from msfp_gen.scene.file.suite import load_suite
 
     with Progress("spectra") as progress:
-        found = load_suite(file, progress)
-    if spectrum is not None and (found.scaled is None or len(found.scaled.period) == 1):
+        loaded = load_suite(file, progress)
+    if spectrum is not None and (loaded.scaled is None or len(loaded.scaled.period) == 1):
         raise InputError(f"--spectrum: {file} has no [scale_to] with sds, sd1 and between; give one")
-    names, motions = [record.name for record in found.records], [record.motion for record in found.records]
-    show(suite_tables(names, motions, found.scaled))
-    if spectrum is not None and found.scaled is not None:
+    names, motions = [record.name for record in loaded.records], [record.motion for record in loaded.records]
+    show(suite_tables(names, motions, loaded.scaled))
+    if spectrum is not None and loaded.scaled is not None:
         from msfp_gen.figures import plot_response_spectrum
 
-        scaled = found.scaled
+        scaled = loaded.scaled
         curves, target = dict(zip(names, scaled.spectra, strict=True)), (scaled.period, scaled.target)
         title = f"Mean spectrum of {file.name}"
         plot_response_spectrum(scaled.period, curves, spectrum, target=target, mean=scaled.mean, title=title)
@@ -172,16 +172,16 @@ def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | N
     from msfp_gen.motions.records.spectrum import MEASURES
 
     with Progress("spectrum") as progress:
-        found = response_spectrum(motion, progress=progress)
+        spectrum = response_spectrum(motion, progress=progress)
     if path.suffix.lower() == ".csv":
-        found.to_csv(path)
+        spectrum.to_csv(path)
         return
     from msfp_gen.figures import plot_response_spectrum
 
-    curves = dict(zip(MEASURES, found.psa.T, strict=True))
+    curves = dict(zip(MEASURES, spectrum.psa.T, strict=True))
     if not raw.acceleration[:, 2].any():
         del curves["E3"]
-    design = None if target is None else target.curve(found.period)
+    design = None if target is None else target.curve(spectrum.period)
     plot_response_spectrum(
-        found.period, curves, path, target=design, damping=found.damping, title=raw.name or "Response spectrum"
+        spectrum.period, curves, path, target=design, damping=spectrum.damping, title=raw.name or "Response spectrum"
     )

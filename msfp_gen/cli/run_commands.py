@@ -144,9 +144,9 @@ class ErrorTarget:
         for name, value in others.items():
             if value is not None:
                 raise InputError(f"--error = {error:g}: cannot be combined with {name}; give one of them")
-        found = cls(error, explain, BUDGET if budget is None else budget)
-        check_target(found.error, found.budget)
-        return found
+        target = cls(error, explain, BUDGET if budget is None else budget)
+        check_target(target.error, target.budget)
+        return target
 
     def simulate(self, scene: Scene) -> Within:
         """Run the scene to the requested error."""
@@ -261,15 +261,15 @@ def _run(
 
     stream: the run writes the output itself.
     """
-    found = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
+    within = None if target is None else target.simulate(one_bearing(scene, f"--error = {target.error:g}"))
     options = {"strict": strict} | checkpoints.arguments | ({"stream": output} if stream else {})
     with checkpoints.hint_on_write_error():
-        result, failure = run_scene(scene, **options) if found is None else (found.result, None)
+        result, failure = run_scene(scene, **options) if within is None else (within.result, None)
     saved: list[Path] = []
     if result is not None:
-        _report(result, as_json, {} if found is None else {"accuracy": found.as_dict()})
-        if found is not None and not as_json:
-            show(found.tables)
+        _report(result, as_json, {} if within is None else {"accuracy": within.as_dict()})
+        if within is not None and not as_json:
+            show(within.tables)
         with checkpoints.hint_on_write_error():
             saved = _save(result, output, plot, written=stream)
     if failure is not None:

@@ -159,10 +159,10 @@ class ServedBearing:
             return self._initial
         rate, acceleration = self._moving_with_displacements(step)
         try:
-            found = self._response.effective_stiffness(rate, acceleration)
+            stiffness = self._response.effective_stiffness(rate, acceleration)
         except RunError:  # the force is known: another matrix only costs the client iterations
             return self._initial
-        return np.asarray(self._map.T @ found @ self._map)
+        return np.asarray(self._map.T @ stiffness @ self._map)
 
     def _moving_with_displacements(self, step: float) -> tuple[float, float]:
         """How rates and accelerations change with displacements in the client's method, from its last two trials."""

@@ -182,11 +182,11 @@ class TwoPort:
             raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
         if self._trial[0] == self.time:
             raise InputError(f"{word}: no time has passed since the committed state; make a trial at a later time")
-        status, found = self._port.derivative(np.array(direction))
+        status, derivative = self._port.derivative(np.array(direction))
         if status != "ok":
             where = f"two-port, {word} at t = {self._trial[0]:.6g} s"
             raise RunError(f"{where}: {_FAILURES[status].failure}", status=status)
-        return found
+        return derivative
 
     def _check_time(self, time: float, ends: Array) -> None:
         if not isinstance(time, int | float | np.floating) or not np.isfinite(time):

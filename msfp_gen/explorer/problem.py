@@ -133,19 +133,19 @@ def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]
 
 def _period(scene: Scene) -> float | None:
     """Period of the motion [s]; None where it has none."""
-    found = scene.motion.metadata.get("period")
-    return None if found is None else float(str(found))
+    period = scene.motion.metadata.get("period")
+    return None if period is None else float(str(period))
 
 
 def _offsets(quantities: tuple[rows.Quantity, ...], surfaces: int) -> dict[str, list[int]]:
     """Name -> offset and number of values of every field; "" -> the number of all values."""
     lengths = {rows.Extent.SURFACES: surfaces, rows.Extent.COORDINATES: 3, rows.Extent.WORKS: len(contract.WORKS)}
-    found, offset = {}, 0
+    offsets, offset = {}, 0
     for quantity in quantities:
         size = int(np.prod([lengths[n] if isinstance(n, rows.Extent) else n for n in quantity.shape], dtype=int))
-        found[quantity.name] = [offset, size]
+        offsets[quantity.name] = [offset, size]
         offset += size
-    return {**found, "": [offset, 0]}
+    return {**offsets, "": [offset, 0]}
 
 
 def _columns(coefficients: Array) -> dict[str, Any]:

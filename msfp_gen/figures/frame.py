@@ -59,8 +59,8 @@ class MovingFrame:
         given = self.scene.building.nodes[node]
         motion = self.result.node(given.name)[:, 0]
         turned = np.cross(motion[:, None, 3:], at - given.position)
-        found: Array = at + self.factor * (motion[:, None, :3] - self.result.ground[:, None, 0] + turned)
-        return found
+        points: Array = at + self.factor * (motion[:, None, :3] - self.result.ground[:, None, 0] + turned)
+        return points
 
     @cached_property
     def floors(self) -> Array:
@@ -98,16 +98,16 @@ class MovingFrame:
     def lowers(self) -> Array:
         """Lower ends of the bearings, shape (k, bearings, 3) [m]; they move where they have a ground of their own."""
         below = self.upper_ends - [0.0, 0.0, self.depth]
-        found: Array = below + self.factor * (self.result.support[:, :, 0] - self.result.ground[:, None, 0])
-        return found
+        positions: Array = below + self.factor * (self.result.support[:, :, 0] - self.result.ground[:, None, 0])
+        return positions
 
     @cached_property
     def uppers(self) -> Array:
         """Upper ends of the bearings, shape (k, bearings, 3) [m]."""
         rows = self.scene.attachments[:, :3]
         moved = np.einsum("bin,kn->kbi", rows, self.result.displacement) - self.result.ground[:, None, 0]
-        found: Array = self.upper_ends + self.factor * moved
-        return found
+        positions: Array = self.upper_ends + self.factor * moved
+        return positions
 
     @cached_property
     def on_rim(self) -> NDArray[np.bool_]:
@@ -117,5 +117,5 @@ class MovingFrame:
     @cached_property
     def lifted(self) -> NDArray[np.bool_]:
         """Whether each bearing carries less than `NOTHING` of its load at rest, shape (k, bearings)."""
-        found: NDArray[np.bool_] = self.result.axial_force < NOTHING * self.scene.axial_loads
-        return found
+        lifted: NDArray[np.bool_] = self.result.axial_force < NOTHING * self.scene.axial_loads
+        return lifted

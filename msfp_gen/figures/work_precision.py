@@ -81,8 +81,8 @@ def _checked(table: Table) -> dict[str, dict[str, Array]]:
         columns = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in given.items()}
         lengths = {len(values) for values in columns.values()}
         if len(lengths) != 1:
-            found = ", ".join(f"{name} {len(values)}" for name, values in columns.items()) or "none"
-            raise InputError(f"table[{method!r}]: columns of one length are needed; given {found}")
+            counts = ", ".join(f"{name} {len(values)}" for name, values in columns.items()) or "none"
+            raise InputError(f"table[{method!r}]: columns of one length are needed; given {counts}")
         out[method] = columns
     return out
 

@@ -133,11 +133,11 @@ def _interface(root: Xml.Element, unit: Unit, kind: str, version: int) -> None:
 
 
 def _units(root: Xml.Element, unit: Unit) -> None:
-    found = Xml.SubElement(root, "UnitDefinitions")
+    definitions = Xml.SubElement(root, "UnitDefinitions")
     for name in dict.fromkeys(variable.unit for variable in unit.variables):
         exponents = base_units(name) if name != "-" else None
         if exponents is not None:
-            base = Xml.SubElement(Xml.SubElement(found, "Unit", name=name), "BaseUnit")
+            base = Xml.SubElement(Xml.SubElement(definitions, "Unit", name=name), "BaseUnit")
             for each, power in exponents.items():
                 base.set(each, str(power))
             if name == CELSIUS:
@@ -146,25 +146,25 @@ def _units(root: Xml.Element, unit: Unit) -> None:
 
 def _attributes(variable: Variable) -> dict[str, str]:
     """Attributes that FMI 2.0 and 3.0 have in common, but for the type."""
-    found = {"causality": _CAUSALITY.get(variable.block, "local"), "variability": "continuous"}
+    attributes = {"causality": _CAUSALITY.get(variable.block, "local"), "variability": "continuous"}
     if variable.block in _PARAMETERS:
-        found = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
+        attributes = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
     elif variable.block not in (Block.TIME, Block.INPUTS):
-        found["initial"] = "calculated"
+        attributes["initial"] = "calculated"
     known = variable.unit != "-" and base_units(variable.unit) is not None
     note = "" if known or variable.unit == "-" else f" [{variable.unit}]"
-    return {"description": variable.meaning + note, **found}
+    return {"description": variable.meaning + note, **attributes}
 
 
 def _numbers(variable: Variable) -> dict[str, str]:
-    found = {}
+    numbers = {}
     if variable.unit != "-" and base_units(variable.unit) is not None:
-        found["unit"] = variable.unit
+        numbers["unit"] = variable.unit
     if variable.block in (Block.INPUTS, *_PARAMETERS):
-        found["start"] = repr(variable.start)
+        numbers["start"] = repr(variable.start)
     if variable.nominal != 1.0:
-        found["nominal"] = repr(variable.nominal)
-    return found
+        numbers["nominal"] = repr(variable.nominal)
+    return numbers
 
 
 def _variable2(variables: Xml.Element, reference: int, variable: Variable) -> None:

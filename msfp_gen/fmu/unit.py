@@ -125,8 +125,8 @@ def _check_exchange(scene: Scene) -> None:
 
 
 def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
-    found = variables(scene, exchange)
-    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {found!r}"
+    unit_variables = variables(scene, exchange)
+    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {unit_variables!r}"
     digest = hashlib.sha256(what.encode())
     for text in _written(version).values():
         digest.update(text.encode())
@@ -138,7 +138,7 @@ def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
         text=f"Multi-stage friction pendulum bearing (PEER 2017/07), {inout}; {effects_text(scene.spec)}",
         kinds=tuple(kind for short, kind in KINDS.items() if short == "cs" or exchange),
         tolerance=scene.solver.rtol,
-        variables=found,
+        variables=unit_variables,
         sources=(),
     )
 
@@ -162,14 +162,14 @@ def _files(
     library = f"{unit.identifier}{suffix}"
     sources = build_shared(scene.spec, others, f"fmi{version}*", library, folder, progress)
     unit = replace(unit, sources=tuple(name for name in sources if name.endswith(".c")))
-    found = {"modelDescription.xml": model_description(unit, version)}
-    found[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
-    found |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    archive_files = {"modelDescription.xml": model_description(unit, version)}
+    archive_files[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
+    archive_files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if version == 3:
-        found["sources/buildDescription.xml"] = build_description(unit)
+        archive_files["sources/buildDescription.xml"] = build_description(unit)
     page = {"unit": unit, "scene": scene, "stamp": content["stamp"], "effects": effects_text(scene.spec)}
-    found["documentation/index.html"] = render("index.html", page, __package__).encode()
-    return found
+    archive_files["documentation/index.html"] = render("index.html", page, __package__).encode()
+    return archive_files
 
 
 def _platform(system: str, version: int) -> str:
@@ -181,11 +181,11 @@ def _platform(system: str, version: int) -> str:
 
 
 def _archive(content: dict[str, bytes]) -> bytes:
-    found = io.BytesIO()
-    with zipfile.ZipFile(found, "w") as archive:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
         for name, data in content.items():
             archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
-    return found.getvalue()
+    return stream.getvalue()
 
 
 def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
@@ -222,22 +222,22 @@ def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
 def _output_places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
     """Names in C of outputs, counted from the first output."""
     names = [unit.variables[i].name for i in unit.at(Block.OUTPUTS)]
-    found = {"SLIDING": "surface[1].sliding", "NORMAL": "surface[1].normal"}
+    names_in_c = {"SLIDING": "surface[1].sliding", "NORMAL": "surface[1].normal"}
     if loaded:
-        found |= {"TOP_FORCE": "top.force[1]", "BASE_FORCE": "lower.force[1]"}
-    return [(place, names.index(name)) for place, name in found.items()]
+        names_in_c |= {"TOP_FORCE": "top.force[1]", "BASE_FORCE": "lower.force[1]"}
+    return [(place, names.index(name)) for place, name in names_in_c.items()]
 
 
 def _places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
     """Names of value references in C: where blocks begin, and the variables that have a place."""
-    found, end = [], 0
+    places, end = [], 0
     for block in Block:
         references = unit.at(block)
-        found.append((block.value, end))
+        places.append((block.value, end))
         end += len(references)
         assert not references or references == list(range(references[0], end)), block
-    found += [(variable.place, i) for i, variable in enumerate(unit.variables) if variable.place]
+    places += [(variable.place, i) for i, variable in enumerate(unit.variables) if variable.place]
     if loaded:
         names = [variable.name for variable in unit.variables]
-        found.append(("TOP_MASS", names.index("top.mass")))
-    return found
+        places.append(("TOP_MASS", names.index("top.mass")))
+    return places

@@ -57,27 +57,27 @@ def variables(scene: Scene, exchange: bool) -> list[Variable]:
     exchange: with the states of Model Exchange. The index of a variable is its value reference.
     """
     loaded = not isinstance(scene.top, RigTop)
-    found = [Variable("time", Block.TIME, "s", "time")]
-    found += _motion("lower", "the lower end, which holds the base")
-    found += _load() if loaded else _motion("upper", "the upper end, the far side of the interface")
-    found += _outputs_loaded() if loaded else _outputs()
-    found += _surface_outputs(scene.bearing.layout.surfaces)
-    found += _parameters(scene)
+    result = [Variable("time", Block.TIME, "s", "time")]
+    result += _motion("lower", "the lower end, which holds the base")
+    result += _load() if loaded else _motion("upper", "the upper end, the far side of the interface")
+    result += _outputs_loaded() if loaded else _outputs()
+    result += _surface_outputs(scene.bearing.layout.surfaces)
+    result += _parameters(scene)
     if exchange:
         states = list(_states(scene))
-        first = len(found)
-        found += states
-        found += [
+        first = len(result)
+        result += states
+        result += [
             Variable(f"der({x.name})", Block.DERIVATIVES, f"{x.unit}/s", f"rate of: {x.meaning}", of=first + i)
             for i, x in enumerate(states)
         ]
         if scene.spec.effects.rims:
-            found += _gaps(scene.bearing.layout.surfaces)
+            result += _gaps(scene.bearing.layout.surfaces)
     meaning = (
         "false: inputs are those at the begin of a step, from which the unit goes on with accelerations that change as "
         "since the last communication point; true: they are those at its end"
     )
-    return [*found, Variable("inputs_at_step_end", Block.BOOLEANS, "-", meaning, place="INPUTS_AT_STEP_END")]
+    return [*result, Variable("inputs_at_step_end", Block.BOOLEANS, "-", meaning, place="INPUTS_AT_STEP_END")]
 
 
 def _vector(name: str, block: Block, unit: str, meaning: str, nominal: float = 1.0) -> Iterator[Variable]:

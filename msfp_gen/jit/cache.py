@@ -184,11 +184,11 @@ class Entry:
 
         build: writes a complete entry into an empty folder. progress: as of `building`.
         """
-        if (found := self.find()) is not None:
-            return found, False
+        if (manifest := self.find()) is not None:
+            return manifest, False
         with self.building(progress or no_progress) as part:
-            if (found := self.find()) is not None:  # another process has built it while this one waited for the lock
-                return found, False
+            if (manifest := self.find()) is not None:  # another process has built it while this one waited for the lock
+                return manifest, False
             made = build(part)
             self.publish(part)
         return made, True
@@ -299,8 +299,8 @@ def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
     except CompileError:
         for folder in sorted(cache_root().glob(f"{module}-*[0-9a-f]")):
             with suppress(OSError, ValueError, TypeError):
-                found = Manifest.read(folder).inputs
-                if all(found.get(name) == value for name, value in inputs.items()):
-                    return list(found["compiler"])
+                manifest_inputs = Manifest.read(folder).inputs
+                if all(manifest_inputs.get(name) == value for name, value in inputs.items()):
+                    return list(manifest_inputs["compiler"])
         raise
     return [*compiler.command, compiler.path, compiler.version]

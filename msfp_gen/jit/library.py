@@ -118,16 +118,16 @@ def _write_sources(
     """Write the C files and headers of each model into a folder of its own; returns their texts."""
     from msfp_gen.generator import generate
 
-    found: dict[str, dict[str, str]] = {}
+    sources: dict[str, dict[str, str]] = {}
     for i, spec in enumerate(specs):
         progress(f"deriving and emitting {spec.key}", GENERATION_SHARE * i / len(specs))
         files = {**runtime_sources(), **generate(spec).files}
-        found[model_name(spec)] = {name: text for name, text in sorted(files.items()) if name.endswith((".c", ".h"))}
-    for model, files in found.items():
+        sources[model_name(spec)] = {name: text for name, text in sorted(files.items()) if name.endswith((".c", ".h"))}
+    for model, files in sources.items():
         (folder / model).mkdir()
         for name, text in files.items():
             write_text(folder / model / name, text)
-    return found
+    return sources
 
 
 def _link_step(compiler: Compiler, options: Sequence[str], objects: Sequence[str], target: str) -> Step:

@@ -177,4 +177,4 @@ def _pictures(
 
 def _escaped(text: str) -> str:
     """JSON with <, > and & escaped, so that no text in it can end the script element."""
-    return re.sub(r"[<>&]", lambda found: f"\\u{ord(found[0]):04x}", text)
+    return re.sub(r"[<>&]", lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -296,7 +296,7 @@ def friction_from_pivot(
     interfaces = [sum(heights[: index + 1]) for index in range(layout.surfaces)]
     pivot = (interfaces[layout.m - 1] + interfaces[layout.m]) / 2
     arms = [abs(z + sign * R - pivot) for z, sign, R in zip(interfaces, layout.signs, radii, strict=True)]
-    found = [0.0] * layout.surfaces
+    converted = [0.0] * layout.surfaces
     for chain in (range(layout.m - 1, -1, -1), range(layout.m, layout.surfaces)):
         inner_arm = inner_moment = 0.0
         for index in chain:
@@ -306,6 +306,6 @@ def friction_from_pivot(
                     f"bearing.surfaces[{index}].friction = {coefficients[index]:g} at the pivot: that of the surface "
                     "itself would be negative; give a larger one, or coefficients at the surfaces"
                 )
-            found[index] = moment / radii[index]
+            converted[index] = moment / radii[index]
             inner_arm, inner_moment = arms[index], moment
-    return found
+    return converted

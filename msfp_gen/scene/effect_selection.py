@@ -240,8 +240,8 @@ def _requires_inertia(scene: SceneFields, others: Effects, plane_until: float) -
         "quasi-static steps need motion in one vertical plane": others.dimension != "planar" or plane_until < scene.end,
         "its limits are for a base that only translates, and for vertical loads": turned_or_pushed(scene),
     }
-    found = next((because for because, holds in reasons.items() if holds), "")
-    return found or _rate_dependence(scene, replace(others, sliders="massless"))
+    reason = next((because for because, holds in reasons.items() if holds), "")
+    return reason or _rate_dependence(scene, replace(others, sliders="massless"))
 
 
 def _friction(scene: SceneFields, requested: Auto) -> Reason:

@@ -82,16 +82,16 @@ def parameters_of(scene: Scene, paths: Sequence[str], name: str = "gradients") -
     """The parameters of a scene at some paths; `[*]` stands for all indices. Raises InputError that names `name`."""
     if isinstance(paths, str) or not all(isinstance(path, str) for path in paths):
         raise InputError(f"{name} = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for text in paths:
         try:
             for parameter in _parameters(scene, text):
-                if parameter.path in found:
+                if parameter.path in parameters:
                     raise InputError(f"{parameter.path} is given twice; give each parameter once")
-                found[parameter.path] = parameter
+                parameters[parameter.path] = parameter
         except InputError as error:
             raise InputError(f"{name} = {text!r}: {error}") from None
-    return tuple(found.values())
+    return tuple(parameters.values())
 
 
 def _parameters(scene: Scene, text: str) -> Iterator[Parameter]:
@@ -192,10 +192,10 @@ def _components(rule: Quantity, brackets: list[str]) -> tuple[int | None, ...]:
 
 
 def _indices(brackets: Iterable[str], count: int) -> tuple[int | None, ...]:
-    found = tuple(None if text == "*" else int(text) for text in brackets)
-    if len(found) != count:
+    indices = tuple(None if text == "*" else int(text) for text in brackets)
+    if len(indices) != count:
         raise InputError(f"it needs {count} indices, such as {'[0]' * count} or {'[*]' * count}")
-    return found
+    return indices
 
 
 def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> Parameter:

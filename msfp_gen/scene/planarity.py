@@ -50,9 +50,9 @@ class PlaneInput:
             return None, inf
         if self.coefficients.shape[1] == 1:
             return None, self.onset()
-        found = piecewise.azimuth(self.knots, self.coefficients)
-        if found is not None:
-            return found, inf
+        azimuth_of_all = piecewise.azimuth(self.knots, self.coefficients)
+        if azimuth_of_all is not None:
+            return azimuth_of_all, inf
         first, last = int(np.argmax(np.any(self.coefficients, axis=(1, 2)))), len(self.knots) - 1
         plane, low = None, first
         while last - low > 1:  # bisection for the largest number of leading pieces that lie in one plane

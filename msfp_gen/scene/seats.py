@@ -34,16 +34,16 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
     name = max(springs, key=lambda each: springs[each])
     stiffest, given = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
     chosen = max(LEAST, len(given) * stiffest / SHARE)
-    found = np.array([chosen if value is None else value for value in given])
-    in_series = 1.0 / float((1.0 / found).sum())
+    stiffness = np.array([chosen if value is None else value for value in given])
+    in_series = 1.0 / float((1.0 / stiffness).sum())
     if stiffest >= in_series:
-        index = int(found.argmin())
+        index = int(stiffness.argmin())
         raise InputError(
-            f"bearing.surfaces[{index}].seat_stiffness = {found[index]:g}: with it the contacts of all surfaces in "
+            f"bearing.surfaces[{index}].seat_stiffness = {stiffness[index]:g}: with it the contacts of all surfaces in "
             f"series have {in_series:.6g} N/m, which must be more than {name} = {stiffest:g} of the top, since this "
             "contains them; give more [N/m], or leave it out"
         )
-    return found
+    return stiffness
 
 
 def check_seats(bearing: Bearing, top: Top, effects: Effects | Auto | None) -> None:

@@ -122,11 +122,11 @@ class ScaleTo:
                 raise InputError(f"scale_to.{name} = {value!r}: {error}") from None
         return cls(**values)
 
-    def ratio(self, target: Array, found: Array) -> float:
+    def ratio(self, target: Array, values: Array) -> float:
         """Geometric mean of target/found, the factor of least squares of the logarithms."""
-        if not np.all(found > 0):
+        if not np.all(values > 0):
             raise InputError(f"scale_to.component = {self.component!r}: the motion has none; choose another component")
-        return float(np.exp(np.mean(np.log(target / found))))
+        return float(np.exp(np.mean(np.log(target / values))))
 
     def __str__(self) -> str:
         """Description of the target."""
@@ -272,13 +272,13 @@ def scaled_suite(
     if not motions:
         raise InputError("suite: there are no motions; give at least one")
     period, wanted = target.ordinates()
-    column, found = measure_index(target.component), []
+    column, spectra = measure_index(target.component), []
     for done, motion in enumerate(motions, start=1):
-        found.append(response_spectrum(motion, period, damping=target.damping).psa[:, column])
+        spectra.append(response_spectrum(motion, period, damping=target.damping).psa[:, column])
         if progress is not None:
             progress(done, len(motions))
-    single = np.array([target.ratio(wanted, psa) for psa in found])
-    mean = (single[:, None] * np.array(found)).mean(axis=0)
+    single = np.array([target.ratio(wanted, psa) for psa in spectra])
+    mean = (single[:, None] * np.array(spectra)).mean(axis=0)
     common = target.ratio(wanted, mean) if least_share is None else least_share * float((wanted / mean).max())
     factors = common * single
-    return ScaledSuite(factors, period, factors[:, None] * np.array(found), wanted)
+    return ScaledSuite(factors, period, factors[:, None] * np.array(spectra), wanted)

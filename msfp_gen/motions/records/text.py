@@ -134,15 +134,15 @@ class Lines:
 
 def _form(text: str) -> tuple[int, int]:
     """Number of decimals, and of digits of the exponent, of a written number."""
-    found = _DECIMALS.match(text)
-    decimals, exponent = found.groups() if found else ("", "")
+    match = _DECIMALS.match(text)
+    decimals, exponent = match.groups() if match else ("", "")
     return len(decimals or ""), len(exponent or "")
 
 
 def _has_final_zero(text: str) -> bool:
     """Whether the decimals of a written number end with a zero, as those of a fixed count do."""
-    found = _DECIMALS.match(text)
-    return bool(found and (found[1] or "").endswith("0"))
+    match = _DECIMALS.match(text)
+    return bool(match and (match[1] or "").endswith("0"))
 
 
 def read_lines(path: Path) -> Lines:

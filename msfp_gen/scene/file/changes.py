@@ -77,16 +77,16 @@ def multiplied_table(
 
 def keys_of(path: str) -> list[Key]:
     """The keys of a path: names of tables, numbers of rows, None for all rows. Raises InputError."""
-    found: list[Key] = []
+    keys: list[Key] = []
     for part in path.split("."):
         step = _STEP.fullmatch(part)
         if step is None:
             raise InputError("no path of a field; give one such as motion.scale or bearing.surfaces[0].friction")
-        found.append(step[1])
-        found += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
-    if len(found) > MAX_DEPTH:
+        keys.append(step[1])
+        keys += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
+    if len(keys) > MAX_DEPTH:
         raise InputError("no path of a field: it leads deeper than any table of a scene")
-    return found
+    return keys
 
 
 def _places(walk: _Walk, path: str) -> Iterator[_Place]:

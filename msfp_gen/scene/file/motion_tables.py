@@ -189,8 +189,8 @@ class RecordMotion(MotionTable):
     def files(self) -> tuple[Path, ...]:
         """The files of the record; none where it comes with the package."""
         if (self.file is None) == (self.bundled is None):
-            found = "neither is" if self.file is None else "both are"
-            raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
+            defect = "neither is" if self.file is None else "both are"
+            raise InputError(f"motion.file and motion.bundled: {defect} given; give one, a path or a record's name")
         return tuple(_existing(file) for file in ([self.file] if isinstance(self.file, str) else self.file or ()))
 
     def _record(self) -> Record:

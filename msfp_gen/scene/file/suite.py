@@ -88,15 +88,15 @@ def _suite(tables: list[Table], target: Table | None, progress: Callable[[float,
 
 
 def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:
-    found = []
+    records = []
     for index, table in enumerate(tables):
         try:
             motion = RecordMotion(**table).build()
         except InputError as error:
             raise InputError(f"records[{index}].{str(error).removeprefix('motion').lstrip('.: ')}") from None
-        found.append(SuiteRecord(motion.name, table, motion))
-    names = [record.name for record in found]
+        records.append(SuiteRecord(motion.name, table, motion))
+    names = [record.name for record in records]
     return tuple(
         replace(record, name=f"{record.name}-{index}") if names.count(record.name) > 1 else record
-        for index, record in enumerate(found, start=1)
+        for index, record in enumerate(records, start=1)
     )
