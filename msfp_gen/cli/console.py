@@ -45,9 +45,9 @@ def with_effects(command: Callable[..., None]) -> Callable[..., None]:
     options = {name: _option(name, rule) for name, rule, _ in ruled_fields(Effects)}
 
     @wraps(command)
-    def called(**given: Any) -> None:
-        chosen = {name: value for name in options if (value := given.pop(name)) is not None}
-        command(**given, effects=Effects(**chosen))
+    def called(**arguments: Any) -> None:
+        chosen = {name: value for name in options if (value := arguments.pop(name)) is not None}
+        command(**arguments, effects=Effects(**chosen))
 
     signature = inspect.signature(command, eval_str=True)
     others = [parameter for name, parameter in signature.parameters.items() if name != "effects"]

@@ -60,14 +60,14 @@ def export(
 ) -> None:
     """Write the rows of a run as CSV or Parquet, or (--prefix) layouts as a C library for C, C++ and Fortran."""
     if prefix is not None:
-        for given, option in (
+        for value, option in (
             (output, "--output"),
             (columns, "--columns"),
             (None if sign == DEFAULT else sign, "--sign"),
         ):
-            if given is not None:
+            if value is not None:
                 raise InputError(
-                    f"{option} = {str(given)!r}: this is for the rows of a run; leave it out with --prefix"
+                    f"{option} = {str(value)!r}: this is for the rows of a run; leave it out with --prefix"
                 )
         _export_library([ModelSpec(layout, effects) for layout in _layouts(what)], prefix, target)
     elif target is not None:
@@ -148,7 +148,7 @@ def fmu(
         raise InputError(f"--type = {kind!r}: give one of {', '.join(TYPES)}")
     with building(kept=False) as progress:
         unit = write_fmu(load_bearing_scene(source), output, version=fmi, exchange=kind == "me", progress=progress)
-    counts = {block.name.lower(): 0 for block in dict.fromkeys(each.block for each in unit.variables)}
+    counts = {block.name.lower(): 0 for block in dict.fromkeys(unit_variable.block for unit_variable in unit.variables)}
     for variable in unit.variables:
         counts[variable.block.name.lower()] += 1
     rows = [("model", unit.model), ("kinds", ", ".join(unit.kinds))]
@@ -194,8 +194,8 @@ def serve(
         make()  # what is wrong with a scene is said before anybody connects
         makers.append((source, make))
     with Server(makers, port, report=note, host=host, up=up) as server:
-        for source, each in zip(sources, server.ports, strict=True):
-            say(f"serving {source} at {host}:{each}")
+        for source, port_of_source in zip(sources, server.ports, strict=True):
+            say(f"serving {source} at {host}:{port_of_source}")
         failed = server.serve(bearings)
     if failed:
         raise RunError(f"{failed} of {bearings} bearings failed; see the messages above", status="failed")

@@ -78,9 +78,9 @@ def fit(
     prepared = start_fit(chosen, read, paths, limits, offset)  # refuses bad input before anything is built or written
     if output is not None:
         make_folder(output, "--output")
-    for each in prepared.scenes:
-        build(each, gradients=True)
-        build(each)  # tighter runs at the end have no derivatives
+    for fitted_scene in prepared.scenes:
+        build(fitted_scene, gradients=True)
+        build(fitted_scene)  # tighter runs at the end have no derivatives
     line = Progress("fit")
     with line as update:
 

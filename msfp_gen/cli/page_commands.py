@@ -79,7 +79,7 @@ def explore(
     from msfp_gen.explorer.page import SUFFIXES
 
     path = check_output(output, SUFFIXES, "--output")
-    given = None if scene is None else load_bearing_scene(scene)
+    first = None if scene is None else load_bearing_scene(scene)
     with Progress("explorer") as progress:
-        write_explorer(path, given, progress)
+        write_explorer(path, first, progress)
     note(f"wrote {path}")

@@ -137,8 +137,8 @@ class ErrorTarget:
         from msfp_gen.studies.accuracy.error_target import BUDGET, check_target
 
         if error is None:
-            for name, given in (("--explain", explain), ("--budget", budget is not None)):
-                if given:
+            for name, present in (("--explain", explain), ("--budget", budget is not None)):
+                if present:
                     raise InputError(f"{name} belongs to --error: give both, such as --error 0.5%")
             return None
         for name, value in others.items():
@@ -153,8 +153,8 @@ class ErrorTarget:
         from msfp_gen.studies.accuracy import simulate_within
         from msfp_gen.studies.accuracy.error_target import with_all_effects
 
-        for each in (scene, with_all_effects(scene)):  # of the run, and of its reference run
-            build(each)
+        for needed in (scene, with_all_effects(scene)):  # of the run, and of its reference run
+            build(needed)
         with Progress(scene.name or "run") as progress:
             return simulate_within(scene, self.error, budget=self.budget, explain=self.explain, progress=progress)
 
@@ -242,8 +242,8 @@ def demo(
 
 def _with_options(scene: AnyScene, duration: float | None, **solver: Any) -> AnyScene:
     """`scene` with the duration and solver options of the command line."""
-    given = {name: value for name, value in solver.items() if value is not None}
-    scene = replace(scene, solver=replace(scene.solver, **given)) if given else scene
+    changes = {name: value for name, value in solver.items() if value is not None}
+    scene = replace(scene, solver=replace(scene.solver, **changes)) if changes else scene
     return scene if duration is None else replace(scene, duration=duration)
 
 

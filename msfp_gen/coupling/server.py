@@ -209,7 +209,7 @@ class Server:
         except InputError:
             self.close()
             raise
-        self.ports = [int(each.getsockname()[1]) for each in self._listeners]
+        self.ports = [int(listener.getsockname()[1]) for listener in self._listeners]
 
     def __enter__(self) -> Self:
         return self

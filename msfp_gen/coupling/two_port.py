@@ -121,9 +121,9 @@ class TwoPort:
         rotation: the angles psi, theta, phi (2.1)) follows the polynomial of degree five through both ends. Raises
         InputError; RunError where the bearing cannot follow: its committed state remains.
         """
-        given = {"lower": lower, "upper": upper}
-        ends = np.stack([vector(motion, name, (3, 6), "m, rad") for name, motion in given.items()])
-        for name, end in zip(given, ends, strict=True):
+        motions = {"lower": lower, "upper": upper}
+        ends = np.stack([vector(motion, name, (3, 6), "m, rad") for name, motion in motions.items()])
+        for name, end in zip(motions, ends, strict=True):
             if (turn := float(np.linalg.norm(end[0, 3:]))) > LARGEST_ROTATION:
                 raise InputError(f"{name}[0, 3:]: a rotation of {turn:.4g}; give at most {LARGEST_ROTATION} [rad]")
         self._check_time(time, ends)

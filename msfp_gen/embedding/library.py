@@ -120,7 +120,7 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "version": __version__,
         "abi": ABI_VERSION,
         "models": modules,
-        "port": next((each for each, spec in zip(modules, models.values(), strict=True) if _has_ports(spec)), None),
+        "port": next((module for module, spec in zip(modules, models.values(), strict=True) if _has_ports(spec)), None),
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),

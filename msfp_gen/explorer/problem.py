@@ -49,13 +49,13 @@ def problem_of(scene: Scene, title: str) -> Problem:
     fixed = fixed_scene(scene)
     effects = cast(Effects, fixed.effects)
     spec = ModelSpec(fixed.bearing.layout, effects)
-    given, azimuth = run_arguments(fixed, spec)
-    run, stack = given["run"], given["stack"]
+    arguments, azimuth = run_arguments(fixed, spec)
+    run, stack = arguments["run"], arguments["stack"]
     motion, load = (
         {"knots": _packed(knots), "coefficients": _columns(coefficients)}
         for knots, coefficients in ((run[0], run[1]), (run[2], run[3]))
     )
-    options = given["options"]
+    options = arguments["options"]
     data = {
         "title": title,
         "name": fixed.name,
@@ -117,18 +117,18 @@ def fixed_scene(scene: Scene) -> Scene:
 
 def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
     """What the compiled run of a scene would be given, and the azimuth of its frame [rad]; nothing is compiled."""
-    given: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
 
     def stack(*values: Any) -> tuple[Any, ...]:
         return values
 
     def run(values: Any, *positional: Any, **options: Any) -> None:
-        given.update(stack=values, run=positional, options=options)
+        arguments.update(stack=values, run=positional, options=options)
 
     recorder = cast("ModuleType", SimpleNamespace(Stack=stack, Run=run))
     model = Model(spec, recorder, cast("BuildInfo", None))
     _, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
-    return given, azimuth
+    return arguments, azimuth
 
 
 def _period(scene: Scene) -> float | None:

@@ -56,9 +56,9 @@ class MovingFrame:
 
     def points(self, node: int, at: Array) -> Array:
         """Points that move with a node, shape (k, p, 3) [m]; at: where they are at rest, shape (p, 3) [m]."""
-        given = self.scene.building.nodes[node]
-        motion = self.result.node(given.name)[:, 0]
-        turned = np.cross(motion[:, None, 3:], at - given.position)
+        position = self.scene.building.nodes[node]
+        motion = self.result.node(position.name)[:, 0]
+        turned = np.cross(motion[:, None, 3:], at - position.position)
         points: Array = at + self.factor * (motion[:, None, :3] - self.result.ground[:, None, 0] + turned)
         return points
 
@@ -68,14 +68,14 @@ class MovingFrame:
         (x0, y0), (x1, y1) = plan_of(self.scene)
         plan = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
         heights = [float(node.position[2]) for node in self.scene.building.nodes]
-        each = [self.points(i, np.column_stack([plan, np.full(4, z)])) for i, z in enumerate(heights)]
-        return np.stack(each, axis=1)
+        corners = [self.points(i, np.column_stack([plan, np.full(4, z)])) for i, z in enumerate(heights)]
+        return np.stack(corners, axis=1)
 
     @cached_property
     def nodes(self) -> Array:
         """The nodes, shape (k, nodes, 3) [m]."""
-        each = [self.points(i, node.position[None]) for i, node in enumerate(self.scene.building.nodes)]
-        return np.concatenate(each, axis=1)
+        positions = [self.points(i, node.position[None]) for i, node in enumerate(self.scene.building.nodes)]
+        return np.concatenate(positions, axis=1)
 
     @cached_property
     def members(self) -> Array:
@@ -85,7 +85,7 @@ class MovingFrame:
         building = self.scene.building
         if not building.columns:
             names = [node.name for node in building.nodes]
-            links = [names.index(each.node) for each in self.scene.bearings]
+            links = [names.index(bearing.node) for bearing in self.scene.bearings]
             return np.stack([self.nodes[:, links], self.uppers], axis=2)
         ends = []
         for index in range(len(building.columns)):
@@ -112,7 +112,7 @@ class MovingFrame:
     @cached_property
     def on_rim(self) -> NDArray[np.bool_]:
         """Whether a slider of each bearing touches its rim, shape (k, bearings)."""
-        return np.stack([(each.sliding >= each.capacity).any(axis=1) for each in self.result.bearings], axis=1)
+        return np.stack([(bearing.sliding >= bearing.capacity).any(axis=1) for bearing in self.result.bearings], axis=1)
 
     @cached_property
     def lifted(self) -> NDArray[np.bool_]:

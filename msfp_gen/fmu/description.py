@@ -44,7 +44,7 @@ def base_units(unit: str) -> dict[str, int] | None:
             if match is None or match[1] not in _KNOWN:
                 return None
             sign = (-1 if i else 1) * int(match[2] or 1)
-            total = [have + sign * each for have, each in zip(total, _KNOWN[match[1]], strict=True)]
+            total = [have + sign * exponent for have, exponent in zip(total, _KNOWN[match[1]], strict=True)]
     return {name: power for name, power in zip(BASE, total, strict=True) if power}
 
 
@@ -138,8 +138,8 @@ def _units(root: Xml.Element, unit: Unit) -> None:
         exponents = base_units(name) if name != "-" else None
         if exponents is not None:
             base = Xml.SubElement(Xml.SubElement(definitions, "Unit", name=name), "BaseUnit")
-            for each, power in exponents.items():
-                base.set(each, str(power))
+            for base_unit, power in exponents.items():
+                base.set(base_unit, str(power))
             if name == CELSIUS:
                 base.set("offset", repr(OFFSET))
 
@@ -168,8 +168,8 @@ def _numbers(variable: Variable) -> dict[str, str]:
 
 
 def _variable2(variables: Xml.Element, reference: int, variable: Variable) -> None:
-    given = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
-    element = Xml.SubElement(variables, "ScalarVariable", given)
+    attributes = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
+    element = Xml.SubElement(variables, "ScalarVariable", attributes)
     if variable.block is Block.BOOLEANS:
         Xml.SubElement(element, "Boolean", start=str(bool(variable.start)).lower())
         return
@@ -179,11 +179,11 @@ def _variable2(variables: Xml.Element, reference: int, variable: Variable) -> No
 
 
 def _variable3(variables: Xml.Element, reference: int, variable: Variable) -> None:
-    given = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
+    attributes = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
     if variable.block is Block.BOOLEANS:
-        Xml.SubElement(variables, "Boolean", given, start=str(bool(variable.start)).lower())
+        Xml.SubElement(variables, "Boolean", attributes, start=str(bool(variable.start)).lower())
         return
-    element = Xml.SubElement(variables, "Float64", given | _numbers(variable))
+    element = Xml.SubElement(variables, "Float64", attributes | _numbers(variable))
     if variable.of is not None:
         element.set("derivative", str(variable.of))
 

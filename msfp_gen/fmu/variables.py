@@ -143,11 +143,11 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     for j, row in enumerate(surfaces):
         place = "" if j else "SURFACE_VALUES"
         yield from _values(f"surface[{j + 1}]", surface_values(spec), row, place, f"surface {j + 1}")
-    given = dict(zip(contract.names(contract.TOP), top_values(scene.top), strict=True))
+    values_of_top = dict(zip(contract.names(contract.TOP), top_values(scene.top), strict=True))
     known = {value.name: value for value in contract.TOP}
     names = top_names(scene)
     word = "interface" if isinstance(scene.top, RigTop) else "top"
-    yield from _values(word, [known[name] for name in names], [given[name] for name in names], "TOP_VALUES", "")
+    yield from _values(word, [known[name] for name in names], [values_of_top[name] for name in names], "TOP_VALUES", "")
     if isinstance(scene.top, RigTop):
         meaning = "compression of the bearing while both ends are where they start"
         yield Variable("axial_load", Block.PARAMETERS, "N", meaning, scene.top.axial_load, place="AXIAL_LOAD")

@@ -189,9 +189,9 @@ class Entry:
         with self.building(progress or no_progress) as part:
             if (manifest := self.find()) is not None:  # another process has built it while this one waited for the lock
                 return manifest, False
-            made = build(part)
+            manifest_of_part = build(part)
             self.publish(part)
-        return made, True
+        return manifest_of_part, True
 
     @contextmanager
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:

@@ -88,10 +88,10 @@ def find_tools(platform: Platform) -> tuple[Compiler, tuple[str, ...]]:
 
 def _find_archiver() -> tuple[str, ...]:
     """The archiver that `AR` names, else `ar`, else that of ziglang. Raises CompileError where there is none."""
-    given = words("AR")
-    command = given or ("ar",)
+    named = words("AR")
+    command = named or ("ar",)
     if shutil.which(command[0]) is not None:
         return command
-    if not given and (zig := zig_program()) is not None:
+    if not named and (zig := zig_program()) is not None:
         return (str(zig), "ar")
     raise CompileError(f"no archiver found (looked for {command[0]}): install binutils or name it with AR=...")

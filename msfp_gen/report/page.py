@@ -86,19 +86,19 @@ def report_html(
     from markupsafe import Markup
 
     if isinstance(result, BuildingResult):
-        given = _of_building(result, frames, progress)
+        content = _of_building(result, frames, progress)
     else:
-        given = _of_bearing(result, frames, progress)
-    scripts, data = given.pop("scripts"), given.pop("data")
+        content = _of_bearing(result, frames, progress)
+    scripts, data = content.pop("scripts"), content.pop("data")
     return render(
         "page.html.jinja",
-        **given,
+        **content,
         characterisation=characterisation_page(result),
         settings=explain(result.scene),
         provenance=provenance_table(result),
         name=result.scene.name or "unnamed scene",
         kind="report",
-        title_block=title.rows(given["device"]),
+        title_block=title.rows(content["device"]),
         outcome=outcome(result.status, result.message),
         succeeded=result.succeeded,
         speeds=SPEEDS,
@@ -144,7 +144,7 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
         "moving": "The building in motion",
         "stage": Markup(stage),
         "lead": building.introduction(result),
-        "device": ", ".join(dict.fromkeys(kind_of(each.bearing) for each in result.scene.bearings)),
+        "device": ", ".join(dict.fromkeys(kind_of(bearing.bearing) for bearing in result.scene.bearings)),
         "terms": building.TERMS,
         "summary": building.summary_page(result),
         "scene": scene_text(result.scene),

@@ -156,9 +156,9 @@ class Bearing:
     def __repr__(self) -> str:
         """Layout, and the values of every surface and body, bottom first, in seven lines."""
         columns = {"R [m]": "radius", "s_c [m]": "capacity", "mu": "friction", "d_y [m]": "yield_displacement"}
-        rows = {label: [getattr(each, name) for each in self.surfaces] for label, name in columns.items()}
-        rows |= {"l [m]": [self.base_height, *(each.height for each in self.bodies)]}
-        rows |= {"m [kg]": [each.mass for each in self.bodies]}
+        rows = {label: [getattr(part, name) for part in self.surfaces] for label, name in columns.items()}
+        rows |= {"l [m]": [self.base_height, *(part.height for part in self.bodies)]}
+        rows |= {"m [kg]": [part.mass for part in self.bodies]}
         lines = (f"  {label:<9}{', '.join(f'{x:.4g}' for x in values)}" for label, values in rows.items())
         return "\n".join([f"Bearing {self.layout.name}", *lines])
 
@@ -202,12 +202,12 @@ class Bearing:
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **own)
         rows = {name: list(getattr(base, name)) for name in _LISTS}
-        for column, given in changes.items():
+        for column, entry in changes.items():
             if column not in list_of:
                 known = ", ".join([*_names(Bearing), *list_of])
                 raise InputError(f"bearing.{column}: unknown name; give one of {known}")
             items = rows[list_of[column]]
-            values = _expanded(column, given, len(items))
+            values = _expanded(column, entry, len(items))
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})

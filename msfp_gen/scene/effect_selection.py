@@ -63,21 +63,21 @@ def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
         yield from unsteady(*standing[:3])
     if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
         turn = np.sqrt((scene.top.vertical_stiffness or 0.0) / mass)
-        given = scene.top.vertical_damping
-        ratio, cure = given / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
+        damping = scene.top.vertical_damping
+        ratio, cure = damping / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
         if ratio < LEAST_DAMPING:
             name, what = "top.vertical_damping", "the mass vibrates on its vertical spring"
-            yield 0, ratio, ringing(name, given, what, turn, ratio, cure)
+            yield 0, ratio, ringing(name, damping, what, turn, ratio, cure)
 
 
-def ringing(path: str, given: float, what: str, turn: float, ratio: float, cure: float) -> str:
+def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:
     """The text of a doubt about a vibration that rings on.
 
-    path: of the damping in messages. given: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
+    path: of the damping in messages. damping: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
     the damping ratio `ratio`. cure: damping with which it has `USUAL_DAMPING`.
     """
     return (
-        f"{path} = {given:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
+        f"{path} = {damping:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
         f"on: accelerations and rotations depend on the tolerance by several per cent; give {cure:.3g} N s/m for "
         f"{USUAL_DAMPING:.0%}"
     )
@@ -159,14 +159,14 @@ def select_effects(scene: SceneFields) -> EffectSelection:
     return EffectSelection(effects, reasons, plane_until, requested.error)
 
 
-def _given(requested: Auto, name: str) -> Reason | None:
+def _fixed(requested: Auto, name: str) -> Reason | None:
     value = getattr(requested, name)
     return None if value is None else Reason(name, value, GIVEN)
 
 
 def _dimension(scene: SceneFields, requested: Auto) -> tuple[Reason, float]:
-    if (given := _given(requested, "dimension")) is not None:
-        return given, inf
+    if (fixed := _fixed(requested, "dimension")) is not None:
+        return fixed, inf
     azimuth, until, name = scene_plane(scene)
     if until < MIN_PLANAR_SHARE * scene.end:
         return Reason("dimension", "spatial", f"the {name} leaves every vertical plane at {until:.4g} s"), inf
@@ -179,8 +179,8 @@ def _dimension(scene: SceneFields, requested: Auto) -> tuple[Reason, float]:
 
 
 def _rims(scene: SceneFields, requested: Auto) -> Reason:
-    if (given := _given(requested, "rims")) is not None:
-        return given
+    if (fixed := _fixed(requested, "rims")) is not None:
+        return fixed
     if scene.stop is not None and scene.stop.all_rims:
         return Reason("rims", True, "the stop condition is contact at all rims")
     capacity = min(surface.capacity for surface in scene.bearing.surfaces)
@@ -213,8 +213,8 @@ def _sliders(scene: SceneFields, requested: Auto, others: Effects, plane_until: 
 
     others: the effects selected before. plane_until: time at which a planar scene leaves its plane [s].
     """
-    if (given := _given(requested, "sliders")) is not None:
-        return given
+    if (fixed := _fixed(requested, "sliders")) is not None:
+        return fixed
     if because := _requires_inertia(scene, others, plane_until):
         return Reason("sliders", "inertial", because)
     share, limit = inertia_share(scene), inertia_limit(scene, requested.error)
@@ -245,8 +245,8 @@ def _requires_inertia(scene: SceneFields, others: Effects, plane_until: float) -
 
 
 def _friction(scene: SceneFields, requested: Auto) -> Reason:
-    if (given := _given(requested, "friction")) is not None:
-        return given
+    if (fixed := _fixed(requested, "friction")) is not None:
+        return fixed
     word, _ = scene.law
     saves = "the thermal states of every surface, until the temperature rise is significant" if word == "pv" else ""
     because = {
@@ -257,8 +257,8 @@ def _friction(scene: SceneFields, requested: Auto) -> Reason:
 
 
 def _uplift(scene: SceneFields, requested: Auto) -> Reason:
-    if (given := _given(requested, "uplift")) is not None:
-        return given
+    if (fixed := _fixed(requested, "uplift")) is not None:
+        return fixed
     if requested.sliders == "massless" or scene.solver.method == "dopri5":
         because = "massless sliders and the explicit method exclude separation; normal forces are monitored"
         return Reason("uplift", False, because)

@@ -150,8 +150,8 @@ def proportional(law: Law, bearing: Bearing) -> bool:
         values, points = law_parameters(law, bearing, index), _grid(law)
         scaled = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
         base, raised = (
-            coefficient(law, {**each, **points, "mu": mu})[0]
-            for each, mu in ((values, surface.friction), (scaled, factor * surface.friction))
+            coefficient(law, {**parameters, **points, "mu": mu})[0]
+            for parameters, mu in ((values, surface.friction), (scaled, factor * surface.friction))
         )
         scales.append(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
     return all(scales)
@@ -248,7 +248,7 @@ def heated_contacts(bearing: Bearing) -> list[tuple[float, float]]:
     out = []
     for index, surface in enumerate(bearing.surfaces):
         radius = surface.patch_radius or bearing.slider_rim_radius(index)
-        given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
-        parameters = derived_parameters({**given, "patch_radius": radius or None})
+        values = {name: getattr(surface, name) or default for name, default in HEAT.items()}
+        parameters = derived_parameters({**values, "patch_radius": radius or None})
         out.append((parameters["heating"] / parameters["area"], parameters["reach"]) if radius else (0.0, 0.0))
     return out

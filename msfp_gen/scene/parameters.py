@@ -96,8 +96,8 @@ def parameters_of(scene: Scene, paths: Sequence[str], name: str = "gradients") -
 
 def _parameters(scene: Scene, text: str) -> Iterator[Parameter]:
     place = _place(scene, text)
-    for given, count in zip(place.indices, place.counts, strict=True):
-        if given is not None and given >= count:
+    for index_or_all, count in zip(place.indices, place.counts, strict=True):
+        if index_or_all is not None and index_or_all >= count:
             raise InputError(f"there are {count} of them; give an index from 0 to {count - 1}, or *")
     for index in product(*(range(n) if i is None else (i,) for i, n in zip(place.indices, place.counts, strict=True))):
         yield _parameter(scene, place.part, place.field, index)
@@ -186,8 +186,10 @@ def _shape(rule: Quantity) -> tuple[int, ...]:
 
 def _components(rule: Quantity, brackets: list[str]) -> tuple[int | None, ...]:
     if len(brackets) != len(rule.shape):
-        each = "[0], [1] or [*]" if rule.shape else "no index"
-        raise InputError(f"this field holds {rule.shape[0] if rule.shape else 1} numbers; give {each} after its name")
+        indices = "[0], [1] or [*]" if rule.shape else "no index"
+        raise InputError(
+            f"this field holds {rule.shape[0] if rule.shape else 1} numbers; give {indices} after its name"
+        )
     return _indices(brackets, len(rule.shape))
 
 
@@ -216,7 +218,7 @@ def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> P
     if part == "top" and field.startswith("vertical_") and not getattr(scene.top, "vertical_stiffness", None):
         raise InputError("this top has no vertical spring, and a run changes abruptly with the first; give it one")
     value = value[component[0]] if component else value
-    path += "".join(f"[{each}]" for each in component)
+    path += "".join(f"[{i}]" for i in component)
     return Parameter(path, part, field, index, rule.unit, float(value), rule.least, rule.above)
 
 

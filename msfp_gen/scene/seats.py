@@ -31,10 +31,10 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
     of the stiffest spring of the top. Raises InputError: the contacts in series are not stiffer than this spring.
     """
     springs = {name: getattr(top, name, None) or 0.0 for name in SPRINGS}
-    name = max(springs, key=lambda each: springs[each])
-    stiffest, given = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
-    chosen = max(LEAST, len(given) * stiffest / SHARE)
-    stiffness = np.array([chosen if value is None else value for value in given])
+    name = max(springs, key=lambda spring: springs[spring])
+    stiffest, values = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
+    chosen = max(LEAST, len(values) * stiffest / SHARE)
+    stiffness = np.array([chosen if value is None else value for value in values])
     in_series = 1.0 / float((1.0 / stiffness).sum())
     if stiffest >= in_series:
         index = int(stiffness.argmin())

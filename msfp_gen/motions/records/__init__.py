@@ -87,10 +87,10 @@ def _record_of(parts: list[Lines]) -> Record:
     if len(parts) == 1 and table.matches(parts[0]):
         return table.read(parts[0])
     formats = [_format_of(lines) for lines in parts]
-    for lines, each in zip(parts, formats, strict=True):
-        if each is not formats[0]:
+    for lines, kind in zip(parts, formats, strict=True):
+        if kind is not formats[0]:
             raise InputError(
-                f"{lines.path.name}: {each.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
+                f"{lines.path.name}: {kind.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
             )
     channels = [channel for lines in parts for channel in formats[0].read(lines)]
     return assemble_record(channels, formats[0].name, formats[0].notes)
@@ -98,10 +98,10 @@ def _record_of(parts: list[Lines]) -> Record:
 
 def _format_of(lines: Lines) -> _Format:
     """Format of a file. Raises InputError if it is unknown."""
-    for each in _FORMATS:
-        if each.matches(lines):
-            return each
-    names = ", ".join(each.name for each in _FORMATS)
+    for file_format in _FORMATS:
+        if file_format.matches(lines):
+            return file_format
+    names = ", ".join(file_format.name for file_format in _FORMATS)
     lines.fail(0, f"unknown format; give {names}, or one CSV with a header like: time [s], a1 [m/s^2]")
 
 

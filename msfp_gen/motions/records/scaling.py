@@ -57,9 +57,9 @@ class ScaleTo:
 
     def __post_init__(self) -> None:
         check_fields(self, "scale_to")
-        given = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
-        if given not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
-            raise InputError(f"scale_to: {', '.join(given) or 'nothing'} given; give {', or '.join(_TARGETS)}")
+        keys = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
+        if keys not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
+            raise InputError(f"scale_to: {', '.join(keys) or 'nothing'} given; give {', or '.join(_TARGETS)}")
         if self.between is not None and self.between[0] >= self.between[1]:
             raise InputError(f"scale_to.between = {list(self.between)}: give the shorter period first")
 
@@ -114,8 +114,8 @@ class ScaleTo:
             name, equals, value = (piece.strip() for piece in part.partition("="))
             if not equals or name not in rules:
                 raise InputError(f"scale_to: {part.strip()!r}; give name=value with a name of {', '.join(rules)}")
-            given = value.split(":") if ":" in value else value
-            numbers = [_number(v) for v in given] if isinstance(given, list) else _number(given)
+            parts = value.split(":") if ":" in value else value
+            numbers = [_number(v) for v in parts] if isinstance(parts, list) else _number(parts)
             try:
                 values[name] = rules[name].parse(numbers, text=True)
             except ValueError as error:

@@ -97,7 +97,7 @@ class Lines:
         Where they have not, nothing is checked.
         """
         ends = [[word.end() for word in _WORD.finditer(line)] for line in self.lines[top:] if line.strip()]
-        if self.ended or len(ends) < 3 or any(each != ends[0] for each in ends[:-1]):
+        if self.ended or len(ends) < 3 or any(row != ends[0] for row in ends[:-1]):
             return
         if ends[-1] != ends[0][: len(ends[-1])]:
             self.fail(

@@ -88,4 +88,4 @@ def _makes(table: Mapping[str, Any], motion: Motion) -> bool:
 def _file_names(table: Mapping[str, Any]) -> dict[str, Any]:
     """The key `file` of a `[motion]` table without folders."""
     file = table["file"]
-    return {"file": PurePath(file).name if isinstance(file, str) else [PurePath(each).name for each in file]}
+    return {"file": PurePath(file).name if isinstance(file, str) else [PurePath(path).name for path in file]}
