@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -138,6 +139,20 @@ def show(tables: Iterable[Table]) -> None:
     for table in tables:
         rows = [[printable(cell) for cell in row] for row in table.rows]
         Console().print(replace(table, title=printable(table.title), rows=rows).rich())
+
+
+def answer(content: Any, tables: Iterable[Table], as_json: bool) -> None:
+    """Print a result: its content as JSON, every number in SI, or its tables."""
+    if as_json:
+        say(json.dumps(content, indent=2, allow_nan=False))
+    else:
+        show(tables)
+
+
+def note_written(paths: Iterable[Path]) -> None:
+    """Name the files that were written."""
+    for path in paths:
+        note(f"wrote {path}")
 
 
 class Progress:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, number, show
+from msfp_gen.cli.console import Progress, note, note_written, number, show
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import InputError
 
@@ -97,8 +97,7 @@ def record(
         _write_spectrum(raw, motion, target, spectrum)
     if output is not None:
         _write_record(raw, motion, output)
-    for path in filter(None, (plot, spectrum, output)):
-        note(f"wrote {path}")
+    note_written(filter(None, (plot, spectrum, output)))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen suite suite.toml --spectrum suite.png")

@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msfp_gen.cli.console import Output, Progress, SceneName, choices_of, note, number, parser_of, say, show
+from msfp_gen.cli.console import (
+    Output,
+    Progress,
+    SceneName,
+    choices_of,
+    note,
+    note_written,
+    number,
+    parser_of,
+    say,
+    show,
+)
 from msfp_gen.cli.inputs import build, figures_of, one_bearing, run_scene
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
 from msfp_gen.common.quantities import to_si
@@ -219,8 +230,7 @@ def run(
     from msfp_gen.buildings.load import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
-    for path in _run(chosen, output, plot, as_json, checkpoints, target, strict, stream):
-        note(f"wrote {path}")
+    note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, stream))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen demo -o out")
