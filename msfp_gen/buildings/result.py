@@ -12,7 +12,7 @@ from msfp_gen.buildings.compiled_run import BuildingRun, unpacked
 from msfp_gen.buildings.data import BuildingData
 from msfp_gen.buildings.peaks import padded
 from msfp_gen.common.arrays import Array
-from msfp_gen.coupling.response import DISSIPATED
+from msfp_gen.coupling.two_port import DISSIPATED
 from msfp_gen.specification.contract import WORKS, names
 
 if TYPE_CHECKING:
