@@ -81,7 +81,7 @@ def record(
     if as_is and (correct or corner is not None):
         raise InputError("--as-is: excludes correction; leave out --correct and --corner")
     from msfp_gen.motions.records import Corrected, ScaleTo
-    from msfp_gen.motions.records.tables import record_tables
+    from msfp_gen.motions.records.record_tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
     raw = _turned(_read(files), components, rotated_by)
@@ -110,7 +110,7 @@ def suite(
     """Read a suite of ground motions; scale its mean spectrum to a target; print the factors."""
     if spectrum is not None:
         check_output(spectrum, FIGURE_SUFFIXES, "--spectrum")
-    from msfp_gen.motions.records.tables import suite_tables
+    from msfp_gen.motions.records.record_tables import suite_tables
     from msfp_gen.scene.file.suite import load_suite
 
     with Progress("spectra") as progress:

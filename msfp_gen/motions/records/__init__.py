@@ -9,14 +9,14 @@ from os import PathLike
 from pathlib import Path
 
 from msfp_gen.errors import InputError
-from msfp_gen.motions.records import cosmos, csmip, knet, peer, table
+from msfp_gen.motions.records import cosmos, csmip, csv_table, knet, peer
 from msfp_gen.motions.records.channel import Channel, assemble_record
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
+from msfp_gen.motions.records.csv_table import Table, read_table, write_csv
 from msfp_gen.motions.records.peer import read_peer
 from msfp_gen.motions.records.record import Record
 from msfp_gen.motions.records.scaling import ScaledSuite, ScaleTo, asce7_spectrum, prepared, scaled_suite
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
-from msfp_gen.motions.records.table import Table, read_table, write_csv
 from msfp_gen.motions.records.text import Lines, lines_of, read_lines
 
 __all__ = [
@@ -84,8 +84,8 @@ def read_record(path: str | PathLike[str], *more: str | PathLike[str]) -> Record
 
 def _record_of(parts: list[Lines]) -> Record:
     """The record in the lines of one file, or of several."""
-    if len(parts) == 1 and table.matches(parts[0]):
-        return table.read(parts[0])
+    if len(parts) == 1 and csv_table.matches(parts[0]):
+        return csv_table.read(parts[0])
     formats = [_format_of(lines) for lines in parts]
     for lines, kind in zip(parts, formats, strict=True):
         if kind is not formats[0]:
