@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -17,6 +15,7 @@ from msfp_gen.errors import CompileError
 from msfp_gen.explorer.problem import Problem, problem_of
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
+from msfp_gen.report.template import script_data
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
@@ -76,7 +75,7 @@ def explorer_html(scene: Scene | None = None, progress: Progress | None = None) 
     return environment.from_string(_asset("explorer.html.jinja")).render(
         version=__version__,
         style=Markup(report.joinpath("page.css").read_text(encoding="utf-8")),
-        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        data=script_data(data),
         worker=Markup("".join(_asset(name) for name in WORKER)),
         scripts=[
             *(Markup(report.joinpath(name).read_text(encoding="utf-8")) for name in SHARED),
@@ -111,11 +110,6 @@ def _problems(scene: Scene | None) -> Sequence[Problem]:
         return named
     first = problem_of(scene, scene.name or "scene")
     return [first, *(problem for problem in named if problem.spec == first.spec and problem.scene.name != scene.name)]
-
-
-def _escaped(text: str) -> str:
-    """JSON with <, > and & escaped, so that no text in it can end the script element."""
-    return re.sub(r"[<>&]", lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def _asset(name: str) -> str:

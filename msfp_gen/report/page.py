@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +19,7 @@ from msfp_gen.report.content import (
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, view
-from msfp_gen.report.template import asset, picture, render
+from msfp_gen.report.template import asset, picture, render, script_data
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -102,7 +100,7 @@ def report_html(
         outcome=outcome(result.status, result.message),
         succeeded=result.succeeded,
         speeds=SPEEDS,
-        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        data=script_data(data),
         scripts=[Markup(asset(name)) for name in scripts],
     )
 
@@ -173,8 +171,3 @@ def _pictures(
         if progress is not None:
             progress(done, len(titles))
         yield drawn
-
-
-def _escaped(text: str) -> str:
-    """JSON with <, > and & escaped, so that no text in it can end the script element."""
-    return re.sub(r"[<>&]", lambda match: f"\\u{ord(match[0]):04x}", text)
