@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.standing import needed_rotational_stiffness
 from msfp_gen.scene.top import MassTop, RigTop, load_values
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing, Body, Surface
     from msfp_gen.scene.file import presets
-    from msfp_gen.scene.parts import InitialState, Stop
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.scene.scene_fields import InitialState, Stop
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
     from msfp_gen.simulation.run_any import simulate
@@ -47,7 +47,7 @@ _MODULES = {
     "BuildingScene": "buildings.scene",
     "CompileError": "errors",
     "Effects": "specification.layout",
-    "InitialState": "scene.parts",
+    "InitialState": "scene.scene_fields",
     "InputError": "errors",
     "Layout": "specification.layout",
     "Load": "motions.prescribed",
@@ -60,7 +60,7 @@ _MODULES = {
     "Scene": "scene.scene",
     "Soil": "buildings.soil",
     "Solver": "scene.solver",
-    "Stop": "scene.parts",
+    "Stop": "scene.scene_fields",
     "Storey": "buildings.storey",
     "Surface": "scene.bearing",
     "Top": "scene.top",

@@ -49,20 +49,22 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
     recorded = result.recorded_extremes
     assert recorded is not None  # a run that computed derivatives has recorded its extremes
     slopes = gradients_of_extremes(gradients, result.history, recorded)
-    found = dict[str, dict[str, Any]]()
+    gradients_of_summary = dict[str, dict[str, Any]]()
     for i, parameter in enumerate(gradients.parameters):
         own = {name: values[i] for name, values in slopes.items()}
-        found[parameter.path] = _summary(gradients, i, own, _ratio_slope(result, parameter, float(own["top_force"][3])))
+        gradients_of_summary[parameter.path] = _summary(
+            gradients, i, own, _ratio_slope(result, parameter, float(own["top_force"][3]))
+        )
         if gradients.error is not None:
             own, load = gradients.error.extremes[i].arrays, axial_load(result)
             ratio = float(own["top_force"][3]) / load if load else None
-            found[parameter.path]["error"] = _summary(gradients.error, i, own, ratio)
-    return found
+            gradients_of_summary[parameter.path]["error"] = _summary(gradients.error, i, own, ratio)
+    return gradients_of_summary
 
 
 def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: float | None) -> SummaryGradient:
     names = (*LABELS["axis"], "radial")
-    found = SummaryGradient(
+    gradient = SummaryGradient(
         peak_displacement=dict(zip(names, slopes["displacement"].tolist(), strict=True)),
         peak_force=dict(zip(names, slopes["top_force"].tolist(), strict=True)),
         peak_force_ratio=ratio,
@@ -73,10 +75,10 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
     )
     for name in ("least_friction", "most_friction"):
         if name in slopes:
-            found[name] = slopes[name].tolist()
+            gradient[name] = slopes[name].tolist()
     if set(gradients.energy) > set(ENERGIES):
-        found["energy"] = {name: float(values[index, -1]) for name, values in gradients.energy.items()}
-    return found
+        gradient["energy"] = {name: float(values[index, -1]) for name, values in gradients.energy.items()}
+    return gradient
 
 
 def _ratio_slope(result: RunData, parameter: Parameter, slope: float) -> float | None:

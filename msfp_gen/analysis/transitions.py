@@ -43,16 +43,18 @@ def transitions(result: RunData, axial_load: float | None) -> dict[str, float | 
     """
     history = result.history
     four = history.surfaces == 4
-    found: dict[str, float | None] = {}
+    values: dict[str, float | None] = {}
     if four:
-        found |= {name: stopping_displacement(history, surface) for name, surface in STOPS.items()}
+        values |= {name: stopping_displacement(history, surface) for name, surface in STOPS.items()}
     for surface in RIMS if four else range(1, history.surfaces + 1):
         displacement, force = _first_contact(result, surface)
-        found[f"u_dr{surface}"] = displacement
-        found[f"F_dr{surface}"] = None if force is None or not axial_load else force / axial_load
+        values[f"u_dr{surface}"] = displacement
+        values[f"F_dr{surface}"] = None if force is None or not axial_load else force / axial_load
     if four:
-        found["resolution"] = max((_spacing(history, u) for u in map(found.get, STOPS) if u is not None), default=None)
-    return found
+        values["resolution"] = max(
+            (_spacing(history, u) for u in map(values.get, STOPS) if u is not None), default=None
+        )
+    return values
 
 
 def stopping_displacement(history: History, surface: int, window: float = WINDOW) -> float | None:

@@ -14,8 +14,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.note import Note
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
-from msfp_gen.scene.effect_switching import Ending, stopping_monitors
-from msfp_gen.scene.monitors import monitor_options
+from msfp_gen.scene.effect_switching import Ending, monitor_options, stopping_monitors
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:

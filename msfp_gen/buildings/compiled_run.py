@@ -17,7 +17,7 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.coupling.response import DISSIPATED
+from msfp_gen.coupling.two_port import DISSIPATED
 from msfp_gen.errors import InputError
 from msfp_gen.jit.driver import load_driver
 from msfp_gen.model.compiled import AnyRun, Port

@@ -9,19 +9,15 @@ import typer
 
 from msfp_gen.cli import (
     assessment_commands,
-    batching,
-    benching,
-    building,
-    cache_command,
-    drawing,
-    exploring,
-    exporting,
-    fitting,
-    fmu_command,
-    records,
-    reporting,
-    running,
-    serving,
+    batch_commands,
+    bench_commands,
+    export_commands,
+    figure_commands,
+    fit_commands,
+    model_commands,
+    page_commands,
+    record_commands,
+    run_commands,
     study_commands,
 )
 from msfp_gen.cli.console import fail, say
@@ -42,8 +38,8 @@ app = typer.Typer(
 )
 # This order is the order of the commands in the help text.
 for group in (
-    running, batching, study_commands, exporting, drawing, assessment_commands, fitting, benching, reporting, exploring,
-    records, building, serving, fmu_command, cache_command,
+    run_commands, batch_commands, study_commands, export_commands, figure_commands, assessment_commands,
+    fit_commands, bench_commands, page_commands, record_commands, model_commands,
 ):  # fmt: skip
     app.add_typer(group.app)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, answer, note, note_written, say, show
 from msfp_gen.cli.inputs import build, load_source, one_bearing, result_of
 from msfp_gen.errors import RunError
 
@@ -45,10 +44,7 @@ def characterise(
     if failure is not None:
         raise failure
     characterisation = result.characterise()
-    if as_json:
-        say(json.dumps(characterisation.as_dict(), indent=2, allow_nan=False))
-    else:
-        show(characterisation_tables(characterisation))
+    answer(characterisation.as_dict(), characterisation_tables(characterisation), as_json)
     if output is not None:
         note(f"wrote {write_csv(characterisation, output)}")
 
@@ -82,13 +78,8 @@ def bound(
     build(chosen)
     with Progress("3 cases") as progress:
         bounds = run_bounds(chosen, table, progress=progress)
-    if as_json:
-        say(json.dumps(bounds.as_dict(), indent=2, allow_nan=False))
-    else:
-        show(bounding_tables(bounds))
-    written = _save(bounds, output) if output is not None else []
-    for path in written:
-        note(f"wrote {path}")
+    answer(bounds.as_dict(), bounding_tables(bounds), as_json)
+    note_written(_save(bounds, output) if output is not None else [])
     if not bounds.succeeded:
         failed = "; ".join(f"{case.name}: {case.failure}" for case in bounds.cases if case.failure)
         raise RunError(f"not all cases could be run; {failed}", status="bound")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -45,9 +46,9 @@ def with_effects(command: Callable[..., None]) -> Callable[..., None]:
     options = {name: _option(name, rule) for name, rule, _ in ruled_fields(Effects)}
 
     @wraps(command)
-    def called(**given: Any) -> None:
-        chosen = {name: value for name in options if (value := given.pop(name)) is not None}
-        command(**given, effects=Effects(**chosen))
+    def called(**arguments: Any) -> None:
+        chosen = {name: value for name in options if (value := arguments.pop(name)) is not None}
+        command(**arguments, effects=Effects(**chosen))
 
     signature = inspect.signature(command, eval_str=True)
     others = [parameter for name, parameter in signature.parameters.items() if name != "effects"]
@@ -102,8 +103,8 @@ def scenes(incomplete: str) -> list[tuple[str, str]]:
     presets = [(name, line) for name, line in known.items() if name.startswith(incomplete)]
     folder, _, start = incomplete.rpartition("/")
     files = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).glob(f"{start}*"))
-    found = [path for path in files if path.is_dir() or path.suffix == ".toml"]
-    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in found]
+    paths = [path for path in files if path.is_dir() or path.suffix == ".toml"]
+    return presets + [(f"{path}/", "folder") if path.is_dir() else (str(path), "scene file") for path in paths]
 
 
 SceneName = Annotated[
@@ -138,6 +139,20 @@ def show(tables: Iterable[Table]) -> None:
     for table in tables:
         rows = [[printable(cell) for cell in row] for row in table.rows]
         Console().print(replace(table, title=printable(table.title), rows=rows).rich())
+
+
+def answer(content: Any, tables: Iterable[Table], as_json: bool) -> None:
+    """Print a result: its content as JSON, every number in SI, or its tables."""
+    if as_json:
+        say(json.dumps(content, indent=2, allow_nan=False))
+    else:
+        show(tables)
+
+
+def note_written(paths: Iterable[Path]) -> None:
+    """Name the files that were written."""
+    for path in paths:
+        note(f"wrote {path}")
 
 
 class Progress:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msfp_gen.cli.console import AsJson, Progress, Workers, note, number, numbers, say, show
+from msfp_gen.cli.console import AsJson, Progress, Workers, answer, note, number, numbers, say
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.common.tables import TABLE_SUFFIXES
 from msfp_gen.errors import InputError
@@ -130,10 +130,7 @@ def status(folder: Folder, as_json: AsJson = False) -> None:
     from msfp_gen.studies.study.chunks import status_table, study_status
 
     progress = study_status(folder)
-    if as_json:
-        say(json.dumps(progress.as_dict(), indent=2))
-    else:
-        show([status_table(progress)])
+    answer(progress.as_dict(), [status_table(progress)], as_json)
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study ida out --demand peak_displacement --plot ida.png")
@@ -271,10 +268,7 @@ def _finish(
     from msfp_gen.studies.assessment.rows import write_frame
 
     plot, output, as_json = options
-    if as_json:
-        say(json.dumps(content, indent=2, allow_nan=False))
-    else:
-        show([table])
+    answer(content, [table], as_json)
     if output is not None:
         note(f"wrote {write_frame(pd.DataFrame(rows), output, '--output')}")
     if plot is not None:
@@ -321,10 +315,7 @@ def pareto(
             source, output, goals, population=population, generations=generations, seed=seed, progress=progress,
             workers=workers, threads=threads, dask=dask,
         )  # fmt: skip
-    if as_json:
-        say(json.dumps(front.designs[front.designs.front].to_dict("records"), indent=2, allow_nan=False))
-    else:
-        show([front_table(front)])
+    answer(front.designs[front.designs.front].to_dict("records"), [front_table(front)], as_json)
     note(f"wrote {output / DESIGNS}")
     if plot is not None:
         plot_pareto(front, plot)

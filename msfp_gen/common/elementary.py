@@ -61,8 +61,10 @@ def exp(x: ArrayLike) -> Array:
     values = np.asarray(x, dtype=float)
     n = np.rint(np.clip(values, -2000.0, 2000.0) * 1.4426950408889634)
     r = (values - n * 0.6931471803691238) - n * 1.9082149292705877e-10
-    found: Array = np.where(values < -708.0, 0.0, np.ldexp(1.0 + (r + r * r * _polynomial(EXP_REST, r)), n.astype(int)))
-    return found[()]
+    result: Array = np.where(
+        values < -708.0, 0.0, np.ldexp(1.0 + (r + r * r * _polynomial(EXP_REST, r)), n.astype(int))
+    )
+    return result[()]
 
 
 def _shifted(x: ArrayLike, quarters: float) -> Array:
@@ -77,8 +79,8 @@ def _shifted(x: ArrayLike, quarters: float) -> Array:
     cosine = left + (((1.0 - left) - half) + z * z * _polynomial(COS_REST, z))
     value = np.where(fold % 2.0 == 1.0, cosine, sine)
     value = np.where(fold >= 2.0, -value, value)
-    found: Array = np.where(np.abs(angle) < LARGEST_ANGLE, value, np.cos(angle) if quarters else np.sin(angle))
-    return found[()]
+    result: Array = np.where(np.abs(angle) < LARGEST_ANGLE, value, np.cos(angle) if quarters else np.sin(angle))
+    return result[()]
 
 
 def _polynomial(coefficients: tuple[float, ...], z: Array) -> Array:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -11,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import require_type
-from msfp_gen.coupling.response import Response
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.model.evaluation import bodies_and_surfaces, separations_at_rest, top_values, vector
 from msfp_gen.model.model import Model, build_model
@@ -22,11 +23,80 @@ from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop, RigTop
-from msfp_gen.specification.contract import STATUSES
+from msfp_gen.specification.contract import STATUSES, WORKS, names
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Port
+
+DISSIPATED = ("friction_dissipated", "contact_dissipated", "rim_dissipated", "seat_dissipated")
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Wrenches of a two-port at the end of a trial; rows are the lower and the upper end.
+
+    time: of the end of the trial [s]. wrench: force along E1, E2, E3 and moment about the present position of the end,
+    which each end exerts on the bearing: ndarray, shape (2, 6), [N], [N m].
+    """
+
+    time: float
+    wrench: Array
+    _row: Array
+    _port: TwoPort
+    _number: int
+
+    @property
+    def sliding(self) -> Array:
+        """Sliding displacements (3.20), shape (n-1,) [m]."""
+        return self._values["sliding"]
+
+    @property
+    def normal_force(self) -> Array:
+        """Normal forces, shape (n-1,) [N]."""
+        return self._values["normal"]
+
+    @property
+    def dissipated(self) -> float:
+        """Energy dissipated in the bearing since the start [J]."""
+        works = dict(zip(names(WORKS), self._values["work"], strict=True))
+        return sum(float(works[name]) for name in DISSIPATED)
+
+    @cached_property
+    def _values(self) -> dict[str, Array]:
+        return self._port.unpacked(self._row)
+
+    @cached_property
+    def tangent(self) -> Array:
+        """Derivatives of the 12 numbers of `wrench` with respect to displacements and rotation vectors of both ends.
+
+        ndarray, shape (12, 12), [N/m], [N/rad], [N m/m], [N m/rad], at given rates and accelerations of the ends; it
+        is consistent with the steps of the trial. Like `damping` and `inertia` it is computed when it is first read, as
+        long as the trial is the latest one, before `commit` and `revert`. Raises InputError afterwards, RunError.
+        """
+        return self._port.derivative(self._number, "tangent", (1.0, 0.0, 0.0))
+
+    @cached_property
+    def damping(self) -> Array:
+        """Derivatives of `wrench` with respect to the rates of both ends, shape (12, 12), as `tangent`."""
+        return self._port.derivative(self._number, "damping", (0.0, 1.0, 0.0))
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Derivatives of `wrench` with respect to the accelerations of both ends, shape (12, 12), as `tangent`."""
+        return self._port.derivative(self._number, "inertia", (0.0, 0.0, 1.0))
+
+    def effective_stiffness(self, rate: float, acceleration: float) -> Array:
+        """`tangent` + `rate` * `damping` + `acceleration` * `inertia`, shape (12, 12), at a third of the cost.
+
+        It is the matrix of an iteration of an implicit method whose rates [1/s] and accelerations [1/s^2] change with
+        the displacements by these factors: gamma/(beta h) and 1/(beta h^2) of Newmark's method. Errors as `tangent`.
+        """
+        for name, factor in (("rate", rate), ("acceleration", acceleration)):
+            if not isfinite(factor):
+                raise InputError(f"{name} = {factor!r}: give a finite number")
+        return self._port.derivative(self._number, "effective_stiffness", (1.0, float(rate), float(acceleration)))
+
 
 MAGIC = b"msfp-gen two-port 1\n"
 LARGEST_ROTATION = 1.5  # of an end [rad]: a run ends at this tilt, next to the singularity of the Euler angles
@@ -121,9 +191,9 @@ class TwoPort:
         rotation: the angles psi, theta, phi (2.1)) follows the polynomial of degree five through both ends. Raises
         InputError; RunError where the bearing cannot follow: its committed state remains.
         """
-        given = {"lower": lower, "upper": upper}
-        ends = np.stack([vector(motion, name, (3, 6), "m, rad") for name, motion in given.items()])
-        for name, end in zip(given, ends, strict=True):
+        motions = {"lower": lower, "upper": upper}
+        ends = np.stack([vector(motion, name, (3, 6), "m, rad") for name, motion in motions.items()])
+        for name, end in zip(motions, ends, strict=True):
             if (turn := float(np.linalg.norm(end[0, 3:]))) > LARGEST_ROTATION:
                 raise InputError(f"{name}[0, 3:]: a rotation of {turn:.4g}; give at most {LARGEST_ROTATION} [rad]")
         self._check_time(time, ends)
@@ -182,11 +252,11 @@ class TwoPort:
             raise InputError(f"{word}: this trial is not the latest; read it before the next trial, commit or revert")
         if self._trial[0] == self.time:
             raise InputError(f"{word}: no time has passed since the committed state; make a trial at a later time")
-        status, found = self._port.derivative(np.array(direction))
+        status, derivative = self._port.derivative(np.array(direction))
         if status != "ok":
             where = f"two-port, {word} at t = {self._trial[0]:.6g} s"
             raise RunError(f"{where}: {_FAILURES[status].failure}", status=status)
-        return found
+        return derivative
 
     def _check_time(self, time: float, ends: Array) -> None:
         if not isinstance(time, int | float | np.floating) or not np.isfinite(time):

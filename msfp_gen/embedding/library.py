@@ -104,7 +104,7 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
     """What the templates need."""
     from msfp_gen.generator.header import word_enums  # it imports SymPy
 
-    found = [
+    modules = [
         {
             "name": name,
             "layout": spec.layout,
@@ -119,8 +119,8 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "stamp": f"written by msfp-gen {__version__}",
         "version": __version__,
         "abi": ABI_VERSION,
-        "models": found,
-        "port": next((each for each, spec in zip(found, models.values(), strict=True) if _has_ports(spec)), None),
+        "models": modules,
+        "port": next((module for module, spec in zip(modules, models.values(), strict=True) if _has_ports(spec)), None),
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),

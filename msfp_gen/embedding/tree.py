@@ -47,7 +47,7 @@ def install(tree: Tree, prefix: Path) -> None:
     written = _written(prefix)
     digests = {name: _digest_of(content) for name, content in tree.items()}
     for name, digest in digests.items():
-        if (found := _digest_at(prefix / name)) is not None and found not in (digest, *written.get(name, ())):
+        if (present := _digest_at(prefix / name)) is not None and present not in (digest, *written.get(name, ())):
             raise InputError(
                 f"--prefix = {str(prefix)!r}: {name} is not as msfp-gen wrote it: move it away or give another folder"
             )

@@ -1,19 +1,22 @@
-"""The page of the explorer: template, scripts, modules and problems in one file that loads no other."""
+"""The page of the explorer: template, scripts, models as WebAssembly and problems in one file that loads no other."""
 
 from __future__ import annotations
 
 import base64
-import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from msfp_gen.common.output import check_output, write_bytes
-from msfp_gen.explorer.module import wasm_module
+from msfp_gen.errors import CompileError
 from msfp_gen.explorer.problem import Problem, problem_of
+from msfp_gen.jit.build import runtime_sources
+from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
+from msfp_gen.report.template import script_data
+from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -72,7 +75,7 @@ def explorer_html(scene: Scene | None = None, progress: Progress | None = None) 
     return environment.from_string(_asset("explorer.html.jinja")).render(
         version=__version__,
         style=Markup(report.joinpath("page.css").read_text(encoding="utf-8")),
-        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        data=script_data(data),
         worker=Markup("".join(_asset(name) for name in WORKER)),
         scripts=[
             *(Markup(report.joinpath(name).read_text(encoding="utf-8")) for name in SHARED),
@@ -109,10 +112,33 @@ def _problems(scene: Scene | None) -> Sequence[Problem]:
     return [first, *(problem for problem in named if problem.spec == first.spec and problem.scene.name != scene.name)]
 
 
-def _escaped(text: str) -> str:
-    """JSON with <, > and & escaped, so that no text in it can end the script element."""
-    return re.sub(r"[<>&]", lambda found: f"\\u{ord(found[0]):04x}", text)
-
-
 def _asset(name: str) -> str:
     return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")
+
+
+GLUE = "explorer.c"
+OUTPUT = "model.wasm"
+# A library without a main function; of the processor only the vectors that every browser has.
+TARGET = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-msimd128", "-fno-sanitize=undefined", "-w", "-s")
+NATIVE = ("-fPIC", "-Wall", "-Wextra")  # flags for the compiled extension alone
+STACK = 4 << 20  # [bytes]; the runtime keeps work areas of a step on the stack
+
+
+def wasm_module(spec: ModelSpec) -> bytes:
+    """The WebAssembly module of a model; it imports nothing. Raises CompileError where ziglang is missing or fails."""
+    from msfp_gen.generator import generate
+
+    zig = zig_program()
+    if zig is None:
+        raise CompileError("the explorer needs ziglang, a compiler for WebAssembly: pip install 'msfp-gen[compiler]'")
+    generated = {name: text for name, text in generate(spec).files.items() if name.endswith((".c", ".h"))}
+    glue = {GLUE: files(__package__).joinpath("assets", GLUE).read_text(encoding="utf-8")}
+    sources = {**runtime_sources(), **generated, **glue}
+    flags = [flag for flag in FLAGS["c"] if flag not in NATIVE]
+    units = sorted(name for name in sources if name.endswith(".c"))
+    with TemporaryDirectory() as folder:
+        for name, text in sources.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        command = (str(zig), "cc", *TARGET, *flags, f"-Wl,-z,stack-size={STACK}", *units, "-o", OUTPUT)
+        Log(Path(folder)).run(Step(OUTPUT, command))
+        return (Path(folder) / OUTPUT).read_bytes()

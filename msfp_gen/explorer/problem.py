@@ -49,13 +49,13 @@ def problem_of(scene: Scene, title: str) -> Problem:
     fixed = fixed_scene(scene)
     effects = cast(Effects, fixed.effects)
     spec = ModelSpec(fixed.bearing.layout, effects)
-    given, azimuth = run_arguments(fixed, spec)
-    run, stack = given["run"], given["stack"]
+    arguments, azimuth = run_arguments(fixed, spec)
+    run, stack = arguments["run"], arguments["stack"]
     motion, load = (
         {"knots": _packed(knots), "coefficients": _columns(coefficients)}
         for knots, coefficients in ((run[0], run[1]), (run[2], run[3]))
     )
-    options = given["options"]
+    options = arguments["options"]
     data = {
         "title": title,
         "name": fixed.name,
@@ -117,35 +117,35 @@ def fixed_scene(scene: Scene) -> Scene:
 
 def run_arguments(scene: Scene, spec: ModelSpec) -> tuple[dict[str, Any], float]:
     """What the compiled run of a scene would be given, and the azimuth of its frame [rad]; nothing is compiled."""
-    given: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
 
     def stack(*values: Any) -> tuple[Any, ...]:
         return values
 
     def run(values: Any, *positional: Any, **options: Any) -> None:
-        given.update(stack=values, run=positional, options=options)
+        arguments.update(stack=values, run=positional, options=options)
 
     recorder = cast("ModuleType", SimpleNamespace(Stack=stack, Run=run))
     model = Model(spec, recorder, cast("BuildInfo", None))
     _, azimuth = start_run(scene, model, scene.effect_selection, scene.end, None, ())
-    return given, azimuth
+    return arguments, azimuth
 
 
 def _period(scene: Scene) -> float | None:
     """Period of the motion [s]; None where it has none."""
-    found = scene.motion.metadata.get("period")
-    return None if found is None else float(str(found))
+    period = scene.motion.metadata.get("period")
+    return None if period is None else float(str(period))
 
 
 def _offsets(quantities: tuple[rows.Quantity, ...], surfaces: int) -> dict[str, list[int]]:
     """Name -> offset and number of values of every field; "" -> the number of all values."""
     lengths = {rows.Extent.SURFACES: surfaces, rows.Extent.COORDINATES: 3, rows.Extent.WORKS: len(contract.WORKS)}
-    found, offset = {}, 0
+    offsets, offset = {}, 0
     for quantity in quantities:
         size = int(np.prod([lengths[n] if isinstance(n, rows.Extent) else n for n in quantity.shape], dtype=int))
-        found[quantity.name] = [offset, size]
+        offsets[quantity.name] = [offset, size]
         offset += size
-    return {**found, "": [offset, 0]}
+    return {**offsets, "": [offset, 0]}
 
 
 def _columns(coefficients: Array) -> dict[str, Any]:

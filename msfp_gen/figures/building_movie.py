@@ -48,7 +48,7 @@ def building_film(result: BuildingResult, times: Array, azimuth: float | None) -
     peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
     moving = MovingFrame(frames, magnification(result.scene.places, peak))
     first = 0.0 if azimuth is None else azimuth
-    views = [Elevation(moving, each) for each in (first, first + np.pi / 2)]
+    views = [Elevation(moving, azimuth_of_view) for azimuth_of_view in (first, first + np.pi / 2)]
     high, wide = views[0].high - views[0].low, sum(view.right - view.left for view in views)
     tall = even(min(TALLEST, (WIDE - 1.2) * high / wide) + AROUND + BELOW)
 
@@ -84,8 +84,8 @@ class Elevation:
         self.members = frame.members @ view.T
         self.lowers, self.uppers = frame.lowers @ view.T, frame.uppers @ view.T
         shown = [self.nodes, self.members, self.lowers, self.uppers, *([] if self.floors is None else [self.floors])]
-        x = np.concatenate([each[..., 0].ravel() for each in shown])
-        z = np.concatenate([each[..., 1].ravel() for each in shown])
+        x = np.concatenate([points[..., 0].ravel() for points in shown])
+        z = np.concatenate([points[..., 1].ravel() for points in shown])
         self.plate = PLATE * float(np.ptp(x))
         room = ROOM * float(np.ptp(x)) + self.plate
         self.left, self.right = float(x.min()) - room, float(x.max()) + room
@@ -188,7 +188,7 @@ def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> Move:
         ylabel="base shear / weight [-]",
     )
     axes.legend(loc="best")
-    places = [[np.interp(time, result.time, each) for each in _loop(result, axis)] for axis in moving]
+    places = [[np.interp(time, result.time, path) for path in _loop(result, axis)] for axis in moving]
 
     def move(row: int) -> None:
         for dot, (u, shear) in zip(dots, places, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures.section import draw_circles, draw_section, peak_time
-from msfp_gen.figures.style import INK, MILLI, THIN, colour, headline, label_of, page, strips, subscript
+from msfp_gen.figures.style import MILLI, colour, draw_limit, headline, label_of, page, strips, subscript
 from msfp_gen.results.geometry.outline import slider_radius
 from msfp_gen.results.geometry.section import sections
 from msfp_gen.results.geometry.shape import friction_circles, poses
@@ -70,17 +70,6 @@ def _draw_offsets(figure: SubFigure, result: RunData) -> None:
         axes.set_ylim(0, 1.3 * max(edge if known else 0.0, np.nan_to_num(off[:, index]).max()) or 1.0)
         axes.locator_params(axis="y", nbins=3)
         if known:
-            axes.axhline(edge, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
-            axes.annotate(
-                f"edge of the slider {edge:.3g} mm",
-                (1, edge),
-                xycoords=("axes fraction", "data"),
-                xytext=(0, 3),
-                textcoords="offset points",
-                ha="right",
-                va="bottom",
-                fontsize=7.5,
-                color=INK,
-            )
+            draw_limit(axes, edge, f"edge of the slider {edge:.3g} mm")
     column[0].set_title("Eccentricity e of the contacts")
     figure.align_ylabels(column)

@@ -56,11 +56,11 @@ class MovingFrame:
 
     def points(self, node: int, at: Array) -> Array:
         """Points that move with a node, shape (k, p, 3) [m]; at: where they are at rest, shape (p, 3) [m]."""
-        given = self.scene.building.nodes[node]
-        motion = self.result.node(given.name)[:, 0]
-        turned = np.cross(motion[:, None, 3:], at - given.position)
-        found: Array = at + self.factor * (motion[:, None, :3] - self.result.ground[:, None, 0] + turned)
-        return found
+        position = self.scene.building.nodes[node]
+        motion = self.result.node(position.name)[:, 0]
+        turned = np.cross(motion[:, None, 3:], at - position.position)
+        points: Array = at + self.factor * (motion[:, None, :3] - self.result.ground[:, None, 0] + turned)
+        return points
 
     @cached_property
     def floors(self) -> Array:
@@ -68,14 +68,14 @@ class MovingFrame:
         (x0, y0), (x1, y1) = plan_of(self.scene)
         plan = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
         heights = [float(node.position[2]) for node in self.scene.building.nodes]
-        each = [self.points(i, np.column_stack([plan, np.full(4, z)])) for i, z in enumerate(heights)]
-        return np.stack(each, axis=1)
+        corners = [self.points(i, np.column_stack([plan, np.full(4, z)])) for i, z in enumerate(heights)]
+        return np.stack(corners, axis=1)
 
     @cached_property
     def nodes(self) -> Array:
         """The nodes, shape (k, nodes, 3) [m]."""
-        each = [self.points(i, node.position[None]) for i, node in enumerate(self.scene.building.nodes)]
-        return np.concatenate(each, axis=1)
+        positions = [self.points(i, node.position[None]) for i, node in enumerate(self.scene.building.nodes)]
+        return np.concatenate(positions, axis=1)
 
     @cached_property
     def members(self) -> Array:
@@ -85,7 +85,7 @@ class MovingFrame:
         building = self.scene.building
         if not building.columns:
             names = [node.name for node in building.nodes]
-            links = [names.index(each.node) for each in self.scene.bearings]
+            links = [names.index(bearing.node) for bearing in self.scene.bearings]
             return np.stack([self.nodes[:, links], self.uppers], axis=2)
         ends = []
         for index in range(len(building.columns)):
@@ -98,24 +98,24 @@ class MovingFrame:
     def lowers(self) -> Array:
         """Lower ends of the bearings, shape (k, bearings, 3) [m]; they move where they have a ground of their own."""
         below = self.upper_ends - [0.0, 0.0, self.depth]
-        found: Array = below + self.factor * (self.result.support[:, :, 0] - self.result.ground[:, None, 0])
-        return found
+        positions: Array = below + self.factor * (self.result.support[:, :, 0] - self.result.ground[:, None, 0])
+        return positions
 
     @cached_property
     def uppers(self) -> Array:
         """Upper ends of the bearings, shape (k, bearings, 3) [m]."""
         rows = self.scene.attachments[:, :3]
         moved = np.einsum("bin,kn->kbi", rows, self.result.displacement) - self.result.ground[:, None, 0]
-        found: Array = self.upper_ends + self.factor * moved
-        return found
+        positions: Array = self.upper_ends + self.factor * moved
+        return positions
 
     @cached_property
     def on_rim(self) -> NDArray[np.bool_]:
         """Whether a slider of each bearing touches its rim, shape (k, bearings)."""
-        return np.stack([(each.sliding >= each.capacity).any(axis=1) for each in self.result.bearings], axis=1)
+        return np.stack([(bearing.sliding >= bearing.capacity).any(axis=1) for bearing in self.result.bearings], axis=1)
 
     @cached_property
     def lifted(self) -> NDArray[np.bool_]:
         """Whether each bearing carries less than `NOTHING` of its load at rest, shape (k, bearings)."""
-        found: NDArray[np.bool_] = self.result.axial_force < NOTHING * self.scene.axial_loads
-        return found
+        lifted: NDArray[np.bool_] = self.result.axial_force < NOTHING * self.scene.axial_loads
+        return lifted

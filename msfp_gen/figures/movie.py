@@ -114,25 +114,25 @@ def check_movie(path: str | Path, name: str = "movie") -> Path:
 def stack_film(result: RunData, times: Array, azimuth: float | None) -> Film:
     """The movie of one bearing at these times [s], its section at `azimuth` [rad]."""
     frames = at_times(result, times)
-    found = sections(frames, azimuth)
-    return Film(_height(found), len(times), lambda figure: _layout(figure, result, frames, found))
+    drawn_sections = sections(frames, azimuth)
+    return Film(_height(drawn_sections), len(times), lambda figure: _layout(figure, result, frames, drawn_sections))
 
 
-def _height(found: list[Section]) -> float:
+def _height(drawn_sections: list[Section]) -> float:
     """Height of the movie [inch]: the section over its full width to scale, the loop and the bars below it."""
-    (left, right), (low, high) = limits(found)
+    (left, right), (low, high) = limits(drawn_sections)
     return even(min(TALLEST, (WIDE - 1.0) * (high - low) / (right - left)) + AROUND + BELOW)
 
 
-def _layout(figure: Figure, result: RunData, frames: RunData, found: list[Section]) -> Layout:
+def _layout(figure: Figure, result: RunData, frames: RunData, drawn_sections: list[Section]) -> Layout:
     """Draw all parts; returns a function that moves them to one row of `frames`, and the artists that it changes."""
     headline(figure, label_of(result))
     height = figure.get_size_inches()[1]
     ((above,), (below,)) = figure.subfigures(2, 1, squeeze=False, height_ratios=(height - BELOW, BELOW))
     stack = above.subplots()
     left, right = below.subplots(1, 2)
-    drawing = draw_section(stack, frames, found[0])
-    wide, high = limits(found)
+    drawing = draw_section(stack, frames, drawn_sections[0])
+    wide, high = limits(drawn_sections)
     stack.set(xlim=wide, ylim=high)
     legend = above.legend(handles=drawing.entries, loc="outside upper center", ncols=3)
     dot, x, y = _loop(left, result, frames)
@@ -141,7 +141,7 @@ def _layout(figure: Figure, result: RunData, frames: RunData, found: list[Sectio
     cursor = right.axvline(frames.history.time[0], color=INK, linewidth=THIN)
 
     def update(row: int) -> None:
-        drawing.update(found[row], row)
+        drawing.update(drawn_sections[row], row)
         shown = zip(legend.get_texts(), legend.get_lines(), drawing.entries, strict=True)
         for text, line, entry in shown:
             text.set_text(entry.get_label())

@@ -211,9 +211,9 @@ def draw_circles(axes: Axes, section: Section, radii: Array) -> None:
         )
 
 
-def limits(found: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:
+def limits(drawn_sections: list[Section]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Horizontal and vertical limits [mm] that contain the stack and its line of force in all sections."""
-    points = np.concatenate([polygon for section in found for polygon in section.bodies]) * MILLI
+    points = np.concatenate([polygon for section in drawn_sections for polygon in section.bodies]) * MILLI
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
     room = OVERHANG * (high - low)
     return (left - room, right + room), (low - 1.2 * room, high + 1.2 * room)

@@ -14,6 +14,7 @@ from msfp_gen.figures.style import (
     contacts,
     displacement,
     displacement_label,
+    draw_limit,
     headline,
     label_of,
     mark,
@@ -95,18 +96,7 @@ def draw_sliding(figure: Any, result: RunData) -> None:
     events = contacts(result)
     for index, (axes, surface) in enumerate(zip(column[::-1], surfaces, strict=True)):
         capacity, sliding = surface.capacity * MILLI, history.sliding[:, index] * MILLI
-        axes.axhline(capacity, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
-        axes.annotate(
-            f"capacity {capacity:.3g} mm",
-            (1, capacity),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, 4),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            fontsize=7.5,
-            color=INK,
-        )
+        draw_limit(axes, capacity, f"capacity {capacity:.3g} mm")
         axes.plot(history.time, sliding, color=colour(index + 1))
         for event in events:
             if event.surface == index + 1:

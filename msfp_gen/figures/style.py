@@ -174,3 +174,19 @@ def mark(event: Event) -> dict[str, Any]:
         "markeredgewidth": 0.6,
         "color": colour(event.surface),
     }
+
+
+def draw_limit(axes: Axes, value: float, text: str) -> None:
+    """A dashed line at a value of the vertical axis, with its text above the right end."""
+    axes.axhline(value, color=INK, linewidth=THIN, linestyle=(0, (5, 3)))
+    axes.annotate(
+        text,
+        (1, value),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 4),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=7.5,
+        color=INK,
+    )

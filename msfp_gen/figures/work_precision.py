@@ -51,7 +51,7 @@ def plot_work_precision(
     """
     columns = _checked(table)
     named = errors or {name: name.replace("_", " ") for name in _error_names(columns)}
-    costs = [cost for cost in COSTS if any(cost in given for given in columns.values())]
+    costs = [cost for cost in COSTS if any(cost in column for column in columns.values())]
     for what, names in (("error", named), ("cost", costs)):
         if not names:
             raise InputError(
@@ -67,7 +67,7 @@ def plot_work_precision(
             row[0].set_ylabel(f"{label}, relative")
         for axes, cost in zip(grid[-1], costs, strict=True):
             axes.set_xlabel(COSTS[cost])
-            _whole_decades(axes, [given[cost] for given in columns.values() if cost in given])
+            _whole_decades(axes, [column[cost] for column in columns.values() if cost in column])
         _legend(figure, grid[0, 0], columns)
     return figure
 
@@ -77,18 +77,18 @@ def _checked(table: Table) -> dict[str, dict[str, Array]]:
     if not table:
         raise InputError("table is empty: give at least one method with its columns")
     out = {}
-    for method, given in table.items():
-        columns = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in given.items()}
+    for method, method_columns in table.items():
+        columns = {name: np.atleast_1d(np.asarray(values, dtype=float)) for name, values in method_columns.items()}
         lengths = {len(values) for values in columns.values()}
         if len(lengths) != 1:
-            found = ", ".join(f"{name} {len(values)}" for name, values in columns.items()) or "none"
-            raise InputError(f"table[{method!r}]: columns of one length are needed; given {found}")
+            counts = ", ".join(f"{name} {len(values)}" for name, values in columns.items()) or "none"
+            raise InputError(f"table[{method!r}]: columns of one length are needed; given {counts}")
         out[method] = columns
     return out
 
 
 def _error_names(columns: Mapping[str, Mapping[str, Array]]) -> list[str]:
-    names = [name for given in columns.values() for name in given if name not in (*COSTS, *FLAGS)]
+    names = [name for column in columns.values() for name in column if name not in (*COSTS, *FLAGS)]
     return list(dict.fromkeys(names))
 
 
@@ -100,12 +100,12 @@ def _draw_panel(
     floors: Mapping[str, Mapping[str, float]],
 ) -> None:
     axes.set(xscale="log", yscale="log")
-    for index, (method, given) in enumerate(columns.items()):
-        if cost not in given or error not in given:
+    for index, (method, column) in enumerate(columns.items()):
+        if cost not in column or error not in column:
             continue
         style = _line_style(index)
-        x, y = given[cost], given[error]
-        failed, wrong, cut = (given.get(flag, np.zeros(len(x))) > 0 for flag in FLAGS)
+        x, y = column[cost], column[error]
+        failed, wrong, cut = (column.get(flag, np.zeros(len(x))) > 0 for flag in FLAGS)
         good = ~failed & ~cut & np.isfinite(y) & (y > 0)
         axes.plot(x[good], y[good], **style, label=method)
         axes.plot(x[good & wrong], y[good & wrong], **RING)
@@ -176,6 +176,6 @@ def _legend(figure: Figure, axes: Axes, columns: Mapping[str, Mapping[str, Array
 
     handles = [Line2D([], [], **_line_style(index), label=method) for index, method in enumerate(columns)]
     for flag, style, text in MARKS:
-        if any(np.any(given.get(flag, np.zeros(1)) > 0) for given in columns.values()):
+        if any(np.any(column.get(flag, np.zeros(1)) > 0) for column in columns.values()):
             handles.append(Line2D([], [], **style, label=text))
     figure.legend(handles=handles, loc="outside right upper")

@@ -1,14 +1,52 @@
-"""modelDescription.xml of a unit, and the list of its sources, in FMI 2.0 and 3.0."""
+"""modelDescription.xml of a unit, its units of measure, and the list of its sources, in FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as Xml
 
-from msfp_gen.fmu.units import CELSIUS, OFFSET, base_units
 from msfp_gen.fmu.variables import Block, Variable
 from msfp_gen.version import __version__
+
+# Exponents of kg, m, s, K, rad.
+BASE = ("kg", "m", "s", "K", "rad")
+_KNOWN = {
+    "kg": (1, 0, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0),
+    "s": (0, 0, 1, 0, 0),
+    "K": (0, 0, 0, 1, 0),
+    "rad": (0, 0, 0, 0, 1),
+    "N": (1, 1, -2, 0, 0),
+    "J": (1, 2, -2, 0, 0),
+    "W": (1, 2, -3, 0, 0),
+    "Pa": (1, -1, -2, 0, 0),
+}
+CELSIUS = "degC"
+OFFSET = 273.15  # of degC from K
+_FACTOR = re.compile(r"([A-Za-z]+)(?:\^(\d+))?")
+
+
+def base_units(unit: str) -> dict[str, int] | None:
+    """Base unit -> exponent other than 0, of a unit such as "N m/rad" or "kg m^2"; None where it is no unit of FMI.
+
+    Factors are separated by spaces; all after a slash divide, also after a second one.
+    """
+    if unit == CELSIUS:
+        return {"K": 1}
+    total = [0] * len(BASE)
+    for i, part in enumerate(unit.split("/")):
+        for factor in part.split():
+            match = _FACTOR.fullmatch(factor)
+            if factor == "1":
+                continue
+            if match is None or match[1] not in _KNOWN:
+                return None
+            sign = (-1 if i else 1) * int(match[2] or 1)
+            total = [have + sign * exponent for have, exponent in zip(total, _KNOWN[match[1]], strict=True)]
+    return {name: power for name, power in zip(BASE, total, strict=True) if power}
+
 
 CATEGORIES = {"logStatusDiscard": "states refused", "logStatusError": "errors"}
 STEP = 0.01  # communication step that is suggested [s]
@@ -95,43 +133,43 @@ def _interface(root: Xml.Element, unit: Unit, kind: str, version: int) -> None:
 
 
 def _units(root: Xml.Element, unit: Unit) -> None:
-    found = Xml.SubElement(root, "UnitDefinitions")
+    definitions = Xml.SubElement(root, "UnitDefinitions")
     for name in dict.fromkeys(variable.unit for variable in unit.variables):
         exponents = base_units(name) if name != "-" else None
         if exponents is not None:
-            base = Xml.SubElement(Xml.SubElement(found, "Unit", name=name), "BaseUnit")
-            for each, power in exponents.items():
-                base.set(each, str(power))
+            base = Xml.SubElement(Xml.SubElement(definitions, "Unit", name=name), "BaseUnit")
+            for base_unit, power in exponents.items():
+                base.set(base_unit, str(power))
             if name == CELSIUS:
                 base.set("offset", repr(OFFSET))
 
 
 def _attributes(variable: Variable) -> dict[str, str]:
     """Attributes that FMI 2.0 and 3.0 have in common, but for the type."""
-    found = {"causality": _CAUSALITY.get(variable.block, "local"), "variability": "continuous"}
+    attributes = {"causality": _CAUSALITY.get(variable.block, "local"), "variability": "continuous"}
     if variable.block in _PARAMETERS:
-        found = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
+        attributes = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
     elif variable.block not in (Block.TIME, Block.INPUTS):
-        found["initial"] = "calculated"
+        attributes["initial"] = "calculated"
     known = variable.unit != "-" and base_units(variable.unit) is not None
     note = "" if known or variable.unit == "-" else f" [{variable.unit}]"
-    return {"description": variable.meaning + note, **found}
+    return {"description": variable.meaning + note, **attributes}
 
 
 def _numbers(variable: Variable) -> dict[str, str]:
-    found = {}
+    numbers = {}
     if variable.unit != "-" and base_units(variable.unit) is not None:
-        found["unit"] = variable.unit
+        numbers["unit"] = variable.unit
     if variable.block in (Block.INPUTS, *_PARAMETERS):
-        found["start"] = repr(variable.start)
+        numbers["start"] = repr(variable.start)
     if variable.nominal != 1.0:
-        found["nominal"] = repr(variable.nominal)
-    return found
+        numbers["nominal"] = repr(variable.nominal)
+    return numbers
 
 
 def _variable2(variables: Xml.Element, reference: int, variable: Variable) -> None:
-    given = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
-    element = Xml.SubElement(variables, "ScalarVariable", given)
+    attributes = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
+    element = Xml.SubElement(variables, "ScalarVariable", attributes)
     if variable.block is Block.BOOLEANS:
         Xml.SubElement(element, "Boolean", start=str(bool(variable.start)).lower())
         return
@@ -141,11 +179,11 @@ def _variable2(variables: Xml.Element, reference: int, variable: Variable) -> No
 
 
 def _variable3(variables: Xml.Element, reference: int, variable: Variable) -> None:
-    given = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
+    attributes = {"name": variable.name, "valueReference": str(reference), **_attributes(variable)}
     if variable.block is Block.BOOLEANS:
-        Xml.SubElement(variables, "Boolean", given, start=str(bool(variable.start)).lower())
+        Xml.SubElement(variables, "Boolean", attributes, start=str(bool(variable.start)).lower())
         return
-    element = Xml.SubElement(variables, "Float64", given | _numbers(variable))
+    element = Xml.SubElement(variables, "Float64", attributes | _numbers(variable))
     if variable.of is not None:
         element.set("derivative", str(variable.of))
 

@@ -1,4 +1,4 @@
-"""`write_fmu`: a scene as a Functional Mock-up Unit."""
+"""`write_fmu`: a scene as a Functional Mock-up Unit, with what its C files need to know of the scene."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.coupling.two_port import REST, check_parts, parts_of_rig, scene_at_rest
 from msfp_gen.embedding.rendering import render
 from msfp_gen.errors import CompileError, InputError
-from msfp_gen.fmu.content import model_content
 from msfp_gen.fmu.description import Unit, build_description, model_description
-from msfp_gen.fmu.variables import Variable, variables
+from msfp_gen.fmu.variables import Block, Variable, top_names, variables
 from msfp_gen.generator.interface import effects_text, model_name
 from msfp_gen.jit.library import build_shared
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import MassTop
+from msfp_gen.specification import contract
 from msfp_gen.specification.layout import Auto
 from msfp_gen.version import __version__
 
@@ -124,8 +125,8 @@ def _check_exchange(scene: Scene) -> None:
 
 
 def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
-    found = variables(scene, exchange)
-    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {found!r}"
+    unit_variables = variables(scene, exchange)
+    what = f"{scene.spec.key} {scene.solver!r} {version} {exchange} {__version__} {unit_variables!r}"
     digest = hashlib.sha256(what.encode())
     for text in _written(version).values():
         digest.update(text.encode())
@@ -137,7 +138,7 @@ def _unit(scene: Scene, name: str, version: int, exchange: bool) -> Unit:
         text=f"Multi-stage friction pendulum bearing (PEER 2017/07), {inout}; {effects_text(scene.spec)}",
         kinds=tuple(kind for short, kind in KINDS.items() if short == "cs" or exchange),
         tolerance=scene.solver.rtol,
-        variables=found,
+        variables=unit_variables,
         sources=(),
     )
 
@@ -161,14 +162,14 @@ def _files(
     library = f"{unit.identifier}{suffix}"
     sources = build_shared(scene.spec, others, f"fmi{version}*", library, folder, progress)
     unit = replace(unit, sources=tuple(name for name in sources if name.endswith(".c")))
-    found = {"modelDescription.xml": model_description(unit, version)}
-    found[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
-    found |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    archive_files = {"modelDescription.xml": model_description(unit, version)}
+    archive_files[f"binaries/{_platform(system, version)}/{library}"] = (folder / library).read_bytes()
+    archive_files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if version == 3:
-        found["sources/buildDescription.xml"] = build_description(unit)
+        archive_files["sources/buildDescription.xml"] = build_description(unit)
     page = {"unit": unit, "scene": scene, "stamp": content["stamp"], "effects": effects_text(scene.spec)}
-    found["documentation/index.html"] = render("index.html", page, __package__).encode()
-    return found
+    archive_files["documentation/index.html"] = render("index.html", page, __package__).encode()
+    return archive_files
 
 
 def _platform(system: str, version: int) -> str:
@@ -180,8 +181,63 @@ def _platform(system: str, version: int) -> str:
 
 
 def _archive(content: dict[str, bytes]) -> bytes:
-    found = io.BytesIO()
-    with zipfile.ZipFile(found, "w") as archive:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
         for name, data in content.items():
             archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
-    return found.getvalue()
+    return stream.getvalue()
+
+
+def model_content(scene: Scene, unit: Unit, exchange: bool) -> dict[str, Any]:
+    """The names in the templates fmu_model.h and fmu_model.c."""
+    effects, count = scene.spec.effects, scene.bearing.layout.surfaces
+    loaded, surface = isinstance(scene.top, MassTop), contract.surface_values(effects)
+    top, body = contract.names(contract.TOP), contract.names(contract.BODY)
+    return {
+        "stamp": f"written by msfp-gen {__version__}",
+        "model": model_name(scene.spec),
+        "token": unit.token,
+        "mass": int(loaded),
+        "exchange": int(exchange),
+        "uplift": int(effects.uplift),
+        "method": scene.solver.method,
+        "top_places": [top.index(name) for name in top_names(scene)],
+        "surfaces": count,
+        "coordinates": 6 if effects.uplift else 3,
+        "body_size": len(body),
+        "body_mass": body.index("mass"),
+        "surface_size": len(surface),
+        "seat_stiffness": surface.index("seat_stiffness") if effects.uplift else 0,
+        "top_size": len(top),
+        "output_places": _output_places(unit, loaded),
+        "output_count": len(unit.at(Block.OUTPUTS)),
+        "places": _places(unit, loaded),
+        "names": [variable.name for variable in unit.variables],
+        "start": [variable.start for variable in unit.variables],
+        "input_nominals": [unit.variables[i].nominal for i in unit.at(Block.INPUTS)],
+        "state_nominals": [*(unit.variables[i].nominal for i in unit.at(Block.STATES)), 1.0],
+    }
+
+
+def _output_places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
+    """Names in C of outputs, counted from the first output."""
+    names = [unit.variables[i].name for i in unit.at(Block.OUTPUTS)]
+    names_in_c = {"SLIDING": "surface[1].sliding", "NORMAL": "surface[1].normal"}
+    if loaded:
+        names_in_c |= {"TOP_FORCE": "top.force[1]", "BASE_FORCE": "lower.force[1]"}
+    return [(place, names.index(name)) for place, name in names_in_c.items()]
+
+
+def _places(unit: Unit, loaded: bool) -> list[tuple[str, int]]:
+    """Names of value references in C: where blocks begin, and the variables that have a place."""
+    places, end = [], 0
+    for block in Block:
+        references = unit.at(block)
+        places.append((block.value, end))
+        end += len(references)
+        assert not references or references == list(range(references[0], end)), block
+    places += [(variable.place, i) for i, variable in enumerate(unit.variables) if variable.place]
+    if loaded:
+        names = [variable.name for variable in unit.variables]
+        places.append(("TOP_MASS", names.index("top.mass")))
+    return places

@@ -57,27 +57,27 @@ def variables(scene: Scene, exchange: bool) -> list[Variable]:
     exchange: with the states of Model Exchange. The index of a variable is its value reference.
     """
     loaded = not isinstance(scene.top, RigTop)
-    found = [Variable("time", Block.TIME, "s", "time")]
-    found += _motion("lower", "the lower end, which holds the base")
-    found += _load() if loaded else _motion("upper", "the upper end, the far side of the interface")
-    found += _outputs_loaded() if loaded else _outputs()
-    found += _surface_outputs(scene.bearing.layout.surfaces)
-    found += _parameters(scene)
+    result = [Variable("time", Block.TIME, "s", "time")]
+    result += _motion("lower", "the lower end, which holds the base")
+    result += _load() if loaded else _motion("upper", "the upper end, the far side of the interface")
+    result += _outputs_loaded() if loaded else _outputs()
+    result += _surface_outputs(scene.bearing.layout.surfaces)
+    result += _parameters(scene)
     if exchange:
         states = list(_states(scene))
-        first = len(found)
-        found += states
-        found += [
+        first = len(result)
+        result += states
+        result += [
             Variable(f"der({x.name})", Block.DERIVATIVES, f"{x.unit}/s", f"rate of: {x.meaning}", of=first + i)
             for i, x in enumerate(states)
         ]
         if scene.spec.effects.rims:
-            found += _gaps(scene.bearing.layout.surfaces)
+            result += _gaps(scene.bearing.layout.surfaces)
     meaning = (
         "false: inputs are those at the begin of a step, from which the unit goes on with accelerations that change as "
         "since the last communication point; true: they are those at its end"
     )
-    return [*found, Variable("inputs_at_step_end", Block.BOOLEANS, "-", meaning, place="INPUTS_AT_STEP_END")]
+    return [*result, Variable("inputs_at_step_end", Block.BOOLEANS, "-", meaning, place="INPUTS_AT_STEP_END")]
 
 
 def _vector(name: str, block: Block, unit: str, meaning: str, nominal: float = 1.0) -> Iterator[Variable]:
@@ -143,11 +143,11 @@ def _parameters(scene: Scene) -> Iterator[Variable]:
     for j, row in enumerate(surfaces):
         place = "" if j else "SURFACE_VALUES"
         yield from _values(f"surface[{j + 1}]", surface_values(spec), row, place, f"surface {j + 1}")
-    given = dict(zip(contract.names(contract.TOP), top_values(scene.top), strict=True))
+    values_of_top = dict(zip(contract.names(contract.TOP), top_values(scene.top), strict=True))
     known = {value.name: value for value in contract.TOP}
     names = top_names(scene)
     word = "interface" if isinstance(scene.top, RigTop) else "top"
-    yield from _values(word, [known[name] for name in names], [given[name] for name in names], "TOP_VALUES", "")
+    yield from _values(word, [known[name] for name in names], [values_of_top[name] for name in names], "TOP_VALUES", "")
     if isinstance(scene.top, RigTop):
         meaning = "compression of the bearing while both ends are where they start"
         yield Variable("axial_load", Block.PARAMETERS, "N", meaning, scene.top.axial_load, place="AXIAL_LOAD")

@@ -22,6 +22,7 @@ from time import perf_counter
 from types import ModuleType
 from typing import Any
 
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import cache
 from msfp_gen.jit.compiler import LOG_NAME, compile_extension
@@ -267,3 +268,21 @@ def _replace(source: Path, target: Path) -> None:
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     shutil.copyfile(source, part)
     part.replace(target)
+
+
+def build_table(info: BuildInfo) -> Table:
+    """Build times, size and location of a compiled model."""
+    stages = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in info.stages.items())
+    origin = "found in the cache" if info.cached else "built now"
+    return Table(
+        info.spec,
+        (),
+        [
+            ("stages", stages),
+            ("this call", f"{info.seconds:.2f} s, {origin}"),
+            ("kernels", f"{info.statements} statements, {info.operations} operations"),
+            ("module", info.module),
+            ("folder", str(info.folder)),
+            ("extension", info.path.name),
+        ],
+    )

@@ -184,14 +184,14 @@ class Entry:
 
         build: writes a complete entry into an empty folder. progress: as of `building`.
         """
-        if (found := self.find()) is not None:
-            return found, False
+        if (manifest := self.find()) is not None:
+            return manifest, False
         with self.building(progress or no_progress) as part:
-            if (found := self.find()) is not None:  # another process has built it while this one waited for the lock
-                return found, False
-            made = build(part)
+            if (manifest := self.find()) is not None:  # another process has built it while this one waited for the lock
+                return manifest, False
+            manifest_of_part = build(part)
             self.publish(part)
-        return made, True
+        return manifest_of_part, True
 
     @contextmanager
     def building(self, progress: Callable[[str, float], None]) -> Iterator[Path]:
@@ -299,8 +299,8 @@ def _compiler(module: str, inputs: dict[str, Any]) -> list[str]:
     except CompileError:
         for folder in sorted(cache_root().glob(f"{module}-*[0-9a-f]")):
             with suppress(OSError, ValueError, TypeError):
-                found = Manifest.read(folder).inputs
-                if all(found.get(name) == value for name, value in inputs.items()):
-                    return list(found["compiler"])
+                manifest_inputs = Manifest.read(folder).inputs
+                if all(manifest_inputs.get(name) == value for name, value in inputs.items()):
+                    return list(manifest_inputs["compiler"])
         raise
     return [*compiler.command, compiler.path, compiler.version]

@@ -26,8 +26,35 @@ from typing import NamedTuple
 
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.common.output import write_bytes, write_text
-from msfp_gen.errors import CompileError
-from msfp_gen.jit.options import CFLAGS, COMPILER, user_flags, words
+from msfp_gen.errors import CompileError, InputError
+
+COMPILER, CFLAGS = "CC", "MSFP_GEN_CFLAGS"
+# With these a compiler assumes that no number is infinite or NaN and drops the checks for them.
+FORBIDDEN = ("-Ofast", "-ffast-math", "-ffinite-math-only")
+
+
+def words(name: str) -> tuple[str, ...]:
+    """The words of an environment variable. Raises InputError where a quote is not closed, or a flag is forbidden."""
+    text = os.environ.get(name, "")
+    try:
+        flags = tuple(shlex.split(text))
+    except ValueError as error:
+        raise InputError(f"{name} = {text!r}: {str(error).lower()}; quote it as for a shell") from None
+    if bad := [flag for flag in flags if flag in FORBIDDEN]:
+        raise InputError(
+            f"{name} = {text!r}: {bad[0]} removes the checks that every number is finite; leave it out "
+            "(-O3 and -march=native may stay)"
+        )
+    return flags
+
+
+def user_flags() -> tuple[str, ...]:
+    """The words of MSFP_GEN_CFLAGS; none where these are refused, which `find_compiler` then reports."""
+    try:
+        return words(CFLAGS)
+    except InputError:
+        return ()
+
 
 LOG_NAME = "build.log"
 EXTENSION_SUFFIX = EXTENSION_SUFFIXES[0]
@@ -119,8 +146,8 @@ def find_compiler() -> Compiler:
 
 def zig_program() -> Path | None:
     """The program of the package ziglang; None where it is not installed."""
-    found = importlib.util.find_spec("ziglang")
-    for folder in (found.submodule_search_locations or ()) if found is not None else ():
+    module = importlib.util.find_spec("ziglang")
+    for folder in (module.submodule_search_locations or ()) if module is not None else ():
         if (program := Path(folder) / "zig").is_file():
             return program
     return None
@@ -257,8 +284,8 @@ class Log:
 def first_error(output: str, code: int) -> str:
     """The line of a tool's output that states the error; `code` is its exit status."""
     for pattern in ERROR_PATTERNS:
-        if found := pattern.search(output):
-            return found.group().strip()
+        if match := pattern.search(output):
+            return match.group().strip()
     lines = output.split("\n")
     return next((line.strip() for line in reversed(lines) if line.strip()), f"exit code {code} and no output")
 

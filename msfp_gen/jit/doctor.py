@@ -7,12 +7,13 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit.build import load_extension
 from msfp_gen.jit.cache import cache_root
@@ -86,8 +87,8 @@ def check_prebuilt() -> Check:
         count = sum(find_prebuilt(spec) is not None for spec in prebuilt_specs())
     except InputError as error:
         return Check("prebuilt models", False, *_found_and_remedy(error))
-    found = f"{count} that need no compiler" if count else "none: a model is compiled at its first use"
-    return Check("prebuilt models", True, found)
+    detail = f"{count} that need no compiler" if count else "none: a model is compiled at its first use"
+    return Check("prebuilt models", True, detail)
 
 
 def check_compiler() -> Check:
@@ -144,10 +145,10 @@ def check_disk() -> Check:
 
 def _check_requirement(line: str) -> Check:
     """Check of one line of the declared dependencies, such as `numpy>=1.26`."""
-    found = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", line)
-    if found is None:
+    match = re.match(r"([\w.-]+)\s*(?:>=\s*([\d.]+))?", line)
+    if match is None:
         raise InputError(f"requirement {line!r} of {DISTRIBUTION}: cannot read it; install msfp-gen again")
-    name, least = found.group(1), found.group(2) or "0"
+    name, least = match.group(1), match.group(2) or "0"
     remedy = f'pip install "{name}>={least}"'
     try:
         version = metadata.version(name)
@@ -165,8 +166,8 @@ def _requires_python() -> tuple[int, ...]:
 
 def _found_and_remedy(error: CompileError | InputError) -> Iterator[str]:
     """The two parts of a CompileError of the form `what was found: remedy`."""
-    found, _, remedy = str(error).partition(": ")
-    yield from (found, remedy)
+    problem, _, remedy = str(error).partition(": ")
+    yield from (problem, remedy)
 
 
 def _numbers(version: str) -> tuple[int, ...]:
@@ -176,3 +177,12 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 def _dotted(numbers: tuple[int, ...]) -> str:
     return ".".join(map(str, numbers))
+
+
+def check_table(checks: Iterable[Check]) -> Table:
+    """Result of `msfp-gen doctor`, one row per check."""
+    rows = [
+        (check.name, *(("ok", check.detail) if check.ok else ("MISSING", f"{check.detail}; {check.remedy}")))
+        for check in checks
+    ]
+    return Table("msfp-gen doctor", (), rows)

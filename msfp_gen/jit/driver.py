@@ -51,8 +51,8 @@ def _named(package: str) -> tuple[str, dict[str, str]]:
 
 def sources(folder: Traversable) -> dict[str, str]:
     """The sources in a folder: file name -> text."""
-    found = sorted(folder.iterdir(), key=lambda file: file.name)
-    return {file.name: file.read_text(encoding="utf-8") for file in found if file.name.endswith(SUFFIXES)}
+    paths = sorted(folder.iterdir(), key=lambda file: file.name)
+    return {file.name: file.read_text(encoding="utf-8") for file in paths if file.name.endswith(SUFFIXES)}
 
 
 def headers() -> dict[str, str]:

@@ -88,11 +88,11 @@ def build_shared(
     compiler = find_compiler()
     progress(f"deriving and emitting {spec.key}", 0.0)
     files = {**runtime_sources(), **generate(spec).files, **others}
-    files = {each: text for each, text in sorted(files.items()) if each.endswith((".c", ".h"))}
-    for each, text in files.items():
-        write_text(folder / each, text)
+    files = {file: text for file, text in sorted(files.items()) if file.endswith((".c", ".h"))}
+    for file, text in files.items():
+        write_text(folder / file, text)
     log = Log(folder)
-    objects = _compile([each for each in files if each.endswith(".c")], model_name(spec), compiler, log, progress)
+    objects = _compile([file for file in files if file.endswith(".c")], model_name(spec), compiler, log, progress)
     write_text(folder / EXPORTS, f"{{ global: {exported}; local: *; }};\n")
     # A missing symbol fails the build, and not the program that loads the library.
     linux = ("-shared", f"-Wl,--version-script={EXPORTS}", "-Wl,-z,defs")
@@ -118,16 +118,16 @@ def _write_sources(
     """Write the C files and headers of each model into a folder of its own; returns their texts."""
     from msfp_gen.generator import generate
 
-    found: dict[str, dict[str, str]] = {}
+    sources: dict[str, dict[str, str]] = {}
     for i, spec in enumerate(specs):
         progress(f"deriving and emitting {spec.key}", GENERATION_SHARE * i / len(specs))
         files = {**runtime_sources(), **generate(spec).files}
-        found[model_name(spec)] = {name: text for name, text in sorted(files.items()) if name.endswith((".c", ".h"))}
-    for model, files in found.items():
+        sources[model_name(spec)] = {name: text for name, text in sorted(files.items()) if name.endswith((".c", ".h"))}
+    for model, files in sources.items():
         (folder / model).mkdir()
         for name, text in files.items():
             write_text(folder / model / name, text)
-    return found
+    return sources
 
 
 def _link_step(compiler: Compiler, options: Sequence[str], objects: Sequence[str], target: str) -> Step:

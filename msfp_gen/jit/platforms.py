@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION
-from msfp_gen.jit.compiler import ZIG_OPTIONS, Compiler, find_compiler, zig_program
-from msfp_gen.jit.options import words
+from msfp_gen.jit.compiler import ZIG_OPTIONS, Compiler, find_compiler, words, zig_program
 
 EXPORTS = "msfp.map"  # what a shared library for Linux shows: one function of each model
 WINDOWS_IMPORT = "libmsfp.dll.a"
@@ -89,10 +88,10 @@ def find_tools(platform: Platform) -> tuple[Compiler, tuple[str, ...]]:
 
 def _find_archiver() -> tuple[str, ...]:
     """The archiver that `AR` names, else `ar`, else that of ziglang. Raises CompileError where there is none."""
-    given = words("AR")
-    command = given or ("ar",)
+    named = words("AR")
+    command = named or ("ar",)
     if shutil.which(command[0]) is not None:
         return command
-    if not given and (zig := zig_program()) is not None:
+    if not named and (zig := zig_program()) is not None:
         return (str(zig), "ar")
     raise CompileError(f"no archiver found (looked for {command[0]}): install binutils or name it with AR=...")

@@ -52,8 +52,8 @@ def cached_models() -> list[CachedModel]:
     if not root.is_dir():
         return []
     inputs = _current_inputs()
-    found = [_cached_model(path, inputs) for path in root.iterdir() if _NAME.fullmatch(path.name) and path.is_dir()]
-    return sorted((item for item in found if item is not None), key=lambda item: -item.used)
+    models = [_cached_model(path, inputs) for path in root.iterdir() if _NAME.fullmatch(path.name) and path.is_dir()]
+    return sorted((item for item in models if item is not None), key=lambda item: -item.used)
 
 
 def prune(days: float) -> tuple[list[CachedModel], list[CachedModel]]:

@@ -101,11 +101,11 @@ def top_values(top: Top | None, anchor: ArrayLike = (0.0, 0.0)) -> Array:
     """
     values = dict.fromkeys(contract.names(contract.TOP), 0.0)
     values["anchor_x"], values["anchor_y"] = np.asarray(anchor, dtype=float)
-    given = {} if top is None else vars(top)
+    numbers = {} if top is None else vars(top)
     if isinstance(top, MassTop):
         inertia = top.inertia if isinstance(top.inertia, tuple) else (top.inertia, top.inertia)
-        given = {**given, "inertia_transverse": inertia[0], "inertia_axial": inertia[1]}
-    values |= {name: value for name, value in given.items() if name in values and value is not None}
+        numbers = {**numbers, "inertia_transverse": inertia[0], "inertia_axial": inertia[1]}
+    values |= {name: value for name, value in numbers.items() if name in values and value is not None}
     return np.array([float(value) for value in values.values()])
 
 

@@ -118,9 +118,9 @@ class Ode:
         base = self._base(t)
         a, row, *_ = self._accelerations(t, y)
         # The unknowns of `fun` are used here: solving the balances again could converge to another root.
-        found, free = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
-        angles = found["angles"][:, 1:] if self.model.planar else found["angles"]
-        unknowns = np.concatenate([a[:, free].ravel(), angles.ravel(), found["normal"]])
+        jacobians, free = self.model.unpack(row), [1] if self.model.planar else [0, 1, 2]
+        angles = jacobians["angles"][:, 1:] if self.model.planar else jacobians["angles"]
+        unknowns = np.concatenate([a[:, free].ravel(), angles.ravel(), jacobians["normal"]])
         inner, outer = unknown_columns(self.count, self.model.planar), state_columns(self.count)
         _, jacobian, rates = self.stack.report(q, v, h, base, self.load, unknowns, [*inner, *outer])
         split = len(inner)

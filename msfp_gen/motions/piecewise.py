@@ -47,8 +47,8 @@ def powers(values: ArrayLike, count: int = ORDER) -> Array:
     """
     factors = np.repeat(np.asarray(values, dtype=float)[..., None], count, axis=-1)
     factors[..., 0] = 1.0
-    found: Array = np.cumprod(factors, axis=-1)
-    return found
+    result: Array = np.cumprod(factors, axis=-1)
+    return result
 
 
 def derivatives(local: float, orders: int = 3) -> Array:

@@ -124,7 +124,7 @@ class Prescribed:
         end = max(self.duration, other.duration)
         one, two = self.until(end), other.until(end)
         knots = np.union1d(one.knots, two.knots)
-        pieces = [piecewise.refined(each.knots, each.coefficients, knots) for each in (one, two)]
+        pieces = [piecewise.refined(history.knots, history.coefficients, knots) for history in (one, two)]
         return type(self)(knots, pieces[0] + pieces[1], " + ".join(n for n in (self.name, other.name) if n))
 
     @classmethod

@@ -126,8 +126,8 @@ def distinct_times(times: Array) -> Array:
     """Times, shape (k,) [s], in increasing order; of times that are equal to `TIME_TOLERANCE` only the first."""
     ordered: Array = np.unique(times)
     distinct = np.append(True, np.diff(ordered) > TIME_TOLERANCE * np.maximum(1.0, ordered[1:]))
-    found: Array = ordered[distinct[: len(ordered)]]
-    return found
+    kept: Array = ordered[distinct[: len(ordered)]]
+    return kept
 
 
 def short_pieces(knots: Array) -> Array:
@@ -168,8 +168,8 @@ def _in_vectors(coefficients: Array) -> Array:
 def _sizes(knots: Array, pieces: Array, order: int) -> Array:
     """Largest magnitude of a derivative of each vector, shape (vectors,); 1 where the derivative is zero."""
     width = np.diff(knots)
-    found = [np.abs(_at(pieces, share * width, order)).max(axis=(0, 2)) for share in (0.0, 0.5, 1.0)]
-    size: Array = np.max(found, axis=0)
+    sizes = [np.abs(_at(pieces, share * width, order)).max(axis=(0, 2)) for share in (0.0, 0.5, 1.0)]
+    size: Array = np.max(sizes, axis=0)
     size[size == 0] = 1.0
     return size
 
@@ -186,11 +186,11 @@ def _deviations(knots: Array, pieces: Array, order: int, size: Array) -> Array:
     the jumps of all higher derivatives (Taylor), relative to `size`.
     """
     width = np.diff(knots)
-    shorter, found = np.minimum(width[:-1], width[1:])[:, None, None], np.zeros(pieces[1:, ..., 0].shape)
+    shorter, deviations = np.minimum(width[:-1], width[1:])[:, None, None], np.zeros(pieces[1:, ..., 0].shape)
     for d in range(order, ORDER):
         jump = np.abs(factorial(d) * pieces[1:, ..., d] - _at(pieces[:-1], width[:-1], d))
-        found += jump * shorter ** (d - order) / factorial(d - order)
-    deviation: Array = (found.max(axis=2) / size).max(axis=1, initial=0.0)
+        deviations += jump * shorter ** (d - order) / factorial(d - order)
+    deviation: Array = (deviations.max(axis=2) / size).max(axis=1, initial=0.0)
     return deviation
 
 
@@ -223,16 +223,16 @@ def _pieces_approximated(
     """
     count = len(pieces)
     blocked = np.append(kinked, True) if direction > 0 else np.append(True, kinked)  # by a kink or the end
-    found, candidate, stride = np.zeros(count, dtype=np.intp), ~blocked, 1
+    approximated, candidate, stride = np.zeros(count, dtype=np.intp), ~blocked, 1
     while stride < count and candidate.any():
         index = np.flatnonzero(candidate)
         index = index[(index + direction * stride >= 0) & (index + direction * stride < count)]
         index = index[_approximates(knots, pieces, index, direction * stride, sizes)]
-        found[index] = stride
+        approximated[index] = stride
         candidate = np.zeros(count, dtype=bool)
-        candidate[index[found[index + direction * stride] == stride]] = True
+        candidate[index[approximated[index + direction * stride] == stride]] = True
         stride *= 2
-    return found
+    return approximated
 
 
 def _approximates(knots: Array, pieces: Array, index: Indices, stride: int, sizes: Mapping[int, Array]) -> Flags:

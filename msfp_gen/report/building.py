@@ -41,7 +41,7 @@ TERMS = (
 
 def scale_of(result: BuildingResult) -> int:
     """The magnification with which the view opens: displacements are seen and bearings stay apart."""
-    peak = max(each.summary["peak_displacement"]["radial"] for each in result.bearings)
+    peak = max(bearing.summary["peak_displacement"]["radial"] for bearing in result.bearings)
     wanted = SHOWN * size_of(result.scene) / peak if peak > 0 else 1.0
     return max((scale for scale in SCALES if scale <= wanted), default=1)
 
@@ -50,13 +50,13 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     """Data for the scripts, ready for JSON: lengths [m], forces [N], accelerations [m/s^2], axes E1, E2, E3."""
     scene, rows = result.scene, _rows(result, count)
     nodes = [result.node(node.name)[rows] for node in scene.building.nodes]
-    motion = np.stack([each[:, 0] for each in nodes], axis=1)
+    motion = np.stack([node[:, 0] for node in nodes], axis=1)
     motion[..., :3] -= result.ground[rows, None, 0]
     low, high = plan_of(scene)
     size = size_of(scene)
-    bearings = [each.displacement[rows] for each in result.bearings]
+    bearings = [bearing.displacement[rows] for bearing in result.bearings]
     mean = np.mean(bearings, axis=0)
-    left = np.stack([(each.capacity - each.sliding[rows]).min(axis=1) for each in result.bearings], axis=1)
+    left = np.stack([(bearing.capacity - bearing.sliding[rows]).min(axis=1) for bearing in result.bearings], axis=1)
     heights = np.diff([node.position[2] for node in scene.building.nodes])
     drift = np.hypot(*np.moveaxis(result.drift[rows, :, :2], -1, 0))
     frames = {
@@ -68,7 +68,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "left": left,
         "mean": mean,
         "shear": result.base_reaction[rows, :2],
-        "acceleration": np.stack([each[:, 2, :3] for each in nodes], axis=1),
+        "acceleration": np.stack([node[:, 2, :3] for node in nodes], axis=1),
         "drift": drift / heights[: drift.shape[1]] if drift.shape[1] else drift,
     }
     return {
@@ -79,7 +79,7 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
         "plates": bool(scene.building.columns),
         "storeys": [column.name for column in scene.building.columns],
         "places": [[*place, level_of(scene, index)] for index, place in enumerate(scene.places.tolist())],
-        "labels": [each.name or str(index + 1) for index, each in enumerate(scene.bearings)],
+        "labels": [bearing.name or str(index + 1) for index, bearing in enumerate(scene.bearings)],
         "loads": scene.axial_loads.tolist(),
         "plan": [low.tolist(), high.tolist()],
         "size": size,
@@ -121,6 +121,6 @@ def _rows(result: BuildingResult, count: int) -> Array:
     """Rows of the view: evenly in time, with the peaks of displacement and axial force."""
     time = result.time
     even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
-    peaks = [int(np.hypot(*each.displacement[:, :2].T).argmax()) for each in result.bearings]
+    peaks = [int(np.hypot(*bearing.displacement[:, :2].T).argmax()) for bearing in result.bearings]
     least = result.axial_force.argmin(axis=0).tolist()
     return np.unique([*even.round().astype(int), *peaks, *least])

@@ -101,7 +101,7 @@ def _values(fit: Fit) -> Table:
     """The table of estimates with the change from the start and the bounds."""
     table = estimate_table(fit)
     pairs = zip(table.rows, fit.estimates, strict=True)
-    rows = [(*row, _run_error(each), _change(each), _bounds(each)) for row, each in pairs]
+    rows = [(*row, _run_error(estimate), _change(estimate), _bounds(estimate)) for row, estimate in pairs]
     return Table(table.title, (*table.columns, "error of the runs", "change", "bounds"), rows)
 
 

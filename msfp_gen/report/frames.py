@@ -114,10 +114,10 @@ def quaternions(where: Poses) -> Array:
 
 def states(history: History) -> Array:
     """State of every surface as index into `STATES`, shape (T, n-1)."""
-    found = np.where(sliding_surfaces(history), 1.0, 0.0)
-    found[history.gap <= 0] = 2.0
-    found[separated(history) | (history.normal_force <= 0)] = 3.0
-    return found
+    result = np.where(sliding_surfaces(history), 1.0, 0.0)
+    result[history.gap <= 0] = 2.0
+    result[separated(history) | (history.normal_force <= 0)] = 3.0
+    return result
 
 
 def pieces(bearing: Bearing, body: int) -> list[dict[str, Any]]:

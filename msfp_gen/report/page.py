@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +19,7 @@ from msfp_gen.report.content import (
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, view
-from msfp_gen.report.template import asset, picture, render
+from msfp_gen.report.template import asset, picture, render, script_data
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
@@ -86,23 +84,23 @@ def report_html(
     from markupsafe import Markup
 
     if isinstance(result, BuildingResult):
-        given = _of_building(result, frames, progress)
+        content = _of_building(result, frames, progress)
     else:
-        given = _of_bearing(result, frames, progress)
-    scripts, data = given.pop("scripts"), given.pop("data")
+        content = _of_bearing(result, frames, progress)
+    scripts, data = content.pop("scripts"), content.pop("data")
     return render(
         "page.html.jinja",
-        **given,
+        **content,
         characterisation=characterisation_page(result),
         settings=explain(result.scene),
         provenance=provenance_table(result),
         name=result.scene.name or "unnamed scene",
         kind="report",
-        title_block=title.rows(given["device"]),
+        title_block=title.rows(content["device"]),
         outcome=outcome(result.status, result.message),
         succeeded=result.succeeded,
         speeds=SPEEDS,
-        data=Markup(_escaped(json.dumps(data, allow_nan=False, separators=(",", ":")))),
+        data=script_data(data),
         scripts=[Markup(asset(name)) for name in scripts],
     )
 
@@ -144,7 +142,7 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
         "moving": "The building in motion",
         "stage": Markup(stage),
         "lead": building.introduction(result),
-        "device": ", ".join(dict.fromkeys(kind_of(each.bearing) for each in result.scene.bearings)),
+        "device": ", ".join(dict.fromkeys(kind_of(bearing.bearing) for bearing in result.scene.bearings)),
         "terms": building.TERMS,
         "summary": building.summary_page(result),
         "scene": scene_text(result.scene),
@@ -173,8 +171,3 @@ def _pictures(
         if progress is not None:
             progress(done, len(titles))
         yield drawn
-
-
-def _escaped(text: str) -> str:
-    """JSON with <, > and & escaped, so that no text in it can end the script element."""
-    return re.sub(r"[<>&]", lambda found: f"\\u{ord(found[0]):04x}", text)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import json
+import re
 from importlib.resources import files
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
 RESOLUTION = 110  # dots per inch of the figures
@@ -36,3 +39,11 @@ def picture(title: str, figure: Figure) -> dict[str, str]:
 def asset(name: str) -> str:
     """A file of assets/ as text."""
     return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def script_data(data: Any) -> Markup:
+    """Data as JSON inside a script element, which no text in it can end: <, > and & are escaped."""
+    from markupsafe import Markup
+
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return Markup(re.sub(r"[<>&]", lambda match: f"\\u{ord(match[0]):04x}", text))

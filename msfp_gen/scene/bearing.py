@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.fields import check_fields, errors_at, paired, require_type
 from msfp_gen.errors import InputError
-from msfp_gen.scene.pivot_friction import friction_from_pivot
 from msfp_gen.specification import contract
 from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.specification.layout import Layout
@@ -157,9 +156,9 @@ class Bearing:
     def __repr__(self) -> str:
         """Layout, and the values of every surface and body, bottom first, in seven lines."""
         columns = {"R [m]": "radius", "s_c [m]": "capacity", "mu": "friction", "d_y [m]": "yield_displacement"}
-        rows = {label: [getattr(each, name) for each in self.surfaces] for label, name in columns.items()}
-        rows |= {"l [m]": [self.base_height, *(each.height for each in self.bodies)]}
-        rows |= {"m [kg]": [each.mass for each in self.bodies]}
+        rows = {label: [getattr(part, name) for part in self.surfaces] for label, name in columns.items()}
+        rows |= {"l [m]": [self.base_height, *(part.height for part in self.bodies)]}
+        rows |= {"m [kg]": [part.mass for part in self.bodies]}
         lines = (f"  {label:<9}{', '.join(f'{x:.4g}' for x in values)}" for label, values in rows.items())
         return "\n".join([f"Bearing {self.layout.name}", *lines])
 
@@ -195,7 +194,7 @@ class Bearing:
 
         A field of surfaces or bodies takes a list, bottom first (`friction=[0.064, 0.168, 0.168, 0.064]`), or one value
         for all. With `friction_at="pivot"` the coefficients in `friction` are those of a data sheet, which refer to the
-        pivot of the bearing, and are converted: `pivot_friction.friction_from_pivot`. Raises InputError: an unknown
+        pivot of the bearing, and are converted: `friction_from_pivot`. Raises InputError: an unknown
         name, a list of the wrong length, or an invalid value.
         """
         at_pivot = _is_at_pivot(changes.pop("friction_at", "surface"), "friction" in changes)
@@ -203,12 +202,12 @@ class Bearing:
         own = {name: changes.pop(name) for name in _names(Bearing) if name in changes}
         base = dataclass_replace(self, **own)
         rows = {name: list(getattr(base, name)) for name in _LISTS}
-        for column, given in changes.items():
+        for column, entry in changes.items():
             if column not in list_of:
                 known = ", ".join([*_names(Bearing), *list_of])
                 raise InputError(f"bearing.{column}: unknown name; give one of {known}")
             items = rows[list_of[column]]
-            values = _expanded(column, given, len(items))
+            values = _expanded(column, entry, len(items))
             for index, value in enumerate(values):
                 with errors_at(type(items[index]).__name__.lower(), f"bearing.{list_of[column]}[{index}]"):
                     items[index] = dataclass_replace(items[index], **{column: value})
@@ -268,3 +267,45 @@ def _expanded(column: str, value: Any, count: int) -> list[Any]:
     if len(value) != count:
         raise InputError(f"bearing.{column} has {len(value)} entries: give {count}, or one value for all")
     return list(value)
+
+
+def friction_from_pivot(
+    layout: Layout, radii: Sequence[float], heights: Sequence[float], coefficients: Sequence[float]
+) -> list[float]:
+    """Friction coefficients mu of the surfaces [-], from those of a data sheet, which refer to the pivot.
+
+    Published formulas let friction act at the pivot, the middle of the innermost slider, and not at the sliding
+    surface. The coefficient of an outer surface in such a formula contains the lever arms of the inner ones:
+    docs/devices.md, "Which friction a data sheet means". With R_eff the distance from the sphere centre to the pivot
+    and ' for the next surface towards the pivot: mu = (mu_pivot (R_eff - R_eff') + mu' R')/R.
+
+    Args:
+        layout: of the bearing, with as many surfaces concave up as down.
+        radii: radius of each surface, bottom first [m].
+        heights: height of each body, base first [m].
+        coefficients: coefficient of each surface at the pivot, bottom first.
+
+    Raises:
+        InputError: the pivot of the layout is not the middle of a slider, or a coefficient would be negative.
+    """
+    if layout.m != layout.p:
+        raise InputError(
+            f"bearing.friction_at = 'pivot': layout {layout.name} has {layout.m} surfaces concave up and {layout.p} "
+            "down, so its pivot is not the middle of its inner slider; give the coefficients at the surfaces"
+        )
+    interfaces = [sum(heights[: index + 1]) for index in range(layout.surfaces)]
+    pivot = (interfaces[layout.m - 1] + interfaces[layout.m]) / 2
+    arms = [abs(z + sign * R - pivot) for z, sign, R in zip(interfaces, layout.signs, radii, strict=True)]
+    converted = [0.0] * layout.surfaces
+    for chain in (range(layout.m - 1, -1, -1), range(layout.m, layout.surfaces)):
+        inner_arm = inner_moment = 0.0
+        for index in chain:
+            moment = coefficients[index] * (arms[index] - inner_arm) + inner_moment
+            if moment < 0:
+                raise InputError(
+                    f"bearing.surfaces[{index}].friction = {coefficients[index]:g} at the pivot: that of the surface "
+                    "itself would be negative; give a larger one, or coefficients at the surfaces"
+                )
+            converted[index] = moment / radii[index]
+            inner_arm, inner_moment = arms[index], moment
+    return converted

@@ -19,7 +19,7 @@ from msfp_gen.specification.layout import Auto, Effects
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
 
 
 def response_time(bearing: Bearing, top: Top, load: float) -> float:
@@ -43,7 +43,7 @@ def motion_time_scale(motion: Motion, times: Array) -> float:
     return float(velocity / acceleration) if acceleration > 0 else inf
 
 
-def turned_or_pushed(scene: SceneParts) -> bool:
+def turned_or_pushed(scene: SceneFields) -> bool:
     """Whether base or top rotate, or a load history has other components than the vertical one."""
     turned = scene.top_rotation is not None or np.any(scene.motion.coefficients[:, 3:])
     return bool(turned or (scene.load is not None and np.any(scene.load.coefficients[:, [0, 1, 3, 4, 5]])))
@@ -56,28 +56,28 @@ USUAL_DAMPING = 0.02  # ratio that is named as the remedy
 LARGEST_TILT = 0.5  # sliding capacity over radius; beyond it a slider tilts by more than 28 degrees
 
 
-def scene_doubts(scene: SceneParts) -> Iterator[tuple[int, float, str]]:
+def scene_doubts(scene: SceneFields) -> Iterator[tuple[int, float, str]]:
     """Those of the bearing of a scene, and of what holds its top plate up."""
     yield from doubtful_values(scene.bearing)
     if standing := standing_of(scene):
         yield from unsteady(*standing[:3])
     if (mass := sprung_mass(scene.top)) and isinstance(scene.top, MassTop):
         turn = np.sqrt((scene.top.vertical_stiffness or 0.0) / mass)
-        given = scene.top.vertical_damping
-        ratio, cure = given / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
+        damping = scene.top.vertical_damping
+        ratio, cure = damping / (2 * turn * mass), 2 * USUAL_DAMPING * turn * mass
         if ratio < LEAST_DAMPING:
             name, what = "top.vertical_damping", "the mass vibrates on its vertical spring"
-            yield 0, ratio, ringing(name, given, what, turn, ratio, cure)
+            yield 0, ratio, ringing(name, damping, what, turn, ratio, cure)
 
 
-def ringing(path: str, given: float, what: str, turn: float, ratio: float, cure: float) -> str:
+def ringing(path: str, damping: float, what: str, turn: float, ratio: float, cure: float) -> str:
     """The text of a doubt about a vibration that rings on.
 
-    path: of the damping in messages. given: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
+    path: of the damping in messages. damping: its value. what: vibrates, at the circular frequency `turn` [rad/s] with
     the damping ratio `ratio`. cure: damping with which it has `USUAL_DAMPING`.
     """
     return (
-        f"{path} = {given:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
+        f"{path} = {damping:g}: {what} at {turn / (2 * np.pi):.3g} Hz with {ratio:.1%} of critical damping and rings "
         f"on: accelerations and rotations depend on the tolerance by several per cent; give {cure:.3g} N s/m for "
         f"{USUAL_DAMPING:.0%}"
     )
@@ -139,7 +139,7 @@ class EffectSelection:
     error: float = 0.005
 
 
-def select_effects(scene: SceneParts) -> EffectSelection:
+def select_effects(scene: SceneFields) -> EffectSelection:
     """The effects of a scene: as given, or selected. Raises InputError where the given ones contradict each other."""
     requested = scene.effects
     if isinstance(requested, Effects):
@@ -159,14 +159,14 @@ def select_effects(scene: SceneParts) -> EffectSelection:
     return EffectSelection(effects, reasons, plane_until, requested.error)
 
 
-def _given(requested: Auto, name: str) -> Reason | None:
+def _fixed(requested: Auto, name: str) -> Reason | None:
     value = getattr(requested, name)
     return None if value is None else Reason(name, value, GIVEN)
 
 
-def _dimension(scene: SceneParts, requested: Auto) -> tuple[Reason, float]:
-    if (given := _given(requested, "dimension")) is not None:
-        return given, inf
+def _dimension(scene: SceneFields, requested: Auto) -> tuple[Reason, float]:
+    if (fixed := _fixed(requested, "dimension")) is not None:
+        return fixed, inf
     azimuth, until, name = scene_plane(scene)
     if until < MIN_PLANAR_SHARE * scene.end:
         return Reason("dimension", "spatial", f"the {name} leaves every vertical plane at {until:.4g} s"), inf
@@ -178,9 +178,9 @@ def _dimension(scene: SceneParts, requested: Auto) -> tuple[Reason, float]:
     return Reason("dimension", "planar", because, saves), inf
 
 
-def _rims(scene: SceneParts, requested: Auto) -> Reason:
-    if (given := _given(requested, "rims")) is not None:
-        return given
+def _rims(scene: SceneFields, requested: Auto) -> Reason:
+    if (fixed := _fixed(requested, "rims")) is not None:
+        return fixed
     if scene.stop is not None and scene.stop.all_rims:
         return Reason("rims", True, "the stop condition is contact at all rims")
     capacity = min(surface.capacity for surface in scene.bearing.surfaces)
@@ -194,13 +194,13 @@ def _rims(scene: SceneParts, requested: Auto) -> Reason:
     return Reason("rims", True, because)
 
 
-def _farthest(scene: SceneParts) -> float:
+def _farthest(scene: SceneFields) -> float:
     """Largest horizontal distance of the base from its position at the start [m]."""
     path = scene.motion.evaluate(_sampled_times(scene))[:, :2]
     return float(np.linalg.norm(path - path[0], axis=1).max())
 
 
-def _initial_sliding(scene: SceneParts) -> float:
+def _initial_sliding(scene: SceneFields) -> float:
     """Largest sliding displacement of a surface in the initial state [m]; an upper bound."""
     if scene.initial_state is None:
         return 0.0
@@ -208,13 +208,13 @@ def _initial_sliding(scene: SceneParts) -> float:
     return float(np.max(tilt * [surface.radius for surface in scene.bearing.surfaces]))
 
 
-def _sliders(scene: SceneParts, requested: Auto, others: Effects, plane_until: float) -> Reason:
+def _sliders(scene: SceneFields, requested: Auto, others: Effects, plane_until: float) -> Reason:
     """Massless only where quasi-static steps apply: elsewhere leaving inertia out saves little and costs accuracy.
 
     others: the effects selected before. plane_until: time at which a planar scene leaves its plane [s].
     """
-    if (given := _given(requested, "sliders")) is not None:
-        return given
+    if (fixed := _fixed(requested, "sliders")) is not None:
+        return fixed
     if because := _requires_inertia(scene, others, plane_until):
         return Reason("sliders", "inertial", because)
     share, limit = inertia_share(scene), inertia_limit(scene, requested.error)
@@ -231,7 +231,7 @@ def _sliders(scene: SceneParts, requested: Auto, others: Effects, plane_until: f
     return Reason("sliders", "massless", because, "integration in time: quasi-static steps solve the force balance")
 
 
-def _requires_inertia(scene: SceneParts, others: Effects, plane_until: float) -> str:
+def _requires_inertia(scene: SceneFields, others: Effects, plane_until: float) -> str:
     """Why sliders of any mass need inertia; empty where quasi-static steps apply, which do without it."""
     reasons = {
         "a separated body moves by its inertia": others.uplift,
@@ -240,13 +240,13 @@ def _requires_inertia(scene: SceneParts, others: Effects, plane_until: float) ->
         "quasi-static steps need motion in one vertical plane": others.dimension != "planar" or plane_until < scene.end,
         "its limits are for a base that only translates, and for vertical loads": turned_or_pushed(scene),
     }
-    found = next((because for because, holds in reasons.items() if holds), "")
-    return found or _rate_dependence(scene, replace(others, sliders="massless"))
+    reason = next((because for because, holds in reasons.items() if holds), "")
+    return reason or _rate_dependence(scene, replace(others, sliders="massless"))
 
 
-def _friction(scene: SceneParts, requested: Auto) -> Reason:
-    if (given := _given(requested, "friction")) is not None:
-        return given
+def _friction(scene: SceneFields, requested: Auto) -> Reason:
+    if (fixed := _fixed(requested, "friction")) is not None:
+        return fixed
     word, _ = scene.law
     saves = "the thermal states of every surface, until the temperature rise is significant" if word == "pv" else ""
     because = {
@@ -256,9 +256,9 @@ def _friction(scene: SceneParts, requested: Auto) -> Reason:
     return Reason("friction", word, because, saves)
 
 
-def _uplift(scene: SceneParts, requested: Auto) -> Reason:
-    if (given := _given(requested, "uplift")) is not None:
-        return given
+def _uplift(scene: SceneFields, requested: Auto) -> Reason:
+    if (fixed := _fixed(requested, "uplift")) is not None:
+        return fixed
     if requested.sliders == "massless" or scene.solver.method == "dopri5":
         because = "massless sliders and the explicit method exclude separation; normal forces are monitored"
         return Reason("uplift", False, because)
@@ -269,18 +269,18 @@ def _uplift(scene: SceneParts, requested: Auto) -> Reason:
     return Reason("uplift", True, because)
 
 
-def load_at_rest(scene: SceneParts) -> float:
+def load_at_rest(scene: SceneFields) -> float:
     """Vertical load on the lowest surface at the start, without accelerations; downward positive [N]."""
     weights = scene.bearing.gravity * sum(body.mass for body in scene.bearing.bodies)
     return float(_applied_load(scene, 0.0)) + _supported_mass(scene) * scene.bearing.gravity + weights
 
 
-def minimum_load(scene: SceneParts) -> float:
+def minimum_load(scene: SceneFields) -> float:
     """Smallest vertical load on the lowest surface if all masses follow the vertical motion of the base [N]."""
     return float(np.min(_loads(scene)))
 
 
-def rigid_mass_limit(scene: SceneParts) -> float:
+def rigid_mass_limit(scene: SceneFields) -> float:
     """Normal force [N] above which the contacts of a stack under a rigid mass must not be rigid; 0 for other tops.
 
     It is `PEAK_LOAD_SHARE` times the largest vertical load if all masses follow the vertical motion of the base. A
@@ -290,7 +290,7 @@ def rigid_mass_limit(scene: SceneParts) -> float:
     return PEAK_LOAD_SHARE * float(np.max(_loads(scene))) if rigid else 0.0
 
 
-def _loads(scene: SceneParts) -> Array:
+def _loads(scene: SceneFields) -> Array:
     """Vertical loads on the lowest surface if all masses follow the vertical motion of the base [N]."""
     times = _sampled_times(scene)
     vertical = scene.motion.evaluate(times, 2)[:, 2]
@@ -299,7 +299,7 @@ def _loads(scene: SceneParts) -> Array:
     return inertial + _applied_load(scene, times) + _held_load(scene, times)
 
 
-def _held_load(scene: SceneParts, times: Array) -> Array | float:
+def _held_load(scene: SceneFields, times: Array) -> Array | float:
     """Force of the vertical spring of a rig if the top plate rises and falls with the base, downward positive [N]."""
     if not isinstance(scene.top, RigTop):
         return 0.0
@@ -307,25 +307,25 @@ def _held_load(scene: SceneParts, times: Array) -> Array | float:
     return np.asarray(scene.top.vertical_stiffness * rise)
 
 
-def _supported_mass(scene: SceneParts) -> float:
+def _supported_mass(scene: SceneFields) -> float:
     """Mass of the top [kg]."""
     return scene.top.mass if isinstance(scene.top, MassTop) else 0.0
 
 
-def _applied_load(scene: SceneParts, time: ArrayLike) -> Array:
+def _applied_load(scene: SceneFields, time: ArrayLike) -> Array:
     """Vertical force of the top and the load history at `time` [s], downward positive [N]."""
     history = 0.0 if scene.load is None else scene.load.evaluate(time)[..., 2]
     return -np.asarray(load_values(scene.top)[2] + history)
 
 
-def inertia_share(scene: SceneParts) -> float:
+def inertia_share(scene: SceneFields) -> float:
     """Largest inertial force of a body over the load at rest, if the bodies follow the base [-]."""
     peak = float(np.linalg.norm(scene.motion.evaluate(_sampled_times(scene), 2)[:, :3], axis=1).max())
     rest = load_at_rest(scene)
     return max(body.mass for body in scene.bearing.bodies) * peak / rest if rest > 0 else inf
 
 
-def quasistatic(scene: SceneParts, effects: Effects) -> bool:
+def quasistatic(scene: SceneFields, effects: Effects) -> bool:
     """Whether a run with these effects takes quasi-static steps: no force depends on a rate, within the tolerance.
 
     Conditions: a planar model without masses and with closed-form friction, no supported mass, the method "implicit",
@@ -334,7 +334,7 @@ def quasistatic(scene: SceneParts, effects: Effects) -> bool:
     return effects.dimension == "planar" and effects.sliders == "massless" and not _rate_dependence(scene, effects)
 
 
-def _rate_dependence(scene: SceneParts, effects: Effects) -> str:
+def _rate_dependence(scene: SceneFields, effects: Effects) -> str:
     """Why a planar run without masses is integrated in time; empty where it takes quasi-static steps."""
     share, limit = damping_share(scene), min(1e-3, 1e3 * scene.solver.rtol)
     reasons = {
@@ -346,7 +346,7 @@ def _rate_dependence(scene: SceneParts, effects: Effects) -> str:
     return next((because for because, holds in reasons.items() if holds), "")
 
 
-def damping_share(scene: SceneParts) -> float:
+def damping_share(scene: SceneFields) -> float:
     """Force of the dampers over the friction force, if everything moves as the base does; inf without friction [-].
 
     The rate of rotation of the top plate has two bounds: the slip velocity over a radius, and, while friction reverses
@@ -366,12 +366,12 @@ def damping_share(scene: SceneParts) -> float:
     return share
 
 
-def inertia_limit(scene: SceneParts, error: float) -> float:
+def inertia_limit(scene: SceneFields, error: float) -> float:
     """Permitted inertial force over N: `error`, a share of the friction force, times the largest coefficient [-]."""
     return error * max(surface.friction for surface in scene.bearing.surfaces)
 
 
-def slider_period(scene: SceneParts) -> float:
+def slider_period(scene: SceneFields) -> float:
     """Longest period of a slider on its stuck surface, 2 pi sqrt(m/(mu N/d_y + N/R)) [s]."""
     rest, longest = load_at_rest(scene), 0.0
     for index, surface in enumerate(scene.bearing.surfaces):
@@ -380,7 +380,7 @@ def slider_period(scene: SceneParts) -> float:
     return float(2 * np.pi * np.sqrt(longest))
 
 
-def _sampled_times(scene: SceneParts) -> Array:
+def _sampled_times(scene: SceneFields) -> Array:
     """Times at which motion and load are evaluated: their knots, and 1001 evenly spaced ones."""
     load_knots = () if scene.load is None else scene.load.knots
     times = np.concatenate([scene.motion.knots, load_knots, np.linspace(0, scene.end, 1001)])

@@ -1,18 +1,29 @@
-"""Effects of a run: those that a method supports; the monitors that end a segment, and the effects of the next one; all
-effects that may follow on each other.
+"""Effects of a run: those that a method supports; the monitors of what a model leaves out, with the limits beyond which
+that matters (docs/effects.md); those that end a segment, and the effects of the next one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
 
 from msfp_gen.errors import InputError
+from msfp_gen.scene.effect_selection import (
+    UPLIFT_MONITOR_SHARE,
+    EffectSelection,
+    inertia_limit,
+    load_at_rest,
+    rigid_mass_limit,
+    slider_period,
+)
+from msfp_gen.scene.friction_parameters import checked_range, heated_contacts, thermal_softening
 from msfp_gen.specification.layout import Auto, Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
     from msfp_gen.scene.solver import Solver
 
 # The effects that a model needs after a monitor has tripped.
@@ -100,7 +111,7 @@ def next_effects(scene: Requested, ending: Ending) -> Effects | None:
     return extended
 
 
-def all_effects(scene: SceneParts) -> Effects:
+def all_effects(scene: SceneFields) -> Effects:
     """The effects of a scene if nothing is left to monitors: every effect that one of them may add is modelled.
 
     Those of which the scene fixes a field stay as they are, and so does a friction law without further parameters.
@@ -128,3 +139,47 @@ def _extended(scene: Requested, effects: Effects, name: str) -> Effects | None:
     if not needed or any(getattr(requested, key) is not None for key in needed):
         return None
     return replace(effects, **needed)  # type: ignore[arg-type]
+
+
+NOTED_SOFTENING = 0.05  # relative change of friction by heat that is noted where the law has no temperature
+
+
+def _significant_rise(scene: SceneFields, effects: Effects, selection: EffectSelection) -> float:
+    """Temperature rise at which the monitor of heat trips [K]; see `thermal_softening`."""
+    softening = thermal_softening(effects.law, scene.bearing)
+    change = selection.error if effects.friction == "pv" else NOTED_SOFTENING
+    return change / softening if softening > 0 else 0.0
+
+
+def monitor_options(
+    scene: SceneFields,
+    effects: Effects,
+    selection: EffectSelection,
+    stops: tuple[str, ...],
+    noted: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    """Monitors of everything that the model leaves out, and their limits, as arguments of the compiled run.
+
+    stops: the monitors that stop it. noted: "uplift", where a load below its limit is to be noted without them.
+    """
+    heats = effects.law is not None and effects.law.depends_on_temperature
+    left_out = {
+        "rims": not effects.rims,
+        "uplift": "uplift" in (*stops, *noted) and not effects.uplift,
+        "inertia": effects.sliders == "massless",
+        "heat": not heats,
+    }
+    checked = checked_range(effects.law, scene.bearing, lower_load_limit=not effects.uplift)
+    left_out |= {name: name in checked for name in ("law_speed", "law_load", "law_temperature")}
+    heating, reach = np.array(heated_contacts(scene.bearing)).T
+    return checked | {
+        "monitors": tuple(name for name, out in left_out.items() if out),
+        "monitor_stop": tuple(stops),
+        "monitor_normal": UPLIFT_MONITOR_SHARE * load_at_rest(scene),
+        "monitor_peak": rigid_mass_limit(scene),
+        "monitor_inertia": inertia_limit(scene, selection.error),
+        "monitor_time": slider_period(scene),
+        "monitor_rise": _significant_rise(scene, effects, selection),
+        "monitor_heating": np.ascontiguousarray(heating),
+        "monitor_reach": np.ascontiguousarray(reach),
+    }

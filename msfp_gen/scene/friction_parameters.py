@@ -111,21 +111,21 @@ def law_parameters(law: Law, bearing: Bearing, index: int) -> dict[str, float]:
 
     Raises InputError where a parameter without a default is missing.
     """
-    surface, found = bearing.surfaces[index], dict[str, float | None]()
+    surface, values = bearing.surfaces[index], dict[str, float | None]()
     defaults = {**law.parameters, "patch_radius": bearing.slider_rim_radius(index) or None}
     for name in law.parameters:
         value = getattr(surface, name)
-        found[name] = defaults[name] if value is None else value
-        if found[name] is None:
+        values[name] = defaults[name] if value is None else value
+        if values[name] is None:
             more = ", or the slider's rim_radius" if name == "patch_radius" else ""
             raise InputError(
                 f"bearing.surfaces[{index}].{name} is missing (surface {index + 1}): "
                 f"effects.friction = {law.word!r} needs it{more}"
             )
-    return {name: float(value) for name, value in {**found, **derived_parameters(found)}.items() if value is not None}
+    return {name: float(value) for name, value in {**values, **derived_parameters(values)}.items() if value is not None}
 
 
-def derived_parameters(found: Mapping[str, float | None]) -> dict[str, float]:
+def derived_parameters(parameters: Mapping[str, float | None]) -> dict[str, float]:
     """Parameters that follow from others.
 
     area: of the contact patch, pi r^2 [m^2]. reach: half the side of the square of that area; the patch covers the
@@ -133,9 +133,9 @@ def derived_parameters(found: Mapping[str, float | None]) -> dict[str, float]:
     [K s^1/2 m^2/J]. Each is given where its inputs are.
     """
     out: dict[str, float] = {}
-    if (radius := found.get("patch_radius")) is not None:
+    if (radius := parameters.get("patch_radius")) is not None:
         out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
-    if (k := found.get("conductivity")) is not None and (d := found.get("diffusivity")) is not None:
+    if (k := parameters.get("conductivity")) is not None and (d := parameters.get("diffusivity")) is not None:
         out["heating"] = sqrt(d / pi) / k
     return out
 
@@ -145,16 +145,16 @@ def proportional(law: Law, bearing: Bearing) -> bool:
 
     A law with `friction_slow` must be proportional to both coefficients together.
     """
-    factor, found = 1.25, []
+    factor, scales = 1.25, []
     for index, surface in enumerate(bearing.surfaces):
         values, points = law_parameters(law, bearing, index), _grid(law)
         scaled = values | {name: factor * values[name] for name in ("friction_slow",) if name in values}
         base, raised = (
-            coefficient(law, {**each, **points, "mu": mu})[0]
-            for each, mu in ((values, surface.friction), (scaled, factor * surface.friction))
+            coefficient(law, {**parameters, **points, "mu": mu})[0]
+            for parameters, mu in ((values, surface.friction), (scaled, factor * surface.friction))
         )
-        found.append(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
-    return all(found)
+        scales.append(np.allclose(raised, factor * base, rtol=1e-9, atol=0.0))
+    return all(scales)
 
 
 def _grid(law: Law) -> dict[str, NDArray[np.float64]]:
@@ -170,19 +170,19 @@ def checked_range(law: Law | None, bearing: Bearing, lower_load_limit: bool = Tr
     [N]; the smallest is 0 unless `lower_load_limit`. law_temperature: lowest and highest, shape (2,) [degC]. Each is
     given if the law depends on that variable.
     """
-    used, found = frozenset() if law is None else names_in(law.tree), dict[str, Any]()
+    used, ranges = frozenset() if law is None else names_in(law.tree), dict[str, Any]()
     if "v" in used:
-        found["law_speed"] = float(RANGES["v"][-1])
+        ranges["law_speed"] = float(RANGES["v"][-1])
     if law is not None and used & {"p", "N"}:
         limits = np.tile([0.0, np.inf], (len(bearing.surfaces), 1))
         for index in range(len(bearing.surfaces)):
             area = law_parameters(law, bearing, index).get("area", np.nan)
             sides = [RANGES[name][[0, -1]] * (area if name == "p" else 1.0) for name in ("p", "N") if name in used]
             limits[index] = max(side[0] for side in sides) if lower_load_limit else 0.0, min(side[1] for side in sides)
-        found["law_load"] = limits
+        ranges["law_load"] = limits
     if "T" in used:
-        found["law_temperature"] = RANGES["T"][[0, -1]]
-    return found
+        ranges["law_temperature"] = RANGES["T"][[0, -1]]
+    return ranges
 
 
 @lru_cache(maxsize=256)
@@ -201,12 +201,12 @@ def _defect(law: Law, values: tuple[tuple[str, float], ...]) -> str | None:
         ("mu", mu, invalid, "finite and positive"),
         *((name, slope, ~np.isfinite(slope), "of finite slope") for name, slope in slopes.items()),
     ]
-    for quantity, found, failed, remedy in checks:
+    for quantity, results, failed, remedy in checks:
         if failed.any():
             where = np.unravel_index(int(np.argmax(failed)), failed.shape)
             place = ", ".join(f"{name} = {points[name][where]:.4g} {VARIABLES[name]}" for name in points)
             return (
-                f"gives {quantity} = {found[where]:.4g} at {place or 'every point'}; give a law and parameters with "
+                f"gives {quantity} = {results[where]:.4g} at {place or 'every point'}; give a law and parameters with "
                 f"which it is {remedy}"
             )
     return None
@@ -220,8 +220,8 @@ def select_friction(bearing: Bearing, text: str | None) -> str:
     if text is not None:
         return "custom"
     words = {"pv": "reference_pressure", "velocity": "friction_slow"}
-    found = (w for w, name in words.items() if any(getattr(s, name) is not None for s in bearing.surfaces))
-    return next(found, "constant")
+    words_of_surfaces = (w for w, name in words.items() if any(getattr(s, name) is not None for s in bearing.surfaces))
+    return next(words_of_surfaces, "constant")
 
 
 def thermal_softening(law: Law | None, bearing: Bearing) -> float:
@@ -232,8 +232,8 @@ def thermal_softening(law: Law | None, bearing: Bearing) -> float:
     """
     slopes = []
     for index, surface in enumerate(bearing.surfaces):
-        found = {} if law is None else law_parameters(law, bearing, index)
-        ratio, start = found.get("temperature_ratio", 0.7), found.get("start_temperature", 20.0)
+        parameters = {} if law is None else law_parameters(law, bearing, index)
+        ratio, start = parameters.get("temperature_ratio", 0.7), parameters.get("start_temperature", 20.0)
         power = ratio ** (start / 50.0)
         slopes.append(abs(log(ratio)) / 50.0 * power / (power + 0.4) if surface.friction > 0 else 0.0)
     return max(slopes)
@@ -248,7 +248,7 @@ def heated_contacts(bearing: Bearing) -> list[tuple[float, float]]:
     out = []
     for index, surface in enumerate(bearing.surfaces):
         radius = surface.patch_radius or bearing.slider_rim_radius(index)
-        given = {name: getattr(surface, name) or default for name, default in HEAT.items()}
-        found = derived_parameters({**given, "patch_radius": radius or None})
-        out.append((found["heating"] / found["area"], found["reach"]) if radius else (0.0, 0.0))
+        values = {name: getattr(surface, name) or default for name, default in HEAT.items()}
+        parameters = derived_parameters({**values, "patch_radius": radius or None})
+        out.append((parameters["heating"] / parameters["area"], parameters["reach"]) if radius else (0.0, 0.0))
     return out

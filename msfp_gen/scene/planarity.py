@@ -19,7 +19,7 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.scene.top import PrescribedTop
 
 if TYPE_CHECKING:
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class PlaneInput:
             return None, inf
         if self.coefficients.shape[1] == 1:
             return None, self.onset()
-        found = piecewise.azimuth(self.knots, self.coefficients)
-        if found is not None:
-            return found, inf
+        azimuth_of_all = piecewise.azimuth(self.knots, self.coefficients)
+        if azimuth_of_all is not None:
+            return azimuth_of_all, inf
         first, last = int(np.argmax(np.any(self.coefficients, axis=(1, 2)))), len(self.knots) - 1
         plane, low = None, first
         while last - low > 1:  # bisection for the largest number of leading pieces that lie in one plane
@@ -62,7 +62,7 @@ class PlaneInput:
         return plane, float(self.knots[low])
 
 
-def scene_plane(scene: SceneParts) -> tuple[float, float, str]:
+def scene_plane(scene: SceneFields) -> tuple[float, float, str]:
     """Vertical plane of a scene: azimuth [rad], in (-pi/2, pi/2]; time at which it is left [s]; name of that input."""
     scene_azimuth: float | None = None
     until, name = inf, "motion"
@@ -78,7 +78,7 @@ def scene_plane(scene: SceneParts) -> tuple[float, float, str]:
     return scene_azimuth or 0.0, until, name
 
 
-def plane_inputs(scene: SceneParts) -> Iterator[PlaneInput]:
+def plane_inputs(scene: SceneFields) -> Iterator[PlaneInput]:
     """All inputs of a scene that may leave a vertical plane, the base motion first."""
     motion = scene.motion
     moving = motion.coefficients.copy()

@@ -13,8 +13,8 @@ from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
-from msfp_gen.scene.parts import InitialState, SceneParts, Stop
 from msfp_gen.scene.planarity import scene_plane
+from msfp_gen.scene.scene_fields import InitialState, SceneFields, Stop
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_standing, standing_of
@@ -25,7 +25,7 @@ from msfp_gen.specification.layout import Auto, Effects, ModelSpec
 
 
 @dataclass(frozen=True, init=False)
-class Scene(SceneParts):
+class Scene(SceneFields):
     """The complete input of `simulate`.
 
     bearing, motion (of the base), top, solver: see their classes. duration [s]; None: that of the motion.

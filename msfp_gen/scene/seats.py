@@ -31,19 +31,19 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
     of the stiffest spring of the top. Raises InputError: the contacts in series are not stiffer than this spring.
     """
     springs = {name: getattr(top, name, None) or 0.0 for name in SPRINGS}
-    name = max(springs, key=lambda each: springs[each])
-    stiffest, given = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
-    chosen = max(LEAST, len(given) * stiffest / SHARE)
-    found = np.array([chosen if value is None else value for value in given])
-    in_series = 1.0 / float((1.0 / found).sum())
+    name = max(springs, key=lambda spring: springs[spring])
+    stiffest, values = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
+    chosen = max(LEAST, len(values) * stiffest / SHARE)
+    stiffness = np.array([chosen if value is None else value for value in values])
+    in_series = 1.0 / float((1.0 / stiffness).sum())
     if stiffest >= in_series:
-        index = int(found.argmin())
+        index = int(stiffness.argmin())
         raise InputError(
-            f"bearing.surfaces[{index}].seat_stiffness = {found[index]:g}: with it the contacts of all surfaces in "
+            f"bearing.surfaces[{index}].seat_stiffness = {stiffness[index]:g}: with it the contacts of all surfaces in "
             f"series have {in_series:.6g} N/m, which must be more than {name} = {stiffest:g} of the top, since this "
             "contains them; give more [N/m], or leave it out"
         )
-    return found
+    return stiffness
 
 
 def check_seats(bearing: Bearing, top: Top, effects: Effects | Auto | None) -> None:

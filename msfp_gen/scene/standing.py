@@ -18,7 +18,7 @@ from msfp_gen.scene.top import MassTop, RigTop, load_values
 
 if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.scene.parts import SceneParts
+    from msfp_gen.scene.scene_fields import SceneFields
 
 MARGIN = 2.0  # of the stiffness over what the load at rest needs, below which there is a note
 
@@ -54,32 +54,36 @@ def needed_rotational_stiffness(
     return float(across @ np.linalg.solve(sliders, across) - energy[-1, -1])
 
 
-def check_standing(path: str, given: float, needed: float, load: float) -> None:
+def check_standing(path: str, stiffness: float, needed: float, load: float) -> None:
     """Raise InputError where a rotational stiffness that is given does not hold the plate up.
 
-    path: of the field in messages. given: its value, 0: none is given. needed: as of `needed_rotational_stiffness`.
+    path: of the field in messages. stiffness: its value, 0: none is given. needed: as of `needed_rotational_stiffness`.
     load: on the plate [N].
     """
-    if 0 < given <= needed < np.inf:
+    if 0 < stiffness <= needed < np.inf:
         raise InputError(
-            f"{path} = {given:g}: while the surfaces slide, the top plate turns over under {load:.4g} N on a lever of "
-            f"{needed / load:.3g} m; give more than {needed:.4g} [N m/rad]"
+            f"{path} = {stiffness:g}: while the surfaces slide, the top plate turns over under {load:.4g} N on a lever "
+            f"of {needed / load:.3g} m; give more than {needed:.4g} [N m/rad]"
         )
 
 
-def unsteady(path: str, given: float, needed: float) -> Iterator[tuple[int, float, str]]:
+def unsteady(path: str, stiffness: float, needed: float) -> Iterator[tuple[int, float, str]]:
     """The doubt where a plate stands while friction holds it alone, or would turn over under `MARGIN` times its load.
 
     Yields 0 (no surface), the value and the text, as `plausibility.doubtful_values`. Arguments as of `check_standing`.
     """
-    if 0 < needed < np.inf and given < MARGIN * needed:
-        reason = f"the top plate turns over where N is {given / needed:.2g} times that at rest"
-        if given == 0:
+    if 0 < needed < np.inf and stiffness < MARGIN * needed:
+        reason = f"the top plate turns over where N is {stiffness / needed:.2g} times that at rest"
+        if stiffness == 0:
             reason = "nothing holds the top plate up, which turns over while the surfaces slide"
-        yield 0, given, f"{path} = {given:g}: {reason}; give more than {needed:.4g} [N m/rad], several times as much"
+        yield (
+            0,
+            stiffness,
+            f"{path} = {stiffness:g}: {reason}; give more than {needed:.4g} [N m/rad], several times as much",
+        )
 
 
-def standing_of(scene: SceneParts) -> tuple[str, float, float, float] | None:
+def standing_of(scene: SceneFields) -> tuple[str, float, float, float] | None:
     """Path, value given, value needed and load of the plate of a scene at its start; None: no spring could hold it."""
     top, load = scene.top, -float(load_values(scene.top)[2])
     if not isinstance(top, RigTop | MassTop):

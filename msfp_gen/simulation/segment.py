@@ -23,9 +23,8 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
-from msfp_gen.scene.effect_switching import Ending
+from msfp_gen.scene.effect_switching import Ending, monitor_options
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.monitors import monitor_options
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.top import load_values
 

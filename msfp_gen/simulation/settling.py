@@ -11,7 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.motions.prescribed import Load, Rotation
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 from msfp_gen.scene.solver import Solver
 from msfp_gen.specification.layout import Auto
 

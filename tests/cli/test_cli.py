@@ -13,7 +13,7 @@ from support.synthetic import loops, ramp
 
 from msfp_gen.cli import main
 from msfp_gen.cli.console import Progress
-from msfp_gen.cli.running import DEMO, _report
+from msfp_gen.cli.run_commands import DEMO
 from msfp_gen.errors import CompileError, RunError
 from msfp_gen.jit.build import BuildInfo
 from msfp_gen.result import Result
@@ -330,10 +330,10 @@ def test_interrupted_run_says_so(capsys, simulated, monkeypatch):
     assert_one_line_error(capsys, "interrupted")
 
 
-def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch):
+def test_terminal_gets_rich_tables_and_progress(capsys, monkeypatch, simulated):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    _report(loops(), as_json=False)
+    assert main(["run", "fenz-test5"]) == 0
     with Progress("fenz-test5") as update:
         for time in (0.0, 20.0, 20.1, 40.0):
             update(time, 40.0)

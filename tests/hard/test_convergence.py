@@ -16,7 +16,7 @@ from support.stacks import PLANAR, a_pendulum, a_rig, a_stack, pendulum_angle, s
 
 import msfp_gen
 from msfp_gen import Motion, Scene, Solver, simulate
-from msfp_gen.scene.parts import Stop
+from msfp_gen.scene.scene_fields import Stop
 
 RUNTIME = Path(msfp_gen.__file__).parent / "runtime" / "steppers"
 START = 0.6

@@ -181,7 +181,7 @@ def test_a_first_step_that_is_too_long_does_not_decide_what_is_regular() -> None
 @pytest.mark.parametrize("method", ["implicit", "dopri5"])
 def test_a_violent_start_is_regular(method: str) -> None:
     """Let go far from where it would rest; a first step of 0.1 ms would be past the fall of the free plate."""
-    from msfp_gen.scene.parts import InitialState
+    from msfp_gen.scene.scene_fields import InitialState
 
     bearing = a_stack((3, 1, 1), [0.8, 0.8], friction=[0.03, 0.09], body={"mass": 1.0}, yield_displacement=1e-3)
     start = InitialState([(0.0, -0.02, 0.0), (0.0, -0.05, 0.0)], np.zeros((2, 3)), [(-0.1, 0.0), (-0.4, 0.0)])

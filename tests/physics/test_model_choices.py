@@ -19,7 +19,7 @@ from msfp_gen import (
     presets,
     simulate,
 )
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 
 LOAD = (0.0, 0.0, -112e3)
 

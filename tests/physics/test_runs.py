@@ -27,7 +27,7 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.result import Result
-from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Stop
 
 LOAD, ROTATIONAL_STIFFNESS = 112e3, 1e6
 TESTS = [f"fenz-test{i}" for i in range(1, 6)]

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pytest
 
 HEADER = "double msfp_twice(double x);\nextern const double msfp_factor;\n"
 SYMBOLS = "#define MSFP_MODEL msfp_fake\n"
@@ -56,6 +62,32 @@ def prepare_in_child(house: str) -> None:
     extension = build.load_extension(info.path, info.module)
     tools = sorted({"sympy", "Cython", "jinja2", "filelock"} & set(sys.modules))
     print(info.cached, extension.twice(21.0), *tools)
+
+
+def run_child(house: Path, models: Path) -> subprocess.Popen[str]:
+    """`prepare_in_child` with the cache `models`, in a session of its own."""
+    environment = {name: value for name, value in os.environ.items() if name != "CC"} | {"MSFP_GEN_CACHE": str(models)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    command = [sys.executable, __file__, str(house)]
+    return subprocess.Popen(command, env=environment, text=True, start_new_session=True, **pipes)
+
+
+def house(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package of its own with a generator whose model builds in a second, and an empty cache `folder`/models."""
+    from msfp_gen.jit import cache
+
+    monkeypatch.setattr(cache, "PACKAGE", write_house(folder / "house"))
+    monkeypatch.setenv("MSFP_GEN_CACHE", str(folder / "models"))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setitem(sys.modules, "msfp_gen.generator", generator())
+    return cache.PACKAGE
+
+
+def prebuilt(factory: pytest.TempPathFactory) -> Path:
+    """A cache that holds the fake model, for all tests that start from one."""
+    root = factory.mktemp("prebuilt")
+    assert run_child(write_house(root / "house"), root / "models").communicate()[0].split()[:2] == ["False", "42.0"]
+    return root / "models"
 
 
 if __name__ == "__main__":

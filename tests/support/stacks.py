@@ -15,7 +15,7 @@ from reference.quasi_static import follow
 
 from msfp_gen import Bearing, Body, Effects, Layout, Motion, Scene, Solver, Surface, Top, simulate
 from msfp_gen.result import Result
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 from support import Array
 
 LOAD, TILT_STIFFNESS, SIDE_STIFFNESS = 1e5, 1e6, 1e9

@@ -39,39 +39,41 @@ TIMES = {"start [s]", "end [s]"}  # columns that have no envelope
 Row = dict[str, float | str | None]
 
 
-def characterisation_tables(found: Characterisation) -> list[Table]:
+def characterisation_tables(characterisation: Characterisation) -> list[Table]:
     """Tables of the run, its cycles, the sliding regimes of first loading and last cycle, and the surfaces."""
-    tables = [_run_table(found)]
-    if found.cycles:
-        tables.append(_cycle_table(found))
-    branches = list(_named_branches(found))
+    tables = [_run_table(characterisation)]
+    if characterisation.cycles:
+        tables.append(_cycle_table(characterisation))
+    branches = list(_named_branches(characterisation))
     if branches:
         tables.append(_stage_table(branches))
-    tables.append(_surface_table(found.surfaces))
-    if found.notes:
-        tables.append(Table("what is not defined in this run, and why", (), [(note,) for note in found.notes]))
+    tables.append(_surface_table(characterisation.surfaces))
+    if characterisation.notes:
+        tables.append(
+            Table("what is not defined in this run, and why", (), [(note,) for note in characterisation.notes])
+        )
     return tables
 
 
-def write_csv(found: Characterisation, path: str | Path) -> Path:
+def write_csv(characterisation: Characterisation, path: str | Path) -> Path:
     """Write one row per cycle, then least, mean and largest values of the cycles, then the run, to a CSV file.
 
     The file appears only when complete. Raises InputError for a path that does not end in .csv or cannot be written.
     """
-    return write_rows(check_output(path, CSV_SUFFIXES), csv_rows(found))
+    return write_rows(check_output(path, CSV_SUFFIXES), csv_rows(characterisation))
 
 
-def csv_rows(found: Characterisation) -> list[Row]:
+def csv_rows(characterisation: Characterisation) -> list[Row]:
     """The rows of `write_csv`: column with its unit -> value; None and missing columns are empty cells."""
-    cycles = [{"scope": f"cycle {cycle.number}", **_cycle_row(cycle)} for cycle in found.cycles]
+    cycles = [{"scope": f"cycle {cycle.number}", **_cycle_row(cycle)} for cycle in characterisation.cycles]
     whole: Row = {
         "scope": "run",
-        "peak_displacement [m]": found.peak_displacement,
-        "peak_force [N]": found.peak_force,
-        "secant_stiffness [N/m]": found.secant_stiffness,
-        "total_energy_dissipated [J]": found.energy_dissipated,
-        "residual_displacement [m]": found.residual_displacement if found.at_rest else None,
-        **_demand_row(found.surfaces),
+        "peak_displacement [m]": characterisation.peak_displacement,
+        "peak_force [N]": characterisation.peak_force,
+        "secant_stiffness [N/m]": characterisation.secant_stiffness,
+        "total_energy_dissipated [J]": characterisation.energy_dissipated,
+        "residual_displacement [m]": characterisation.residual_displacement if characterisation.at_rest else None,
+        **_demand_row(characterisation.surfaces),
     }
     return [*cycles, *_envelope_rows(cycles), whole]
 
@@ -116,42 +118,44 @@ def _demand_row(demands: tuple[SurfaceDemand, ...]) -> Row:
     }
 
 
-def _run_table(found: Characterisation) -> Table:
-    load, rest = found.axial_load, "at rest" if found.at_rest else "still moving"
-    ratio = f", {found.peak_force / load:.4f} of the axial load" if load else ""
-    angle = degrees(atan2(found.direction[1], found.direction[0]))
-    lift = "not modelled" if found.maximum_uplift is None else f"{found.maximum_uplift * 1e3:.3f} mm"
+def _run_table(characterisation: Characterisation) -> Table:
+    load, rest = characterisation.axial_load, "at rest" if characterisation.at_rest else "still moving"
+    ratio = f", {characterisation.peak_force / load:.4f} of the axial load" if load else ""
+    angle = degrees(atan2(characterisation.direction[1], characterisation.direction[0]))
+    lift = (
+        "not modelled" if characterisation.maximum_uplift is None else f"{characterisation.maximum_uplift * 1e3:.3f} mm"
+    )
     rows = [
-        ("motion", f"{found.kind}; largest displacement at {angle:.1f} degrees from E1"),
-        ("peak displacement", f"{found.peak_displacement * 1e3:.2f} mm"),
-        ("peak force", f"{found.peak_force / 1e3:.3f} kN{ratio}"),
-        ("secant stiffness", _number(found.secant_stiffness, 1e-3, " kN/m at the largest displacement")),
-        ("energy dissipated", f"{found.energy_dissipated:.5g} J in the whole run"),
-        ("displacement at the end", f"{found.residual_displacement * 1e3:.2f} mm, {rest}"),
+        ("motion", f"{characterisation.kind}; largest displacement at {angle:.1f} degrees from E1"),
+        ("peak displacement", f"{characterisation.peak_displacement * 1e3:.2f} mm"),
+        ("peak force", f"{characterisation.peak_force / 1e3:.3f} kN{ratio}"),
+        ("secant stiffness", _number(characterisation.secant_stiffness, 1e-3, " kN/m at the largest displacement")),
+        ("energy dissipated", f"{characterisation.energy_dissipated:.5g} J in the whole run"),
+        ("displacement at the end", f"{characterisation.residual_displacement * 1e3:.2f} mm, {rest}"),
         ("maximum uplift", lift),
     ]
-    return Table(f"{found.name or 'unnamed scene'}, {found.status}", (), rows)
+    return Table(f"{characterisation.name or 'unnamed scene'}, {characterisation.status}", (), rows)
 
 
-def _cycle_table(found: Characterisation) -> Table:
+def _cycle_table(characterisation: Characterisation) -> Table:
     columns = ("cycle", "least u [mm]", "largest u [mm]", *(heading for heading, _ in SHOWN.values()))
     rows = []
-    for cycle in found.cycles:
+    for cycle in characterisation.cycles:
         ends = (cycle.loop.displacement_least, cycle.loop.displacement_most)
         numbers = [_number(loop_quantity(cycle, name), scale) for name, (_, scale) in SHOWN.items()]
         rows.append((str(cycle.number), *(f"{end * 1e3:.2f}" for end in ends), *numbers))
     for scope in ("least", "mean", "most"):
-        ranges = [(found.envelope.get(name), scale) for name, (_, scale) in SHOWN.items()]
+        ranges = [(characterisation.envelope.get(name), scale) for name, (_, scale) in SHOWN.items()]
         numbers = ["-" if at is None else _number(getattr(at, scope), scale) for at, scale in ranges]
         rows.append((scope, "", "", *numbers))
     return Table("closed cycles", columns, rows)
 
 
-def _named_branches(found: Characterisation) -> Iterator[tuple[str, Branch]]:
-    if found.first_loading is not None:
-        yield "first loading", found.first_loading
-    if found.cycles:
-        last = found.cycles[-1]
+def _named_branches(characterisation: Characterisation) -> Iterator[tuple[str, Branch]]:
+    if characterisation.first_loading is not None:
+        yield "first loading", characterisation.first_loading
+    if characterisation.cycles:
+        last = characterisation.cycles[-1]
         for half, branch in enumerate(last.branches, start=1):
             yield f"cycle {last.number}, half {half}", branch
 

@@ -9,15 +9,14 @@ from os import PathLike
 from pathlib import Path
 
 from msfp_gen.errors import InputError
-from msfp_gen.motions.records import cosmos, csmip, knet, peer, table
+from msfp_gen.motions.records import cosmos, csmip, csv_table, knet, peer
 from msfp_gen.motions.records.channel import Channel, assemble_record
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, strong_window, uncorrected
+from msfp_gen.motions.records.csv_table import Table, read_table, write_csv
 from msfp_gen.motions.records.peer import read_peer
 from msfp_gen.motions.records.record import Record
-from msfp_gen.motions.records.scaling import ScaleTo, asce7_spectrum, prepared
+from msfp_gen.motions.records.scaling import ScaledSuite, ScaleTo, asce7_spectrum, prepared, scaled_suite
 from msfp_gen.motions.records.spectrum import Spectrum, response_spectrum
-from msfp_gen.motions.records.suite import ScaledSuite, scaled_suite
-from msfp_gen.motions.records.table import Table, read_table, write_csv
 from msfp_gen.motions.records.text import Lines, lines_of, read_lines
 
 __all__ = [
@@ -85,13 +84,13 @@ def read_record(path: str | PathLike[str], *more: str | PathLike[str]) -> Record
 
 def _record_of(parts: list[Lines]) -> Record:
     """The record in the lines of one file, or of several."""
-    if len(parts) == 1 and table.matches(parts[0]):
-        return table.read(parts[0])
+    if len(parts) == 1 and csv_table.matches(parts[0]):
+        return csv_table.read(parts[0])
     formats = [_format_of(lines) for lines in parts]
-    for lines, each in zip(parts, formats, strict=True):
-        if each is not formats[0]:
+    for lines, kind in zip(parts, formats, strict=True):
+        if kind is not formats[0]:
             raise InputError(
-                f"{lines.path.name}: {each.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
+                f"{lines.path.name}: {kind.name}, but {parts[0].path.name} is {formats[0].name}; give one recording"
             )
     channels = [channel for lines in parts for channel in formats[0].read(lines)]
     return assemble_record(channels, formats[0].name, formats[0].notes)
@@ -99,10 +98,10 @@ def _record_of(parts: list[Lines]) -> Record:
 
 def _format_of(lines: Lines) -> _Format:
     """Format of a file. Raises InputError if it is unknown."""
-    for each in _FORMATS:
-        if each.matches(lines):
-            return each
-    names = ", ".join(each.name for each in _FORMATS)
+    for file_format in _FORMATS:
+        if file_format.matches(lines):
+            return file_format
+    names = ", ".join(file_format.name for file_format in _FORMATS)
     lines.fail(0, f"unknown format; give {names}, or one CSV with a header like: time [s], a1 [m/s^2]")
 
 

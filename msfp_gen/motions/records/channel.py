@@ -72,31 +72,33 @@ def assemble_record(channels: Sequence[Channel], file_format: str, notes: tuple[
     """
     _check_one_recording(channels)
     groups = {q: parts for q in QUANTITIES if (parts := [c for c in channels if c.quantity == q])}
-    given, first = next(iter(groups)), channels[0]
+    measured, first = next(iter(groups)), channels[0]
     arrays, all_notes = {}, dict.fromkeys(notes)  # a dict keeps the order and drops repeated notes
     for quantity, parts in groups.items():
-        if len(parts) != len(groups[given]):
-            parts[0].fail(f"{len(parts)} channels of {quantity}, {len(groups[given])} of {given}; give as many of each")
+        if len(parts) != len(groups[measured]):
+            parts[0].fail(
+                f"{len(parts)} channels of {quantity}, {len(groups[measured])} of {measured}; give as many of each"
+            )
         columns = [None if c is None else _upwards(c) for c in _ordered(parts)]
         arrays[quantity], cut = common_window(columns)
         all_notes |= dict.fromkeys(cut)
     shortest = min(map(len, arrays.values()))
     arrays = {quantity: values[:shortest] for quantity, values in arrays.items()}
-    if given != "acceleration":
-        arrays |= differentiated(given, arrays[given], first.time_step)
-        all_notes |= dict.fromkeys(derived_note(given))
+    if measured != "acceleration":
+        arrays |= differentiated(measured, arrays[measured], first.time_step)
+        all_notes |= dict.fromkeys(derived_note(measured))
     if any(c.direction == DOWN for c in channels):
         all_notes["vertical channel is positive downwards: its sign is reversed"] = None
-    labels = ["" if c is None else c.label for c in _ordered(groups[given])]
+    labels = ["" if c is None else c.label for c in _ordered(groups[measured])]
     return Record(
         name=stem(first.path),
         time_step=first.time_step,
         channels=(labels[0], labels[1], labels[2]),
         start_time=first.start,
         station=first.station,
-        units=groups[given][0].unit,
+        units=groups[measured][0].unit,
         notes=tuple(all_notes),
-        quantity=given,
+        quantity=measured,
         **arrays,
         metadata={"format": file_format, "file": ", ".join(dict.fromkeys(c.path.name for c in channels))},
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
-from msfp_gen.motions.records.text import Lines
+from msfp_gen.motions.records.text import Lines, word
 
 FORMAT = "COSMOS V1, V2"
 _TITLE = re.compile(r"\(Format v\d+\.\d+ with (\d{1,3}) text lines\)", re.I)
@@ -47,18 +47,18 @@ def _channel(lines: Lines, top: int) -> tuple[Channel, int]:
     if not _TITLE.search(lines[top]):
         lines.fail(top, f"{lines[top].strip()[:40]!r} where a channel should begin with '... (Format v01.20 with ...'")
     index = top + 1
-    while not (found := _DATA.match(lines[index])):
+    while not (match := _DATA.match(lines[index])):
         if lines[index].lower().startswith(_END) or _TITLE.search(lines[index]):
             lines.fail(index, "a channel without a line '... acceleration pts, approx ... secs, units=..., Format=...'")
         index += 1
     head = range(top, index)
-    points, unit = int(found[1]), found[4].strip()
-    quantity = next(q for q in QUANTITIES if q.startswith(found[2].lower()))
+    points, unit = int(match[1]), match[4].strip()
+    quantity = next(q for q in QUANTITIES if q.startswith(match[2].lower()))
     if unit.lower() == "counts":
         lines.fail(index, "raw counts, whose scale is not in the file; give volume 1 or 2")
     factor = si_factor(lines, index, unit, quantity)
-    step = _time_step(lines, head, index, points, lines.positive(index, "the length", found[3]))
-    values, after = lines.block(index + 1, points, (int(found[6]), int(found[7])))
+    step = _time_step(lines, head, index, points, lines.positive(index, "the length", match[3]))
+    values, after = lines.block(index + 1, points, (int(match[6]), int(match[7])))
     if not lines[after].lower().startswith(_END):
         lines.fail(after, f"more data than the {points} points of the header, or no 'End-of-data' mark")
     direction, label = _direction(lines, head)
@@ -72,18 +72,18 @@ def _channel(lines: Lines, top: int) -> tuple[Channel, int]:
         values * factor,
         label,
         unit,
-        _word(_START, text),
-        _word(_STATION, text),
+        word(_START, text),
+        word(_STATION, text),
     ), after + 1
 
 
 def _time_step(lines: Lines, head: range, data: int, points: int, length: float) -> float:
     """Sample interval from the real header [s]; fails unless it agrees with the length in the line at `data`."""
     where = next((i for i in head if _REALS.search(lines[i])), None)
-    found = _REALS.search(lines[where]) if where is not None else None
-    if where is None or found is None:
+    match = _REALS.search(lines[where]) if where is not None else None
+    if where is None or match is None:
         lines.fail(head[0], "no line '... Real-header values follow on ...' with its format")
-    reals, _ = lines.block(where + 1, int(found[1]), (int(found[3]), int(found[4])))
+    reals, _ = lines.block(where + 1, int(match[1]), (int(match[3]), int(match[4])))
     if len(reals) <= _INTERVAL or reals[_INTERVAL] <= 0:
         lines.fail(where, f"real-header value {_INTERVAL + 1}, the sample interval in ms, is missing")
     step = float(reals[_INTERVAL]) / 1000
@@ -95,14 +95,10 @@ def _time_step(lines: Lines, head: range, data: int, points: int, length: float)
 def _direction(lines: Lines, head: range) -> tuple[int | str, str]:
     """Direction and label from the text of the header, else from the channel code."""
     for index in head:
-        if found := _CHANNEL.search(lines[index]):
-            if found[2]:
-                return int(found[2]) % 360, f"{int(found[2])} deg"
-            if found[3]:
-                return (UP if found[3].lower() == "up" else DOWN), found[3]
+        if match := _CHANNEL.search(lines[index]):
+            if match[2]:
+                return int(match[2]) % 360, f"{int(match[2])} deg"
+            if match[3]:
+                return (UP if match[3].lower() == "up" else DOWN), match[3]
     code = next((m[1].upper() for i in head if (m := _SCNL.search(lines[i]))), "")
     return _LETTERS.get(code, UNKNOWN), code or UNKNOWN
-
-
-def _word(pattern: re.Pattern[str], text: list[str]) -> str:
-    return next((m[1] for line in text if (m := pattern.search(line))), "")

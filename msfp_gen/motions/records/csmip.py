@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from msfp_gen.motions.records.channel import DOWN, QUANTITIES, UNKNOWN, UP, Channel, si_factor
-from msfp_gen.motions.records.text import Lines
+from msfp_gen.motions.records.text import Lines, search, word
 
 FORMAT = "CSMIP V1, V2"
 _TITLES = ("uncorrected accelerogram data", "corrected accelerogram")
@@ -42,8 +42,8 @@ def read(lines: Lines) -> list[Channel]:
     index = 0
     while index < len(lines):
         if lines[index].strip():
-            found, index = _channel(lines, index)
-            channels += found
+            quantities, index = _channel(lines, index)
+            channels += quantities
         else:
             index += 1
     return channels
@@ -57,21 +57,21 @@ def _channel(lines: Lines, top: int) -> tuple[list[Channel], int]:
         )
     index = _first_data_line(lines, top)
     head = [lines[i] for i in range(top, index)]
-    label = _search(_CHANNEL, head)
+    label = search(_CHANNEL, head)
     if label is None:
         lines.fail(top, "no 'Chan n: <azimuth> Deg' or 'Chan n: Up' in this channel's header")
     shared: dict[str, Any] = {
         "direction": int(label[3]) % 360 if label[3] else _DIRECTIONS.get(label[2].lower(), UNKNOWN),
         "label": " ".join(label[2].split()),
-        "start": _word(_START, head),
-        "station": _word(_STATION, head),
+        "start": word(_START, head),
+        "station": word(_STATION, head),
     }
-    count = _search(_COUNT, head)
+    count = search(_COUNT, head)
     channels = []
-    while found := _RAW.match(lines[index]) or _CORRECTED.match(lines[index]):
-        if count is not None and count[1] != found["points"]:
-            lines.fail(index, f"{found['points']} points here, but the header says {count[1]}")
-        channel, index = _series(lines, index, found, shared)
+    while match := _RAW.match(lines[index]) or _CORRECTED.match(lines[index]):
+        if count is not None and count[1] != match["points"]:
+            lines.fail(index, f"{match['points']} points here, but the header says {count[1]}")
+        channel, index = _series(lines, index, match, shared)
         channels.append(channel)
     if not lines[index].startswith(_END):
         lines.fail(index, f"more data than the {len(channels[-1].values)} points of the header, or no '/&' end mark")
@@ -92,26 +92,17 @@ def _first_data_line(lines: Lines, top: int) -> int:
     return index
 
 
-def _series(lines: Lines, top: int, found: re.Match[str], shared: dict[str, Any]) -> tuple[Channel, int]:
+def _series(lines: Lines, top: int, match: re.Match[str], shared: dict[str, Any]) -> tuple[Channel, int]:
     """One quantity of a channel, whose numbers follow the line at `top`, and the index of the line after them."""
-    groups = found.groupdict()
+    groups = match.groupdict()
     if "rate" in groups:
-        quantity, step = "acceleration", 1 / lines.positive(top, "the sampling rate", found["rate"])
+        quantity, step = "acceleration", 1 / lines.positive(top, "the sampling rate", match["rate"])
     else:
-        quantity = next(q for q in QUANTITIES if q.startswith(found["quantity"].lower()))
-        step = lines.positive(top, "the time step", found["step"])
-    unit = found["unit"].strip()
+        quantity = next(q for q in QUANTITIES if q.startswith(match["quantity"].lower()))
+        step = lines.positive(top, "the time step", match["step"])
+    unit = match["unit"].strip()
     factor = si_factor(lines, top, unit, quantity)
-    columns, width = found.groups()[-2:]
+    columns, width = match.groups()[-2:]
     layout = (int(columns), int(width)) if columns else _DEFAULT_LAYOUT
-    values, after = lines.block(top + 1, int(found["points"]), layout)
+    values, after = lines.block(top + 1, int(match["points"]), layout)
     return Channel(lines.path, top, quantity, time_step=step, values=values * factor, unit=unit, **shared), after
-
-
-def _search(pattern: re.Pattern[str], head: list[str]) -> re.Match[str] | None:
-    return next((m for line in head if (m := pattern.search(line))), None)
-
-
-def _word(pattern: re.Pattern[str], head: list[str]) -> str:
-    found = _search(pattern, head)
-    return found[1] if found else ""

@@ -71,11 +71,11 @@ def read(lines: Lines) -> list[Channel]:
     if counts is None:
         lines.fail(head, f"{lines[head].strip()[:40]!r} does not give NPTS and DT")
     where = next((i for i in range(head) if _QUANTITY.search(lines[i])), None)
-    found = _QUANTITY.search(lines[where]) if where is not None else None
-    if where is None or found is None:
+    match = _QUANTITY.search(lines[where]) if where is not None else None
+    if where is None or match is None:
         lines.fail(head, "no line before this one says ACCELERATION (VELOCITY, DISPLACEMENT) ... IN UNITS OF ...")
-    quantity = next(q for q in QUANTITIES if q == found[1].lower())
-    unit = (found[2] or found[3]).strip()
+    quantity = next(q for q in QUANTITIES if q == match[1].lower())
+    unit = (match[2] or match[3]).strip()
     factor = si_factor(lines, where, unit, quantity)
     points, step = int(counts[1]), lines.positive(head, "DT", counts[2])
     words: list[str] = []
@@ -98,9 +98,9 @@ def _direction(title: str, name: str) -> tuple[int | str, str]:
     """Direction and station from a title such as "..., EL CENTRO ARRAY #9, 180", else direction from the file name."""
     station, comma, last = (part.strip() for part in title.rpartition(","))
     for text, found_station in ((last if comma else "", station), (name, "")):
-        if found := _VERTICAL.search(text):
-            return (DOWN if found[2] else UP), found_station
+        if match := _VERTICAL.search(text):
+            return (DOWN if match[2] else UP), found_station
     if comma and last.upper() in _LETTERS:
         return _LETTERS[last.upper()], station
-    found = _AZIMUTH.match(last) if comma else None
-    return (int(found[1]) % 360, station) if found and int(found[1]) <= 360 else (UNKNOWN, "")
+    match = _AZIMUTH.match(last) if comma else None
+    return (int(match[1]) % 360, station) if match and int(match[1]) <= 360 else (UNKNOWN, "")

@@ -74,9 +74,9 @@ class Record:
             )
         object.__setattr__(self, "acceleration", values)
         for name in ("velocity", "displacement"):
-            given = getattr(self, name)
-            if given is not None and finite(name, given).shape != values.shape:
-                raise InputError(f"{name}: shape {given.shape}; give that of the acceleration, {values.shape}")
+            array = getattr(self, name)
+            if array is not None and finite(name, array).shape != values.shape:
+                raise InputError(f"{name}: shape {array.shape}; give that of the acceleration, {values.shape}")
 
     @property
     def time(self) -> Array:
@@ -120,8 +120,8 @@ class Record:
 
     def _changed(self, change: Callable[[Array], Array], channels: tuple[str, str, str], note: str) -> Record:
         """The record with a linear `change` of the rows of all its quantities."""
-        given: dict[str, Any] = {name: getattr(self, name) for name in ("acceleration", "velocity", "displacement")}
-        values: dict[str, Any] = {name: None if rows is None else change(rows) for name, rows in given.items()}
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ("acceleration", "velocity", "displacement")}
+        values: dict[str, Any] = {name: None if rows is None else change(rows) for name, rows in arrays.items()}
         return replace(self, **values, channels=channels, notes=(*self.notes, *filter(None, [note])))
 
 

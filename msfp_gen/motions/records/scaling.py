@@ -1,7 +1,8 @@
-"""Scaling of a motion to a target: a peak, a spectral ordinate, or a design spectrum over a range of periods."""
+"""Scaling of a motion to a peak, a spectral ordinate or a design spectrum, and of a suite to a mean spectrum."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Any, Literal
@@ -56,9 +57,9 @@ class ScaleTo:
 
     def __post_init__(self) -> None:
         check_fields(self, "scale_to")
-        given = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
-        if given not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
-            raise InputError(f"scale_to: {', '.join(given) or 'nothing'} given; give {', or '.join(_TARGETS)}")
+        keys = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
+        if keys not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
+            raise InputError(f"scale_to: {', '.join(keys) or 'nothing'} given; give {', or '.join(_TARGETS)}")
         if self.between is not None and self.between[0] >= self.between[1]:
             raise InputError(f"scale_to.between = {list(self.between)}: give the shorter period first")
 
@@ -113,19 +114,19 @@ class ScaleTo:
             name, equals, value = (piece.strip() for piece in part.partition("="))
             if not equals or name not in rules:
                 raise InputError(f"scale_to: {part.strip()!r}; give name=value with a name of {', '.join(rules)}")
-            given = value.split(":") if ":" in value else value
-            numbers = [_number(v) for v in given] if isinstance(given, list) else _number(given)
+            parts = value.split(":") if ":" in value else value
+            numbers = [_number(v) for v in parts] if isinstance(parts, list) else _number(parts)
             try:
                 values[name] = rules[name].parse(numbers, text=True)
             except ValueError as error:
                 raise InputError(f"scale_to.{name} = {value!r}: {error}") from None
         return cls(**values)
 
-    def ratio(self, target: Array, found: Array) -> float:
+    def ratio(self, target: Array, values: Array) -> float:
         """Geometric mean of target/found, the factor of least squares of the logarithms."""
-        if not np.all(found > 0):
+        if not np.all(values > 0):
             raise InputError(f"scale_to.component = {self.component!r}: the motion has none; choose another component")
-        return float(np.exp(np.mean(np.log(target / found))))
+        return float(np.exp(np.mean(np.log(target / values))))
 
     def __str__(self) -> str:
         """Description of the target."""
@@ -215,3 +216,69 @@ def asce7_spectrum(period: ArrayLike, sds: float, sd1: float, long_period: float
     rising = sds * (0.4 + 0.6 * t / (0.2 * corner))
     pieces = [t < 0.2 * corner, t <= corner, t <= long_period]
     return np.select(pieces, [rising, np.full_like(t, sds), sd1 / safe], sd1 * long_period / safe**2)
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledSuite:
+    """Factors of a suite, and the spectra that they give.
+
+    Attributes:
+        factors: one for each motion, ndarray, shape (r,).
+        period: periods of the target, ndarray, shape (p,), [s].
+        spectra: pseudo-acceleration of each scaled motion, ndarray, shape (r, p), [m/s^2].
+        target: ndarray, shape (p,), [m/s^2].
+    """
+
+    factors: Array
+    period: Array
+    spectra: Array
+    target: Array
+
+    @property
+    def mean(self) -> Array:
+        """Arithmetic mean of the scaled spectra, ndarray, shape (p,), [m/s^2]."""
+        return np.asarray(self.spectra.mean(axis=0))
+
+    @property
+    def least_share(self) -> float:
+        """Least ratio of the mean to the target [-]."""
+        return float((self.mean / self.target).min())
+
+
+def scaled_suite(
+    motions: Sequence[ContinuousMotion],
+    target: ScaleTo,
+    least_share: float | None = None,
+    progress: Progress | None = None,
+) -> ScaledSuite:
+    """Factors of motions for a target of their mean spectrum.
+
+    Each motion is first scaled to the target by itself, by least squares of the logarithms (`ScaleTo.factor`), so that
+    none dominates the mean. One more factor, the same for all, then makes the mean meet the target: the least one for
+    which the mean is nowhere below `least_share` times the target, or, without it, that of least squares of the
+    logarithms.
+
+    Args:
+        motions: of at least one record, corrected.
+        target: a spectrum (sds, sd1 and between) or an ordinate (sa and period); `component` is the measure averaged.
+        least_share: of the target that the mean must reach at every period [-]; ASCE 7-16 requires 1 in 17.3.3.
+        progress: called with the number of completed motions and of all.
+
+    Raises:
+        InputError: the target is a peak acceleration, or a motion has nothing along the component.
+    """
+    if target.pga is not None:
+        raise InputError("scale_to.pga: a mean spectrum has no peak; give sds, sd1 and between, or sa and period")
+    if not motions:
+        raise InputError("suite: there are no motions; give at least one")
+    period, wanted = target.ordinates()
+    column, spectra = measure_index(target.component), []
+    for done, motion in enumerate(motions, start=1):
+        spectra.append(response_spectrum(motion, period, damping=target.damping).psa[:, column])
+        if progress is not None:
+            progress(done, len(motions))
+    single = np.array([target.ratio(wanted, psa) for psa in spectra])
+    mean = (single[:, None] * np.array(spectra)).mean(axis=0)
+    common = target.ratio(wanted, mean) if least_share is None else least_share * float((wanted / mean).max())
+    factors = common * single
+    return ScaledSuite(factors, period, factors[:, None] * np.array(spectra), wanted)

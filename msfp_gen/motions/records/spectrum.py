@@ -112,8 +112,8 @@ def response_spectrum(
         raise InputError(f"damping = {damping!r}: give a ratio above 0 and below 1")
     step, acceleration = _sampled(source)
     sd = []
-    for each in period:
-        sd.append(_peak_measures(_displacements(acceleration, step, each, damping)))
+    for value in period:
+        sd.append(_peak_measures(_displacements(acceleration, step, value, damping)))
         if progress is not None:
             progress(len(sd), len(period))
     return Spectrum(period, damping, np.array(sd), _peak_measures(acceleration))

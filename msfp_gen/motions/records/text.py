@@ -6,6 +6,7 @@ import gzip
 import io
 import re
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NoReturn
 
@@ -96,7 +97,7 @@ class Lines:
         Where they have not, nothing is checked.
         """
         ends = [[word.end() for word in _WORD.finditer(line)] for line in self.lines[top:] if line.strip()]
-        if self.ended or len(ends) < 3 or any(each != ends[0] for each in ends[:-1]):
+        if self.ended or len(ends) < 3 or any(row != ends[0] for row in ends[:-1]):
             return
         if ends[-1] != ends[0][: len(ends[-1])]:
             self.fail(
@@ -133,15 +134,15 @@ class Lines:
 
 def _form(text: str) -> tuple[int, int]:
     """Number of decimals, and of digits of the exponent, of a written number."""
-    found = _DECIMALS.match(text)
-    decimals, exponent = found.groups() if found else ("", "")
+    match = _DECIMALS.match(text)
+    decimals, exponent = match.groups() if match else ("", "")
     return len(decimals or ""), len(exponent or "")
 
 
 def _has_final_zero(text: str) -> bool:
     """Whether the decimals of a written number end with a zero, as those of a fixed count do."""
-    found = _DECIMALS.match(text)
-    return bool(found and (found[1] or "").endswith("0"))
+    match = _DECIMALS.match(text)
+    return bool(match and (match[1] or "").endswith("0"))
 
 
 def read_lines(path: Path) -> Lines:
@@ -183,6 +184,17 @@ def lines_of(path: Path, content: bytes) -> Lines:
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     return Lines(path, text)
+
+
+def search(pattern: re.Pattern[str], head: Iterable[str]) -> re.Match[str] | None:
+    """The first match of a pattern in lines of a header."""
+    return next((match for line in head if (match := pattern.search(line))), None)
+
+
+def word(pattern: re.Pattern[str], head: Iterable[str]) -> str:
+    """The first group of this match; empty where there is none."""
+    match = search(pattern, head)
+    return match[1] if match else ""
 
 
 def column(values: list[float]) -> Array:

@@ -74,7 +74,7 @@ def _find(kind: str, name: str) -> Table:
 
 @lru_cache(maxsize=1)
 def _catalogue() -> dict[str, dict[str, Table]]:
-    found: dict[str, dict[str, Table]] = {kind: {} for kind in KINDS}
+    catalogue: dict[str, dict[str, Table]] = {kind: {} for kind in KINDS}
     folder = files(__package__) / "presets"
     for path in sorted(folder.iterdir(), key=lambda path: path.name):
         if not path.name.endswith(".toml"):
@@ -84,5 +84,5 @@ def _catalogue() -> dict[str, dict[str, Table]]:
         for name, table in tables.items():
             whole = common | table
             kind = "bearing" if path.name == "bearings.toml" else "building" if "building" in whole else "scene"
-            found[kind][name] = whole
-    return found
+            catalogue[kind][name] = whole
+    return catalogue

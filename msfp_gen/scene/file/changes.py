@@ -77,16 +77,16 @@ def multiplied_table(
 
 def keys_of(path: str) -> list[Key]:
     """The keys of a path: names of tables, numbers of rows, None for all rows. Raises InputError."""
-    found: list[Key] = []
+    keys: list[Key] = []
     for part in path.split("."):
         step = _STEP.fullmatch(part)
         if step is None:
             raise InputError("no path of a field; give one such as motion.scale or bearing.surfaces[0].friction")
-        found.append(step[1])
-        found += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
-    if len(found) > MAX_DEPTH:
+        keys.append(step[1])
+        keys += [None if index == "*" else int(index) for index in re.findall(r"\d+|\*", step[2])]
+    if len(keys) > MAX_DEPTH:
         raise InputError("no path of a field: it leads deeper than any table of a scene")
-    return found
+    return keys
 
 
 def _places(walk: _Walk, path: str) -> Iterator[_Place]:
@@ -101,19 +101,19 @@ def _places(walk: _Walk, path: str) -> Iterator[_Place]:
 def _inner_places(walk: _Walk, inner: Any, keys: list[Key]) -> Iterator[_Place]:
     """The places to which keys lead from `inner`, which is a copy, as all that they lead through becomes one."""
     key, *rest = keys
-    for each in [key] if isinstance(key, str) else _rows(inner, key):
+    for step in [key] if isinstance(key, str) else _rows(inner, key):
         if not rest:
-            yield _Place(inner, each)
+            yield _Place(inner, step)
             continue
-        if isinstance(each, str):
-            inner.setdefault(each, {})
-        inner[each] = _own_bearing(walk, inner[each], rest[0]) if each == "bearing" else copy(inner[each])
-        if isinstance(rest[0], str) and not isinstance(inner[each], dict):
-            raise InputError(f"{each} is {inner[each]!r} here, which has no fields to change")
-        if each == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[each]:
-            yield from _column(walk, inner[each], str(rest[0]))
+        if isinstance(step, str):
+            inner.setdefault(step, {})
+        inner[step] = _own_bearing(walk, inner[step], rest[0]) if step == "bearing" else copy(inner[step])
+        if isinstance(rest[0], str) and not isinstance(inner[step], dict):
+            raise InputError(f"{step} is {inner[step]!r} here, which has no fields to change")
+        if step == "bearing" and len(rest) == 1 and rest[0] in _COLUMNS and "layout" in inner[step]:
+            yield from _column(walk, inner[step], str(rest[0]))
         else:
-            yield from _inner_places(walk, inner[each], rest)
+            yield from _inner_places(walk, inner[step], rest)
 
 
 def _column(walk: _Walk, bearing: Table, name: str) -> Iterator[_Place]:
@@ -144,16 +144,16 @@ def _rows(inner: Any, index: int | None) -> list[int]:
     return list(range(len(inner))) if index is None else [index]
 
 
-def _own_bearing(walk: _Walk, given: Any, following: Key) -> Any:
+def _own_bearing(walk: _Walk, bearing: Any, following: Key) -> Any:
     """A bearing as a table that can be changed; complete where a row of its surfaces or bodies is."""
-    if isinstance(given, str):
+    if isinstance(bearing, str):
         named = walk.root.get("bearings", {})
-        given = named[given] if isinstance(named, dict) and given in named else {"preset": given}
-    if isinstance(given, str):
-        given = {"preset": given}
-    if isinstance(given, dict) and (walk.complete or (following in ROWS and "preset" in given)):
-        return complete_bearing(given)
-    return copy(given)
+        bearing = named[bearing] if isinstance(named, dict) and bearing in named else {"preset": bearing}
+    if isinstance(bearing, str):
+        bearing = {"preset": bearing}
+    if isinstance(bearing, dict) and (walk.complete or (following in ROWS and "preset" in bearing)):
+        return complete_bearing(bearing)
+    return copy(bearing)
 
 
 def _times(value: Any, factor: float) -> Any:

@@ -19,8 +19,8 @@ from msfp_gen.scene.file import catalogue, schema
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces, resolved
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
 from msfp_gen.scene.file.toml_text import dumps, plain_values
-from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import SELECTABLE, Auto, Effects, Layout
@@ -73,8 +73,8 @@ def toml_table(text: str) -> Table:
         raise InputError(f"no valid TOML: {str(error).partition(';')[0]}") from None
     level: list[Any] = [table]
     for _ in range(MAX_DEPTH):  # a dotted key nests without a recursion of the parser
-        values = (each.values() if isinstance(each, dict) else each for each in level)
-        level = [item for each in values for item in each if isinstance(item, dict | list)]
+        values = (entry.values() if isinstance(entry, dict) else entry for entry in level)
+        level = [item for entry in values for item in entry if isinstance(item, dict | list)]
     if level:
         raise InputError(_TOO_DEEP)
     return table
@@ -91,23 +91,23 @@ def scene_from_table(
     folder: that of the scene file, to which paths in the table are relative; None: the working folder, and any path is
     permitted. motion: replaces the `[motion]` table; motion_table: that from which it was made. Raises InputError.
     """
-    given = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
-    made = dict(given["motion"])
-    if "file" in made:
-        made["file"] = resolved(made["file"], folder)
-    top = dict(given["top"])
-    parts: Table = {name: kind(**given.pop(name)) for name, kind in _PARTS.items() if name in given}
-    if "effects" in given:
-        parts["effects"] = effects_from_table(given.pop("effects"))
+    valid = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
+    motion_keys = dict(valid["motion"])
+    if "file" in motion_keys:
+        motion_keys["file"] = resolved(motion_keys["file"], folder)
+    top = dict(valid["top"])
+    parts: Table = {name: kind(**valid.pop(name)) for name, kind in _PARTS.items() if name in valid}
+    if "effects" in valid:
+        parts["effects"] = effects_from_table(valid.pop("effects"))
     for name, kinds in (("load", LOADS), ("top_rotation", ROTATIONS)):
-        if name in given:
-            parts[name] = history_from(kinds, given.pop(name), name)
+        if name in valid:
+            parts[name] = history_from(kinds, valid.pop(name), name)
     if parts.get("top_rotation") is not None and isinstance(parts.get("effects"), Effects):
         parts["effects"] = replace(parts["effects"], top_rotation=True)
-    parts["bearing"] = _bearing(given["bearing"])
+    parts["bearing"] = _bearing(valid["bearing"])
     parts["top"] = _TOPS[top.pop("kind")](**top)
-    parts["motion"] = _motion(made) if motion is None else motion
-    return Scene(**{**given, **parts, "motion_table": made if motion is None else motion_table})
+    parts["motion"] = _motion(motion_keys) if motion is None else motion
+    return Scene(**{**valid, **parts, "motion_table": motion_keys if motion is None else motion_table})
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:
@@ -124,21 +124,21 @@ def complete_bearing(table: Mapping[str, Any]) -> Table:
 
 
 def _completed(table: Mapping[str, Any]) -> Table:
-    given = schema.validate_part("bearing", table)
-    at = given.pop("friction_at", "surface")
+    valid = schema.validate_part("bearing", table)
+    at = valid.pop("friction_at", "surface")
     if at == "surface":
-        return dict(plain_values(bearing_table(_bearing(given))))
-    _bearing({**given, "friction_at": at})  # raises its errors
-    return {**plain_values(bearing_table(_bearing(given))), "friction_at": at}
+        return dict(plain_values(bearing_table(_bearing(valid))))
+    _bearing({**valid, "friction_at": at})  # raises its errors
+    return {**plain_values(bearing_table(_bearing(valid))), "friction_at": at}
 
 
 def complete_part(name: str, table: Mapping[str, Any]) -> Table:
     """The table `[top]` or `[solver]` with all numbers, in SI units. Raises InputError."""
-    given = schema.validate_part(name, table)
+    valid = schema.validate_part(name, table)
     if name == "solver":
-        return dict(plain_values(plain_table(Solver(**given))))
-    kind = given.pop("kind")
-    return {"kind": kind, **plain_values(plain_table(_TOPS[kind](**given)))}
+        return dict(plain_values(plain_table(Solver(**valid))))
+    kind = valid.pop("kind")
+    return {"kind": kind, **plain_values(plain_table(_TOPS[kind](**valid)))}
 
 
 def bearing_table(bearing: Bearing) -> Table:
@@ -171,15 +171,15 @@ def scene_text(scene: Scene, motion: Mapping[str, Any] | None = None) -> str:
     )
 
 
-def effects_from_table(given: Mapping[str, Any]) -> Effects | Auto:
+def effects_from_table(table: Mapping[str, Any]) -> Effects | Auto:
     """`Effects` where a table gives every effect that could be selected, else `Auto`."""
-    if "error" in given or any(name not in given for name in SELECTABLE):
-        return Auto(**given)
-    return Effects(**given)
+    if "error" in table or any(name not in table for name in SELECTABLE):
+        return Auto(**table)
+    return Effects(**table)
 
 
-def _bearing(given: Mapping[str, Any]) -> Bearing:
-    changes = dict(given)
+def _bearing(table: Mapping[str, Any]) -> Bearing:
+    changes = dict(table)
     if "preset" in changes:
         return _preset(changes.pop("preset")).replace(**changes)
     with errors_at("layout", "bearing.layout"):

@@ -189,8 +189,8 @@ class RecordMotion(MotionTable):
     def files(self) -> tuple[Path, ...]:
         """The files of the record; none where it comes with the package."""
         if (self.file is None) == (self.bundled is None):
-            found = "neither is" if self.file is None else "both are"
-            raise InputError(f"motion.file and motion.bundled: {found} given; give one, a path or a record's name")
+            defect = "neither is" if self.file is None else "both are"
+            raise InputError(f"motion.file and motion.bundled: {defect} given; give one, a path or a record's name")
         return tuple(_existing(file) for file in ([self.file] if isinstance(self.file, str) else self.file or ()))
 
     def _record(self) -> Record:
@@ -262,7 +262,7 @@ def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "moti
     """
     if isinstance(file, str):
         return _resolved(file, folder, name)
-    return tuple(_resolved(each, folder, name) for each in file)
+    return tuple(_resolved(path, folder, name) for path in file)
 
 
 def _resolved(file: str, folder: Path | None, name: str) -> str:
@@ -271,8 +271,8 @@ def _resolved(file: str, folder: Path | None, name: str) -> str:
     except (OSError, ValueError, RuntimeError) as error:  # such as a null character, or a loop of symbolic links
         raise InputError(f"{name} = {file!r}: this is no path ({error}); give that of a file") from None
     records = os.environ.get(RECORDS, "").split(os.pathsep)
-    permitted = [folder, *(Path(each).expanduser() for each in records if each)] if folder is not None else []
-    if permitted and not any(path.is_relative_to(each.resolve()) for each in permitted):
+    permitted = [folder, *(Path(record).expanduser() for record in records if record)] if folder is not None else []
+    if permitted and not any(path.is_relative_to(record.resolve()) for record in permitted):
         raise InputError(
             f"{name} = {file!r}: outside the folder of the scene file; put the file there, or name its folder "
             f"in the environment variable {RECORDS}"

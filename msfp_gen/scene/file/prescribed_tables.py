@@ -32,6 +32,21 @@ class HistoryTable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Ramp(HistoryTable):
+    kind, make = "ramp", "ramp"
+    duration: Annotated[float, _TIME]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Harmonic(HistoryTable):
+    kind, make = "harmonic", "harmonic"
+    frequency: Annotated[float, _FREQUENCY]
+    cycles: Annotated[float, _COUNT]
+    phase: Annotated[float, _ANGLE] = 0.0
+    lead_in: Annotated[float | None, _TIME] = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class ConstantLoad(HistoryTable):
     """`Load.constant`."""
 
@@ -41,22 +56,13 @@ class ConstantLoad(HistoryTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RampLoad(ConstantLoad):
+class RampLoad(_Ramp, ConstantLoad):
     """`Load.ramp`."""
-
-    kind, make = "ramp", "ramp"
-    duration: Annotated[float, _TIME]
 
 
 @dataclass(frozen=True, kw_only=True)
-class HarmonicLoad(ConstantLoad):
+class HarmonicLoad(_Harmonic, ConstantLoad):
     """`Load.harmonic`."""
-
-    kind, make = "harmonic", "harmonic"
-    frequency: Annotated[float, _FREQUENCY]
-    cycles: Annotated[float, _COUNT]
-    phase: Annotated[float, _ANGLE] = 0.0
-    lead_in: Annotated[float | None, _TIME] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,22 +95,13 @@ class ConstantRotation(HistoryTable):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RampRotation(ConstantRotation):
+class RampRotation(_Ramp, ConstantRotation):
     """`Rotation.ramp`."""
-
-    kind, make = "ramp", "ramp"
-    duration: Annotated[float, _TIME]
 
 
 @dataclass(frozen=True, kw_only=True)
-class HarmonicRotation(ConstantRotation):
+class HarmonicRotation(_Harmonic, ConstantRotation):
     """`Rotation.harmonic`."""
-
-    kind, make = "harmonic", "harmonic"
-    frequency: Annotated[float, _FREQUENCY]
-    cycles: Annotated[float, _COUNT]
-    phase: Annotated[float, _ANGLE] = 0.0
-    lead_in: Annotated[float | None, _TIME] = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,8 +32,8 @@ from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
-from msfp_gen.scene.parts import InitialState, Stop
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.specification.layout import Auto, Layout
@@ -48,10 +48,10 @@ class _Strict(BaseModel):
 
 def model_of(kind: type, /, **more: Any) -> Model:
     """A pydantic model of the fields of a dataclass that have a rule, and of `more` fields as (annotation, default)."""
-    given = {
+    model_fields = {
         name: (_read(rule.parse), ... if default is MISSING else default) for name, rule, default in ruled_fields(kind)
     }
-    return create_model(kind.__name__, __base__=_Strict, **{**given, **more})
+    return create_model(kind.__name__, __base__=_Strict, **{**model_fields, **more})
 
 
 def _read(parse: Callable[..., Any]) -> Any:
@@ -204,7 +204,7 @@ def validate(model: Model, table: Mapping[str, Any], tables: Mapping[str, Model]
     except ValidationError as error:
         details = error.errors(include_url=False)
     # A misspelt key is reported twice, as unknown and as missing: the report of the unknown key is more helpful.
-    detail = min(details, key=lambda each: each["type"] != "extra_forbidden")
+    detail = min(details, key=lambda candidate: candidate["type"] != "extra_forbidden")
     location = detail["loc"]
     path = ".".join(part for part in location[:-1] if isinstance(part, str))
     inner = (_TABLES if tables is None else tables).get(path, _Strict)

@@ -15,8 +15,7 @@ import numpy as np
 
 from msfp_gen.common.fields import Notes
 from msfp_gen.errors import InputError
-from msfp_gen.motions.motion import Motion
-from msfp_gen.motions.trajectory import CHANNELS
+from msfp_gen.motions.motion import CHANNELS, Motion
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces
 
@@ -89,4 +88,4 @@ def _makes(table: Mapping[str, Any], motion: Motion) -> bool:
 def _file_names(table: Mapping[str, Any]) -> dict[str, Any]:
     """The key `file` of a `[motion]` table without folders."""
     file = table["file"]
-    return {"file": PurePath(file).name if isinstance(file, str) else [PurePath(each).name for each in file]}
+    return {"file": PurePath(file).name if isinstance(file, str) else [PurePath(path).name for path in file]}

@@ -57,11 +57,11 @@ def suite_from_table(
     table: Table, folder: Path | None, progress: Callable[[float, float], None] | None = None
 ) -> Suite:
     """The suite of a plain table, as in a suite file. folder: as of `scene_from_table`. Raises InputError."""
-    given = schema.validate_suite(table)
-    if not given["records"]:
+    valid = schema.validate_suite(table)
+    if not valid["records"]:
         raise InputError("records = []: give at least one [[records]]")
-    tables = [_located(each, folder, index) for index, each in enumerate(given["records"])]
-    return _suite(tables, given.get("scale_to"), progress)
+    tables = [_located(record, folder, index) for index, record in enumerate(valid["records"])]
+    return _suite(tables, valid.get("scale_to"), progress)
 
 
 def _located(table: Table, folder: Path | None, index: int) -> Table:
@@ -88,15 +88,15 @@ def _suite(tables: list[Table], target: Table | None, progress: Callable[[float,
 
 
 def _records(tables: list[Table]) -> tuple[SuiteRecord, ...]:
-    found = []
+    records = []
     for index, table in enumerate(tables):
         try:
             motion = RecordMotion(**table).build()
         except InputError as error:
             raise InputError(f"records[{index}].{str(error).removeprefix('motion').lstrip('.: ')}") from None
-        found.append(SuiteRecord(motion.name, table, motion))
-    names = [record.name for record in found]
+        records.append(SuiteRecord(motion.name, table, motion))
+    names = [record.name for record in records]
     return tuple(
         replace(record, name=f"{record.name}-{index}") if names.count(record.name) > 1 else record
-        for index, record in enumerate(found, start=1)
+        for index, record in enumerate(records, start=1)
     )

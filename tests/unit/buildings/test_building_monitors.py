@@ -13,7 +13,7 @@ from msfp_gen.buildings import scene as selection
 from msfp_gen.buildings.compiled_run import start_run
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.results.restart_state import RestartState
-from msfp_gen.scene import monitors
+from msfp_gen.scene import effect_switching
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_fixed_effects_are_noted_and_end_the_run_with_the_name_of_the_bearing(fi
 @pytest.mark.usefixtures("unforeseen")
 def test_notes_of_heat_give_the_peak_over_all_models_of_a_bearing(monkeypatch):
     """Two of the bearings change their model after the limit of heat, here a hundredth of the usual one, is passed."""
-    monkeypatch.setattr(monitors, "NOTED_SOFTENING", 5e-4)
+    monkeypatch.setattr(effect_switching, "NOTED_SOFTENING", 5e-4)
     run, highest = start_run(rocking(None)), np.zeros(4)
     while run.run.advance(10) or run.switch():
         parts = [RestartState.of_port(member.port).monitor_heat for member in run.members]

@@ -15,8 +15,7 @@ from support.generic_client import Client, serving
 
 from msfp_gen import Auto, Effects, InputError, Motion, Scene, Solver, Top, TwoPort, load_scene
 from msfp_gen.cli import main
-from msfp_gen.coupling.generic_client import freedoms
-from msfp_gen.coupling.server import Server
+from msfp_gen.coupling.server import Server, freedoms
 from msfp_gen.scene.file.loader import scene_text
 
 STEP = 0.01

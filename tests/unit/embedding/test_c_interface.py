@@ -22,7 +22,7 @@ from support.example import example_bearing
 from msfp_gen import Effects, InputError, Layout, Motion, Scene, Solver, Top, build_model
 from msfp_gen.embedding import values
 from msfp_gen.model.model import Model
-from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
 

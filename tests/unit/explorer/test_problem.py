@@ -70,7 +70,7 @@ def test_what_a_page_cannot_run_is_named() -> None:
 
 
 def test_without_ziglang_the_remedy_is_named(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr("msfp_gen.explorer.module.zig_program", lambda: None)
+    monkeypatch.setattr("msfp_gen.explorer.page.zig_program", lambda: None)
     target = tmp_path / "page.html"
     assert main(["explore", "fenz-test2", "-o", str(target)]) == 2
     error = capsys.readouterr().err

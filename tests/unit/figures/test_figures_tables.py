@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support import thinned
 
 from msfp_gen.errors import InputError
 from msfp_gen.figures import plot_correction, plot_response_spectrum, plot_work_precision
@@ -106,7 +107,10 @@ def test_a_record_taken_as_it_is_is_not_called_corrected():
     assert plot_correction(calm, uncorrected(calm)).get_suptitle().endswith("and not corrected")
 
 
-@pytest.mark.parametrize("name", [r"$\frac$", "a $ b", r"50 $ and \$5", "$x$", "{}_^\\", "地震"])
+NAMES = [r"$\frac$", "a $ b", r"50 $ and \$5", "$x$", "{}_^\\", "地震"]
+
+
+@pytest.mark.parametrize("name", thinned(NAMES, lambda name: name in (NAMES[0], NAMES[2], NAMES[-1])))
 def test_a_name_is_drawn_as_it_is_whatever_it_holds(name):
     record = replace(drifting(), name=name, channels=(name, "", name))
     corrected = baseline_corrected(record)

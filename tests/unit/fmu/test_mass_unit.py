@@ -236,13 +236,3 @@ def test_what_model_exchange_refuses(unit: Path) -> None:
         with pytest.raises(FMICallException):
             at_work.read(at_work.outputs)
         assert "uplift" in at_work.messages[-1]
-
-
-def test_functions_of_model_exchange_are_refused_in_co_simulation(unit: Path) -> None:
-    with Unit(unit, inputs_at_step_end=True) as at_work:
-        at_work.start()
-        for function, given in (("EnterEventMode", ()), ("SetTime", (ctypes.c_double(0.5),))):
-            assert at_work.call(function, *given) == 3  # an error
-            assert f"{function}: this instance is for Co-Simulation" in at_work.messages[-1]
-        assert at_work.get("time") == 0.0
-        assert at_work.step(0.0, STEP).any()

@@ -1,13 +1,15 @@
-"""The emitted headers of two models, byte by byte as in tests/golden: a change of them is seen, and is made on purpose.
+"""Five emitted kernels, byte by byte as in tests/golden: a change of what is emitted is seen, and is made on purpose.
 
 After an intended change of the generator or the templates: `pytest tests/unit/generator/test_golden.py --update`, then
-read the difference in git. SymPy orders terms differently from one minor version to the next, so the files hold for
+read the difference in git. SymPy orders terms differently from one minor version to the next, so the kernels hold for
 one of them, which `tests/golden/sympy-version` names; with another the comparison is skipped.
 """
 
 from __future__ import annotations
 
 import difflib
+import re
+from functools import cache
 from itertools import islice
 
 import pytest
@@ -20,17 +22,30 @@ from msfp_gen.specification.layout import ModelSpec
 
 GOLDEN = ROOT / "tests" / "golden"
 SYMPY = GOLDEN / "sympy-version"
-MODELS = {
-    "single-planar": ModelSpec(Layout(2, 1, 0), Effects(dimension="planar")),
-    "triple-spatial-velocity": ModelSpec(Layout(5, 2, 2), Effects(friction="velocity")),
+PLANAR = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar"))
+SPATIAL = ModelSpec(Layout(5, 2, 2), Effects(friction="velocity"))
+KERNELS = {  # one of each kind
+    "msfp_angular_balance": SPATIAL,  # values
+    "msfp_surface_local_tangent": SPATIAL,  # values and derivative columns
+    "msfp_contact_lanes": SPATIAL,  # all surfaces at once, with a friction law
+    "msfp_contact_jacobian": PLANAR,  # the same with the matrix of derivatives
+    "msfp_forward": PLANAR,  # what a vertical plane leaves of the kinematics
 }
-FILES = ("msfp_kernels.h", "msfp_model.h")
 INTERFACE = "msfp.h"  # the same for every model
 SHOWN = 60  # lines of a difference
 
 
-def minor(version: str) -> list[str]:
-    return version.strip().split(".")[:2]
+@cache
+def emitted(spec: ModelSpec, file: str) -> str:
+    return generate(spec).files[file]
+
+
+def kernel(name: str) -> str:
+    """A kernel with the lines that belong to it above."""
+    text = emitted(KERNELS[name], "msfp_kernels.h")
+    match = re.search(rf"(?:^[^}}\n][^\n]*\n)*^static inline void {name}\(.*?^}}\n", text, re.MULTILINE | re.DOTALL)
+    assert match is not None
+    return match[0]
 
 
 def difference(old: str, new: str) -> str:
@@ -39,31 +54,27 @@ def difference(old: str, new: str) -> str:
     return "\n".join(islice(lines, SHOWN))
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_emitted_headers_are_the_golden_ones(name: str, update: bool) -> None:
-    files = generate(MODELS[name]).files
-    folder = GOLDEN / name
+@pytest.mark.parametrize("name", KERNELS)
+def test_emitted_kernels_are_the_golden_ones(name: str, update: bool) -> None:
+    path, text = GOLDEN / f"{name}.h", kernel(name)
     if update:
-        folder.mkdir(parents=True, exist_ok=True)
-        for file in FILES:
-            (folder / file).write_bytes(files[file].encode())
+        path.write_bytes(text.encode())
         SYMPY.write_text(f"{sympy.__version__}\n", encoding="utf-8")
         return
-    known = SYMPY.read_text(encoding="utf-8")
-    if minor(known) != minor(sympy.__version__):
-        pytest.skip(f"golden files are of SymPy {known.strip()}, this is {sympy.__version__}")
-    for file in FILES:
-        golden = (folder / file).read_bytes()
-        assert golden == files[file].encode(), (
-            f"{folder.relative_to(ROOT) / file} is not what the generator emits now. If this change is intended, run "
-            f"pytest {__file__.removeprefix(f'{ROOT}/')} --update and read the difference in git.\n"
-            f"{difference(golden.decode(), files[file])}"
-        )
+    golden_version = SYMPY.read_text(encoding="utf-8").strip()
+    if golden_version.split(".")[:2] != sympy.__version__.split(".")[:2]:
+        pytest.skip(f"golden kernels are of SymPy {golden_version}, this is {sympy.__version__}")
+    golden = path.read_bytes()
+    assert golden == text.encode(), (
+        f"{path.relative_to(ROOT)} is not what the generator emits now. If this change is intended, run "
+        f"pytest {__file__.removeprefix(f'{ROOT}/')} --update and read the difference in git.\n"
+        f"{difference(golden.decode(), text)}"
+    )
 
 
 def test_a_change_of_the_public_header_raises_its_version(update: bool) -> None:
     """A program that was compiled with an earlier header must see that the table of functions is another."""
-    path, text = GOLDEN / INTERFACE, generate(MODELS["single-planar"]).files[INTERFACE]
+    path, text = GOLDEN / INTERFACE, emitted(PLANAR, INTERFACE)
     if update:
         path.write_bytes(text.encode())
         return

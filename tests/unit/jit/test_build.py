@@ -14,6 +14,7 @@ from types import ModuleType
 
 import pytest
 from support import fake_model
+from support.fake_model import run_child
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler, pruning
@@ -26,35 +27,19 @@ MODULE = "msfp_3_1_1"
 
 @pytest.fixture(autouse=True)
 def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package of its own with a fake generator, and an empty cache."""
-    monkeypatch.setattr(cache, "PACKAGE", fake_model.write_house(tmp_path / "house"))
-    monkeypatch.setenv("MSFP_GEN_CACHE", str(tmp_path / "models"))
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setitem(sys.modules, "msfp_gen.generator", fake_model.generator())
     monkeypatch.setattr(model, "_models", {})
-    return cache.PACKAGE
+    return fake_model.house(tmp_path, monkeypatch)
 
 
 @pytest.fixture(scope="module")
 def prebuilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cache that holds the fake model, built once for all tests that start from one."""
-    root = tmp_path_factory.mktemp("prebuilt")
-    house = fake_model.write_house(root / "house")
-    assert run_child(house, root / "models").communicate()[0].split()[:2] == ["False", "42.0"]
-    return root / "models"
+    return fake_model.prebuilt(tmp_path_factory)
 
 
 @pytest.fixture
 def models(prebuilt: Path, tmp_path: Path) -> Path:
     shutil.copytree(prebuilt, tmp_path / "models")
     return tmp_path / "models"
-
-
-def run_child(house: Path, models: Path) -> subprocess.Popen[str]:
-    environment = {**os.environ, "MSFP_GEN_CACHE": str(models)}
-    environment.pop("CC", None)
-    command = [sys.executable, fake_model.__file__, str(house)]
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
 
 
 def break_generator(monkeypatch: pytest.MonkeyPatch, **texts: str) -> None:

@@ -8,7 +8,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 from support import fake_model
+from support.fake_model import run_child
 
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
@@ -29,20 +29,12 @@ EXTENSION = f"{MODULE}{compiler.EXTENSION_SUFFIX}"
 
 @pytest.fixture(autouse=True)
 def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package of its own with a generator that builds in a second, and an empty cache."""
-    monkeypatch.setattr(cache, "PACKAGE", fake_model.write_house(tmp_path / "house"))
-    monkeypatch.setenv("MSFP_GEN_CACHE", str(tmp_path / "models"))
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setitem(sys.modules, "msfp_gen.generator", fake_model.generator())
-    return cache.PACKAGE
+    return fake_model.house(tmp_path, monkeypatch)
 
 
 @pytest.fixture(scope="module")
 def prebuilt(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("prebuilt")
-    child = run_child(fake_model.write_house(root / "house"), root / "models")
-    assert child.communicate()[0].split()[:2] == ["False", "42.0"]
-    return root / "models"
+    return fake_model.prebuilt(tmp_path_factory)
 
 
 @pytest.fixture
@@ -52,13 +44,6 @@ def entry(prebuilt: Path, tmp_path: Path) -> cache.Entry:
     found = cache.Entry.of(SPEC)
     assert found.find() is not None
     return found
-
-
-def run_child(house: Path, models: Path) -> subprocess.Popen[str]:
-    environment = {name: value for name, value in os.environ.items() if name != "CC"} | {"MSFP_GEN_CACHE": str(models)}
-    command = [sys.executable, fake_model.__file__, str(house)]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen(command, env=environment, text=True, start_new_session=True, **pipes)
 
 
 def assert_not_believed(entry: cache.Entry) -> None:
@@ -187,15 +172,20 @@ def test_builds_killed_at_any_moment(house: Path, tmp_path: Path) -> None:
     assert_works()
 
 
-def test_two_builders_of_which_the_first_is_killed(house: Path, tmp_path: Path) -> None:
-    """The other one waits for the lock, gets it and builds: nobody waits for the dead."""
-    models = tmp_path / "models"
+def two_builders(house: Path, models: Path) -> tuple[subprocess.Popen[str], subprocess.Popen[str]]:
+    """Two processes that want one model: the second starts when the first compiles."""
     first = run_child(house, models)
     deadline = time.monotonic() + 30
     while not list(models.glob("*.part-*/build.log")):
         assert first.poll() is None and time.monotonic() < deadline
         time.sleep(0.005)
-    second = run_child(house, models)
+    return first, run_child(house, models)
+
+
+def test_two_builders_of_which_the_first_is_killed(house: Path, tmp_path: Path) -> None:
+    """The other one waits for the lock, gets it and builds: nobody waits for the dead."""
+    models = tmp_path / "models"
+    first, second = two_builders(house, models)
     time.sleep(0.3)
     os.killpg(first.pid, signal.SIGKILL)
     first.communicate()
@@ -214,12 +204,7 @@ def test_four_builders_build_once(house: Path, tmp_path: Path) -> None:
 def test_a_builder_that_came_second_leaves_no_folder(house: Path, tmp_path: Path) -> None:
     """It waits for the lock while the first one builds, and finds the model when it has the lock."""
     models = tmp_path / "models"
-    first = run_child(house, models)
-    deadline = time.monotonic() + 30
-    while not list(models.glob("*.part-*/build.log")):
-        assert first.poll() is None and time.monotonic() < deadline
-        time.sleep(0.005)
-    second = run_child(house, models)
+    first, second = two_builders(house, models)
     assert first.communicate()[0].split()[:2] == ["False", "42.0"]
     assert second.communicate()[0].split()[:2] == ["True", "42.0"]
     folder = cache.Entry.of(SPEC).folder.name

@@ -13,7 +13,7 @@ from support import ROOT, fake_model
 
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.jit import build, cache, compiler, doctor
-from msfp_gen.jit.options import FORBIDDEN, words
+from msfp_gen.jit.compiler import FORBIDDEN, words
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())
@@ -22,10 +22,7 @@ SPEC = ModelSpec(Layout.dfp())
 @pytest.fixture
 def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache, and a package whose models build in a second."""
-    monkeypatch.setattr(cache, "PACKAGE", fake_model.write_house(tmp_path / "house"))
-    monkeypatch.setenv("MSFP_GEN_CACHE", str(tmp_path / "models"))
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setitem(sys.modules, "msfp_gen.generator", fake_model.generator())
+    fake_model.house(tmp_path, monkeypatch)
     return tmp_path / "models"
 
 

@@ -8,7 +8,7 @@ from msfp_gen.buildings.load import load_scene
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Body, Surface
-from msfp_gen.scene.parts import Stop
+from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Layout
 

@@ -28,10 +28,10 @@ from msfp_gen.motions.piecewise import ORDER
 from msfp_gen.result import Result
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
-from msfp_gen.scene.effect_switching import REQUIRED_EFFECTS, Ending, _extended, all_effects, next_effects
+from msfp_gen.scene.effect_switching import Ending, all_effects, next_effects, stopping_monitors
 from msfp_gen.scene.explain import explain
 from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.scene.parts import InitialState, Stop
+from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.simulate import RunSequence
@@ -346,7 +346,8 @@ def test_all_effects_are_all_that_monitors_may_add() -> None:
         every = all_effects(scene)
         assert every == Effects(friction=friction, uplift=True)
         assert all_effects(with_selection(scene, dimension="planar", sliders="massless", rims=False)) == every
-        assert not any(_extended(scene, every, name) for name in REQUIRED_EFFECTS)
+        assert not stopping_monitors(scene, every, strict=False)
+        assert next_effects(scene, Ending(every, "ok", 0.0, 0, 0.0, {})) is None  # where a plane would be left
     for given in ({"dimension": "planar"}, {"rims": False}, {"uplift": False}, {"friction": "pv"}, {"spin": "patch"}):
         fixed = all_effects(replace(kumar(), effects=Auto(**given)))
         assert fixed == Effects(**{"friction": "pvt", "uplift": True} | given)

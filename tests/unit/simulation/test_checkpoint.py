@@ -31,7 +31,7 @@ from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.output import replacing
 from msfp_gen.result import Result
-from msfp_gen.scene.parts import Stop
+from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import checkpoint
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.segment import start_run

@@ -16,7 +16,7 @@ from support import failure_of, hearing, scene_of
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, build_model, presets, simulate
 from msfp_gen.result import Result
-from msfp_gen.scene.parts import InitialState
+from msfp_gen.scene.scene_fields import InitialState
 
 LOAD = 112e3
 STILL = Motion(knots=[0.0, 1.0], coefficients=np.zeros((1, 6, 6)))

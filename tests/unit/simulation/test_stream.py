@@ -20,7 +20,7 @@ from msfp_gen.result import Result
 from msfp_gen.results import thinning
 from msfp_gen.results.thinning import thinned_history
 from msfp_gen.scene.file.loader import scene_text
-from msfp_gen.scene.parts import Stop
+from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import memory, streamed_rows
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.simulation.checkpoint import Checkpoint

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def names(kind: str | None = None) -> dict[str, str]:
     """Name -> one line of description, of the presets of a `kind` ("bearing", "scene", "building"), or of all."""
     kinds = catalogue.KINDS if kind is None else (kind,)
-    return {name: line for each in kinds for name, line in catalogue.descriptions(each).items()}
+    return {name: line for word in kinds for name, line in catalogue.descriptions(word).items()}
 
 
 def bearing(name: str) -> Bearing:

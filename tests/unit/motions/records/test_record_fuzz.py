@@ -24,7 +24,7 @@ from support.damaged_records import (
 
 from msfp_gen.errors import InputError
 from msfp_gen.motions import records
-from msfp_gen.motions.records import table, text
+from msfp_gen.motions.records import csv_table, text
 from msfp_gen.motions.records.record import Record
 
 LABELS = ("90 Deg", "360 Deg", "Up")
@@ -69,7 +69,7 @@ def test_every_reader_has_a_sample_that_is_fine(tmp_path: Path) -> None:
             path.write_text(sample)
             lines = text.read_lines(path)
             owners = [each.name for each in records._FORMATS if each.matches(lines)]
-            assert owners + ["CSV"] * table.matches(lines) == [form], "one reader knows it, the others do not"
+            assert owners + ["CSV"] * csv_table.matches(lines) == [form], "one reader knows it, the others do not"
 
 
 @pytest.mark.parametrize(("form", "number"), ALL)

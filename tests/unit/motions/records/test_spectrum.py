@@ -18,8 +18,8 @@ from msfp_gen.motions.records import (
     read_record,
     response_spectrum,
 )
+from msfp_gen.motions.records.record_tables import arias_intensity, significant_duration
 from msfp_gen.motions.records.spectrum import MEASURES
-from msfp_gen.motions.records.tables import arias_intensity, significant_duration
 
 G = 9.80665
 

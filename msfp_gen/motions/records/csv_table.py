@@ -131,8 +131,8 @@ def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str]
             lines.fail(
                 head, f"column {text.strip()[:24]!r} is not of the form `name [unit]`, as in: time [s], a1 [m/s^2]"
             )
-    found = [m for m in matches if m is not None]
-    names, units = [m[1].lower() for m in found], [(m[2] or m[3] or "").strip() for m in found]
+    columns = [m for m in matches if m is not None]
+    names, units = [m[1].lower() for m in columns], [(m[2] or m[3] or "").strip() for m in columns]
     parts = [n for n in names if n != "time"]
     if "time" not in names or not parts or len(set(names)) < len(names):
         lines.fail(head, f"columns {', '.join(names)}; give time and at least one of a1, a2, a3, each once")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, number, show
+from msfp_gen.cli.console import Progress, note, note_written, number, show
 from msfp_gen.common.output import FIGURE_SUFFIXES, check_output
 from msfp_gen.errors import InputError
 
@@ -81,7 +81,7 @@ def record(
     if as_is and (correct or corner is not None):
         raise InputError("--as-is: excludes correction; leave out --correct and --corner")
     from msfp_gen.motions.records import Corrected, ScaleTo
-    from msfp_gen.motions.records.tables import record_tables
+    from msfp_gen.motions.records.record_tables import record_tables
 
     target = None if scale_to is None else ScaleTo.parse(scale_to)
     raw = _turned(_read(files), components, rotated_by)
@@ -97,8 +97,7 @@ def record(
         _write_spectrum(raw, motion, target, spectrum)
     if output is not None:
         _write_record(raw, motion, output)
-    for path in filter(None, (plot, spectrum, output)):
-        note(f"wrote {path}")
+    note_written(filter(None, (plot, spectrum, output)))
 
 
 @app.command(epilog="Example:\n\n\b\n  msfp-gen suite suite.toml --spectrum suite.png")
@@ -111,19 +110,19 @@ def suite(
     """Read a suite of ground motions; scale its mean spectrum to a target; print the factors."""
     if spectrum is not None:
         check_output(spectrum, FIGURE_SUFFIXES, "--spectrum")
-    from msfp_gen.motions.records.tables import suite_tables
+    from msfp_gen.motions.records.record_tables import suite_tables
     from msfp_gen.scene.file.suite import load_suite
 
     with Progress("spectra") as progress:
-        found = load_suite(file, progress)
-    if spectrum is not None and (found.scaled is None or len(found.scaled.period) == 1):
+        loaded = load_suite(file, progress)
+    if spectrum is not None and (loaded.scaled is None or len(loaded.scaled.period) == 1):
         raise InputError(f"--spectrum: {file} has no [scale_to] with sds, sd1 and between; give one")
-    names, motions = [record.name for record in found.records], [record.motion for record in found.records]
-    show(suite_tables(names, motions, found.scaled))
-    if spectrum is not None and found.scaled is not None:
+    names, motions = [record.name for record in loaded.records], [record.motion for record in loaded.records]
+    show(suite_tables(names, motions, loaded.scaled))
+    if spectrum is not None and loaded.scaled is not None:
         from msfp_gen.figures import plot_response_spectrum
 
-        scaled = found.scaled
+        scaled = loaded.scaled
         curves, target = dict(zip(names, scaled.spectra, strict=True)), (scaled.period, scaled.target)
         title = f"Mean spectrum of {file.name}"
         plot_response_spectrum(scaled.period, curves, spectrum, target=target, mean=scaled.mean, title=title)
@@ -172,16 +171,16 @@ def _write_spectrum(raw: Record, motion: Record | Corrected, target: ScaleTo | N
     from msfp_gen.motions.records.spectrum import MEASURES
 
     with Progress("spectrum") as progress:
-        found = response_spectrum(motion, progress=progress)
+        spectrum = response_spectrum(motion, progress=progress)
     if path.suffix.lower() == ".csv":
-        found.to_csv(path)
+        spectrum.to_csv(path)
         return
     from msfp_gen.figures import plot_response_spectrum
 
-    curves = dict(zip(MEASURES, found.psa.T, strict=True))
+    curves = dict(zip(MEASURES, spectrum.psa.T, strict=True))
     if not raw.acceleration[:, 2].any():
         del curves["E3"]
-    design = None if target is None else target.curve(found.period)
+    design = None if target is None else target.curve(spectrum.period)
     plot_response_spectrum(
-        found.period, curves, path, target=design, damping=found.damping, title=raw.name or "Response spectrum"
+        spectrum.period, curves, path, target=design, damping=spectrum.damping, title=raw.name or "Response spectrum"
     )

@@ -1,21 +1,24 @@
-"""Command that hands over to other programs: the rows of a run as a table, or layouts as a C library: export."""
+"""Commands that hand over to other programs: export (tables, C library), fmu (a unit), serve (to OpenSees)."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import SignOption, building, note, show, with_effects
+from msfp_gen.cli.console import SignOption, building, note, say, scenes, show, whole_number, with_effects
 from msfp_gen.cli.inputs import load_source, of_building, result_of
 from msfp_gen.common.output import check_output
-from msfp_gen.errors import InputError
+from msfp_gen.errors import InputError, RunError
 from msfp_gen.jit.platforms import TARGETS
 from msfp_gen.results.sign import DEFAULT, sign_of
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 app = typer.Typer()
+TYPES = ("cs", "me")  # of a unit
+AXES = ("Y", "Z")  # that may be vertical in a client of `serve`
 
 
 @app.command(
@@ -57,14 +60,14 @@ def export(
 ) -> None:
     """Write the rows of a run as CSV or Parquet, or (--prefix) layouts as a C library for C, C++ and Fortran."""
     if prefix is not None:
-        for given, option in (
+        for value, option in (
             (output, "--output"),
             (columns, "--columns"),
             (None if sign == DEFAULT else sign, "--sign"),
         ):
-            if given is not None:
+            if value is not None:
                 raise InputError(
-                    f"{option} = {str(given)!r}: this is for the rows of a run; leave it out with --prefix"
+                    f"{option} = {str(value)!r}: this is for the rows of a run; leave it out with --prefix"
                 )
         _export_library([ModelSpec(layout, effects) for layout in _layouts(what)], prefix, target)
     elif target is not None:
@@ -116,3 +119,83 @@ def _export_library(specs: list[ModelSpec], prefix: Path, target: str | None) ->
     show([Table("C library msfp", (), rows)])
     example = "" if target else "; `make run` in share/msfp/examples runs a C example"
     note(f"start with {library.prefix / 'share/msfp/README.md'}{example}")
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen fmu bearing.toml -o bearing.fmu            # a rig: motion in, wrench out\n"
+    "  msfp-gen fmu isolated.toml -o isolated.fmu --fmi 3 --type me  # a mass: force in, motion out"
+)
+def fmu(
+    source: Annotated[
+        str,
+        typer.Argument(metavar="SCENE", help="A scene file or preset with a rig or a mass.", autocompletion=scenes),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.fmu", help="The file to write.")],
+    fmi: Annotated[int, typer.Option(metavar="2|3", parser=whole_number, help="Version of FMI.")] = 2,
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--type", metavar="|".join(TYPES), help="cs: Co-Simulation; me: also Model Exchange, of a supported mass."
+        ),
+    ] = "cs",
+) -> None:
+    """Write a bearing as a unit (FMU) for Co-Simulation: a rig takes motion and gives wrenches, a mass takes forces."""
+    from msfp_gen.buildings.load import load_bearing_scene
+    from msfp_gen.common.tables import Table
+    from msfp_gen.fmu import write_fmu
+
+    if kind not in TYPES:
+        raise InputError(f"--type = {kind!r}: give one of {', '.join(TYPES)}")
+    with building(kept=False) as progress:
+        unit = write_fmu(load_bearing_scene(source), output, version=fmi, exchange=kind == "me", progress=progress)
+    counts = {block.name.lower(): 0 for block in dict.fromkeys(unit_variable.block for unit_variable in unit.variables)}
+    for variable in unit.variables:
+        counts[variable.block.name.lower()] += 1
+    rows = [("model", unit.model), ("kinds", ", ".join(unit.kinds))]
+    rows += [(name, str(counts[name])) for name in ("inputs", "outputs", "parameters", "states") if name in counts]
+    show([Table(f"FMI {fmi}.0 unit {output.stem}", (), rows)])
+    note(f"wrote {unit.path}")
+
+
+@app.command(
+    epilog="Examples:\n\n\b\n  msfp-gen serve bearing.toml --port 7000\n"
+    "  msfp-gen serve outer.toml inner.toml --port 7000 --bearings 4"
+)
+def serve(
+    sources: Annotated[
+        list[str],
+        typer.Argument(metavar="SCENE...", help="Scene files or presets, each with a rig.", autocompletion=scenes),
+    ],
+    port: Annotated[
+        int,
+        typer.Option(metavar="N", parser=whole_number, help="Port of the first scene; the others have the next ones."),
+    ],
+    bearings: Annotated[
+        int | None,
+        typer.Option(metavar="N", parser=whole_number, help="End after N bearings have ended; else at Ctrl-C."),
+    ] = None,
+    up: Annotated[str, typer.Option(metavar="|".join(AXES), help="Vertical axis of the client in space.")] = "Z",
+    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
+) -> None:
+    """Serve bearings to `element genericClient` of OpenSees: every element is a bearing of its own."""
+    from msfp_gen.buildings.load import load_bearing_scene
+    from msfp_gen.coupling.server import Server
+    from msfp_gen.coupling.two_port import TwoPort
+
+    if up not in AXES:
+        raise typer.BadParameter(f"--up = {up!r}: give one of {', '.join(AXES)}")
+    if bearings is not None and bearings < 1:
+        raise typer.BadParameter(f"--bearings = {bearings}: give at least 1")
+    if port < 1:
+        raise typer.BadParameter(f"--port = {port}: give at least 1")
+    makers = []
+    for source in sources:
+        make = partial(TwoPort.of_scene, load_bearing_scene(source))
+        make()  # what is wrong with a scene is said before anybody connects
+        makers.append((source, make))
+    with Server(makers, port, report=note, host=host, up=up) as server:
+        for source, port_of_source in zip(sources, server.ports, strict=True):
+            say(f"serving {source} at {host}:{port_of_source}")
+        failed = server.serve(bearings)
+    if failed:
+        raise RunError(f"{failed} of {bearings} bearings failed; see the messages above", status="failed")

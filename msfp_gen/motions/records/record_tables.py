@@ -15,7 +15,7 @@ from msfp_gen.motions.records.spectrum import MEASURES, response_spectrum
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
-    from msfp_gen.motions.records.suite import ScaledSuite
+    from msfp_gen.motions.records.scaling import ScaledSuite
 
 _PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0)  # [s]
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import SceneName, note, number, numbers, say, show
+from msfp_gen.cli.console import SceneName, answer, note, note_written, number, numbers
 
 if TYPE_CHECKING:
     from msfp_gen.scene.scene import Scene
@@ -115,10 +114,5 @@ def _report(
     if folder is not None:
         make_folder(folder, "--output")
     result = study(scene)
-    if as_json:
-        say(json.dumps(as_dict(result), indent=2, allow_nan=False))
-    else:
-        show(tables(result))
-    written: Sequence[Path] = write(result, folder) if folder is not None else ()
-    for path in written:
-        note(f"wrote {path}")
+    answer(as_dict(result), tables(result), as_json)
+    note_written(write(result, folder) if folder is not None else ())

@@ -63,7 +63,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class SceneParts:
+class SceneFields:
     """The fields of a `Scene`, without the checks that they are consistent."""
 
     bearing: Bearing

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import AsJson, Progress, SceneName, note, say, show
+from msfp_gen.cli.console import AsJson, Progress, SceneName, answer, note_written
 from msfp_gen.cli.inputs import build
 from msfp_gen.errors import InputError
 
@@ -78,9 +77,9 @@ def fit(
     prepared = start_fit(chosen, read, paths, limits, offset)  # refuses bad input before anything is built or written
     if output is not None:
         make_folder(output, "--output")
-    for each in prepared.scenes:
-        build(each, gradients=True)
-        build(each)  # tighter runs at the end have no derivatives
+    for fitted_scene in prepared.scenes:
+        build(fitted_scene, gradients=True)
+        build(fitted_scene)  # tighter runs at the end have no derivatives
     line = Progress("fit")
     with line as update:
 
@@ -91,13 +90,9 @@ def fit(
 
         prepared.progress = None if update is None else show_evaluation
         result = end_fit(chosen, prepared)
-    if as_json:
-        say(json.dumps(result.as_dict(), indent=2, allow_nan=False))
-    else:
-        show(fit_tables(result))
+    answer(result.as_dict(), fit_tables(result), as_json)
     written = [] if output is None else result.save(output)
-    for path in [*written, *([] if report is None else [write_fit_report(result, report)])]:
-        note(f"wrote {path}")
+    note_written([*written, *([] if report is None else [write_fit_report(result, report)])])
 
 
 def _measurements(

@@ -1,21 +1,56 @@
-"""Reading of parameter paths: `bearing.surfaces[*].friction`, `top.mass`, `motion.scale`."""
+"""Parameters of a scene, numbers by which a run is differentiated or that a fit changes: paths, values, changed scenes.
+
+Paths are such as `bearing.surfaces[*].friction`, `top.mass`, `motion.scale`.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.common.fields import Quantity, ruled_fields
+import numpy as np
+
+from msfp_gen.common.fields import Quantity, errors_at, ruled_fields
 from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.friction_parameters import law_parameters
-from msfp_gen.scene.parameters.parameter import Parameter
+from msfp_gen.scene.scene_fields import InitialState
 
 if TYPE_CHECKING:
+    from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a scene.
+
+    Attributes:
+        path: such as `bearing.surfaces[0].friction`.
+        part: "bearing", "surfaces", "bodies", "top", "motion", "load" or "initial_state".
+        field: name of the field of that part.
+        index: of the surface or body, then of the component of the field; indices count from zero.
+        unit: SI unit; "" for a plain number.
+        value: in the scene.
+        least, above: bounds that its field has, inclusive and exclusive [unit]; None: unbounded.
+    """
+
+    path: str
+    part: str
+    field: str
+    index: tuple[int, ...]
+    unit: str
+    value: float
+    least: float | None = None
+    above: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.path} = {self.value:g}" + (f" {self.unit}" if self.unit else "")
+
 
 _STEP = re.compile(r"([a-z]\w*)((?:\[(?:\d+|\*)\])*)")
 _ROWS: dict[str, type] = {"surfaces": Surface, "bodies": Body}
@@ -47,22 +82,22 @@ def parameters_of(scene: Scene, paths: Sequence[str], name: str = "gradients") -
     """The parameters of a scene at some paths; `[*]` stands for all indices. Raises InputError that names `name`."""
     if isinstance(paths, str) or not all(isinstance(path, str) for path in paths):
         raise InputError(f"{name} = {paths!r}: give a list of paths, such as ['bearing.surfaces[*].friction']")
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for text in paths:
         try:
             for parameter in _parameters(scene, text):
-                if parameter.path in found:
+                if parameter.path in parameters:
                     raise InputError(f"{parameter.path} is given twice; give each parameter once")
-                found[parameter.path] = parameter
+                parameters[parameter.path] = parameter
         except InputError as error:
             raise InputError(f"{name} = {text!r}: {error}") from None
-    return tuple(found.values())
+    return tuple(parameters.values())
 
 
 def _parameters(scene: Scene, text: str) -> Iterator[Parameter]:
     place = _place(scene, text)
-    for given, count in zip(place.indices, place.counts, strict=True):
-        if given is not None and given >= count:
+    for index_or_all, count in zip(place.indices, place.counts, strict=True):
+        if index_or_all is not None and index_or_all >= count:
             raise InputError(f"there are {count} of them; give an index from 0 to {count - 1}, or *")
     for index in product(*(range(n) if i is None else (i,) for i, n in zip(place.indices, place.counts, strict=True))):
         yield _parameter(scene, place.part, place.field, index)
@@ -151,16 +186,18 @@ def _shape(rule: Quantity) -> tuple[int, ...]:
 
 def _components(rule: Quantity, brackets: list[str]) -> tuple[int | None, ...]:
     if len(brackets) != len(rule.shape):
-        each = "[0], [1] or [*]" if rule.shape else "no index"
-        raise InputError(f"this field holds {rule.shape[0] if rule.shape else 1} numbers; give {each} after its name")
+        indices = "[0], [1] or [*]" if rule.shape else "no index"
+        raise InputError(
+            f"this field holds {rule.shape[0] if rule.shape else 1} numbers; give {indices} after its name"
+        )
     return _indices(brackets, len(rule.shape))
 
 
 def _indices(brackets: Iterable[str], count: int) -> tuple[int | None, ...]:
-    found = tuple(None if text == "*" else int(text) for text in brackets)
-    if len(found) != count:
+    indices = tuple(None if text == "*" else int(text) for text in brackets)
+    if len(indices) != count:
         raise InputError(f"it needs {count} indices, such as {'[0]' * count} or {'[*]' * count}")
-    return found
+    return indices
 
 
 def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> Parameter:
@@ -181,7 +218,7 @@ def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> P
     if part == "top" and field.startswith("vertical_") and not getattr(scene.top, "vertical_stiffness", None):
         raise InputError("this top has no vertical spring, and a run changes abruptly with the first; give it one")
     value = value[component[0]] if component else value
-    path += "".join(f"[{each}]" for each in component)
+    path += "".join(f"[{i}]" for i in component)
     return Parameter(path, part, field, index, rule.unit, float(value), rule.least, rule.above)
 
 
@@ -206,3 +243,63 @@ def _history_parameter(scene: Scene, part: str, field: str) -> Parameter:
     elif part == "motion" and table.get("scale_to") is None:
         value = float(table.get("scale", 1.0))
     return Parameter(f"{part}.{field}", part, field, (), unit, value)
+
+
+def changed_parameters(scene: Scene, values: Mapping[Parameter, float]) -> Scene:
+    """`scene` with other values of parameters, which must be those of `parameters_of(scene, ...)`.
+
+    Raises InputError where a field does not accept its value.
+    """
+    for parameter, value in values.items():
+        scene = _changed(scene, parameter, float(value))
+    return scene
+
+
+def _changed(scene: Scene, parameter: Parameter, value: float) -> Scene:
+    part, name = parameter.part, parameter.field
+    if part == "motion":
+        motion = scaled_motion(scene.motion, value / parameter.value) if name != "direction" else None
+        motion = scene.motion.rotated(value - parameter.value) if motion is None else motion
+        return replace(scene, motion=motion, motion_table=None)
+    if part == "load":
+        assert scene.load is not None
+        return replace(scene, load=replace(scene.load, coefficients=value / parameter.value * scene.load.coefficients))
+    if part == "initial_state":
+        return replace(scene, initial_state=_state(scene, name, parameter.index, value))
+    if part == "top":
+        return replace(scene, top=_with(scene.top, name, parameter.index, value))
+    if part == "bearing":
+        return replace(scene, bearing=scene.bearing.replace(**{name: value}))
+    rows = list(getattr(scene.bearing, part))
+    row = parameter.index[0]
+    with errors_at("surface" if part == "surfaces" else "body", f"bearing.{part}[{row}]"):
+        rows[row] = _with(rows[row], name, parameter.index[1:], value)
+    changes: dict[str, Any] = {part: rows}
+    return replace(scene, bearing=replace(scene.bearing, **changes))
+
+
+def scaled_motion(motion: Motion, factor: float) -> Motion:
+    """A motion with its displacements multiplied by a factor; rotations of the base are unchanged."""
+    coefficients = motion.coefficients.copy()
+    coefficients[:, :3] *= factor
+    return replace(motion, coefficients=coefficients)
+
+
+def _with(owner: Any, name: str, component: tuple[int, ...], value: float) -> Any:
+    """A copy of a surface, body or top with one number changed."""
+    if not component:
+        return replace(owner, **{name: value})
+    numbers = list(getattr(owner, name))
+    numbers[component[0]] = value
+    return replace(owner, **{name: tuple(numbers)})
+
+
+def _state(scene: Scene, name: str, index: tuple[int, ...], value: float) -> InitialState:
+    """The initial state with one number changed; centred and at rest where the scene gives none."""
+    count, state = scene.bearing.layout.surfaces, scene.initial_state
+    arrays: dict[str, Any] = {
+        key: np.zeros((count, size)) if state is None else np.array(getattr(state, key), dtype=float)
+        for key, size in (("q", 3), ("v", 3), ("h", 2))
+    }
+    arrays[name][index] = value
+    return InitialState(arrays["q"].tolist(), arrays["v"].tolist(), arrays["h"].tolist())

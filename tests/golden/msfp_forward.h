@@ -1,0 +1,69 @@
+/* body k from body k-1: (2.1)-(2.6), (3.4)-(3.12), rates by differentiation.
+ * 50 operations; out: body. */
+MSFP_INLINED
+static inline void msfp_forward(const double *restrict par /* body_parameters */, const double *restrict u /* body */, const double *restrict x /* coordinates */, double *restrict out)
+{
+    const double par_c = par[0];
+    const double par_e = par[1];
+    const double u_t1x = u[0];
+    const double u_t1z = u[1];
+    const double u_t3x = u[2];
+    const double u_t3z = u[3];
+    const double u_wy = u[4];
+    const double u_aly = u[6];
+    const double u_Cx = u[8];
+    const double u_Cz = u[9];
+    const double u_Vx = u[10];
+    const double u_Vz = u[11];
+    const double u_Ax = u[12];
+    const double u_Az = u[13];
+    const double x_theta = x[0];
+    const double x_theta1 = x[1];
+    const double x_theta2 = x[2];
+    const double s_1 = msfp_sin(x_theta);
+    const double s_2 = msfp_cos(x_theta);
+    const double t1x_3 = -s_1*u_t3x + s_2*u_t1x;
+    const double t1z_4 = -s_1*u_t3z + s_2*u_t1z;
+    const double t3x_5 = s_1*u_t1x + s_2*u_t3x;
+    const double t3z_6 = s_1*u_t1z + s_2*u_t3z;
+    const double wy_7 = u_wy + x_theta1;
+    const double dtx_8 = t3z_6*wy_7;
+    const double dtz_9 = -t3x_5*wy_7;
+    const double rate_10 = u_aly + x_theta2;
+    const double rate_11 = dtx_8*par_e + u_Vx;
+    const double rate_12 = dtz_9*par_e + u_Vz;
+    const double rx_13 = par_e*t3x_5 + u_Cx;
+    const double rz_14 = par_e*t3z_6 + u_Cz;
+    const double rate_15 = dtz_9*wy_7 + rate_10*t3z_6;
+    const double rate_16 = par_e*rate_15 + u_Ax;
+    const double rate_17 = -dtx_8*wy_7 - rate_10*t3x_5;
+    const double rate_18 = par_e*rate_17 + u_Az;
+    const double rate_19 = dtx_8*par_c + u_Vx;
+    const double rate_20 = dtz_9*par_c + u_Vz;
+    const double rx_21 = par_c*t3x_5 + u_Cx;
+    const double rz_22 = par_c*t3z_6 + u_Cz;
+    const double rate_23 = par_c*rate_15 + u_Ax;
+    const double rate_24 = par_c*rate_17 + u_Az;
+    out[0] = t1x_3; /* t1x */
+    out[1] = t1z_4; /* t1z */
+    out[2] = t3x_5; /* t3x */
+    out[3] = t3z_6; /* t3z */
+    out[4] = wy_7; /* wy */
+    out[5] = wy_7; /* wpy */
+    out[6] = rate_10; /* aly */
+    out[7] = rate_10; /* alpy */
+    out[8] = rx_13; /* Cx */
+    out[9] = rz_14; /* Cz */
+    out[10] = rate_11; /* Vx */
+    out[11] = rate_12; /* Vz */
+    out[12] = rate_16; /* Ax */
+    out[13] = rate_18; /* Az */
+    out[14] = rate_23; /* acx */
+    out[15] = rate_24; /* acz */
+    out[16] = rate_19; /* vcx */
+    out[17] = rate_20; /* vcz */
+    out[18] = rx_21; /* rcx */
+    out[19] = rz_22; /* rcz */
+    out[20] = s_1; /* st */
+    out[21] = s_2; /* ct */
+}
