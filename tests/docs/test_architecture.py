@@ -276,6 +276,14 @@ def test_tests_named_in_the_docs_exist():
             assert name in defined, f"{page.name} names {name}"
 
 
+def test_files_of_tests_named_anywhere_exist():
+    files = {path.name for path in (ROOT / "tests").rglob("test_*.py")}
+    scripts = [ROOT / "Makefile", *sorted((ROOT / "tests").glob("*.sh"))]
+    for page in [*PAGES, *scripts]:
+        for name in re.findall(r"\b(test_\w+\.py)\b", page.read_text(encoding="utf-8")):
+            assert name in files, f"{page.name} names {name}"
+
+
 def test_paths_of_the_project_file_exist():
     tools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
     folders = [*tools["setuptools"]["package-dir"].values(), *tools["pytest"]["ini_options"]["testpaths"]]
