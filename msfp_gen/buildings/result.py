@@ -209,18 +209,20 @@ class BuildingResult(AnyResult):
         Keys that `Result.summary` has too: name, status, message, notes, duration, counters, wall_time,
         real_time_factor; peak_displacement: across any bearing [m]; peak_force: of the ground on all bearings, the base
         shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: bearings (from 1) of which a slider reached
-        its rim. Others:
-            weight [N].
-            peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
-            minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
-            peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey [-].
-            floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
-                [m].
-            storeys: of each, name, height [m], peak_drift [m], peak_drift_ratio [-], peak_shear [N], peak_torsion
-                [N m].
-            bearings: see `BearingResult.summary`.
-            energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
-                at the end [J]; closure_error of the balance of the building [-].
+        its rim.
+
+        Others:
+
+        - weight [N].
+        - peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
+        - minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
+        - peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey [-].
+        - floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
+          [m].
+        - storeys: of each, name, height [m], peak_drift [m], peak_drift_ratio [-], peak_shear [N], peak_torsion [N m].
+        - bearings: see `BearingResult.summary`.
+        - energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
+          at the end [J]; closure_error of the balance of the building [-].
         """
         extremes, weight = self.extremes, self.scene.weight
         bearings = [one.summary for one in self.bearings]
