@@ -58,14 +58,14 @@ def floors(building: Building) -> list[Floor]:
     motions = building.rigid_motions
     groups = [_group(motions.T @ building.mass @ motions)]
     groups += [_group(columns.inertia @ motions) for columns in building.columns]
-    made = []
+    of_frame = []
     for (mass, centre, inertia), (above, centre_above, inertia_above) in pairwise([*groups, (0.0, np.zeros(2), 0.0)]):
         own = mass - above
         own_centre = (mass * centre - above * centre_above) / own
         left = inertia - inertia_above
         left -= own * np.sum((own_centre - centre) ** 2) + above * np.sum((centre_above - centre) ** 2)
-        made.append(Floor(own, own_centre, float(np.sqrt(max(left, 0.0) / own))))
-    return made
+        of_frame.append(Floor(own, own_centre, float(np.sqrt(max(left, 0.0) / own))))
+    return of_frame
 
 
 def _group(inertia: Array) -> tuple[float, Array, float]:

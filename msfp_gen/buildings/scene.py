@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.storey import Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
 from msfp_gen.errors import InputError
@@ -167,7 +168,7 @@ class BuildingScene:
     @cached_property
     def places(self) -> Array:
         """Places of the bearings in plan, shape (bearings, 2) [m]."""
-        nodes = [self.building.node(each.node).position[:2] for each in self.bearings]
+        nodes = [self._node(index).position[:2] for index in range(len(self.bearings))]
         pairs = zip(self.bearings, nodes, strict=True)
         return np.array([node if each.position is None else each.position for each, node in pairs], dtype=float)
 
@@ -240,15 +241,20 @@ class BuildingScene:
         found = [ModelSpec(one.bearing.layout, replace(effects, top_rotation=True)) for one, effects in pairs]
         return tuple(dict.fromkeys(found))
 
-    def _attachment(self, index: int) -> Array:
-        given = self.bearings[index]
+    def _node(self, index: int) -> Node:
+        """The node to which a bearing is attached. Raises InputError: there is none, or it carries no bearing."""
+        name = self.bearings[index].node
         try:
-            node = self.building.node(given.node)
+            node = self.building.node(name)
         except InputError as error:
             raise InputError(f"scene.bearings[{index}].{error}") from None
         if not node.carries:
-            raise InputError(f"scene.bearings[{index}].node = {given.node!r}: no bearing can be attached there")
-        return node.rows if given.position is None else node.linked([*given.position, node.position[2]])
+            raise InputError(f"scene.bearings[{index}].node = {name!r}: no bearing can be attached there")
+        return node
+
+    def _attachment(self, index: int) -> Array:
+        node, position = self._node(index), self.bearings[index].position
+        return node.rows if position is None else node.linked([*position, node.position[2]])
 
     def _tension(self, load: float) -> str:
         """Why a bearing carries no compression at rest."""
@@ -261,17 +267,21 @@ class BuildingScene:
 
     def _check_places(self) -> None:
         """Raise InputError where two bearings have one place or one name."""
-        assert len(self.attachments) == len(self.bearings)  # their nodes exist
-        levels = [self.building.node(each.node).position[2] for each in self.bearings]
-        places = np.column_stack([self.places, levels])
-        for second, each in enumerate(self.bearings):
-            for first in range(second):
-                field, other = f"scene.bearings[{second}]", f"scene.bearings[{first}]"
-                if each.name and each.name == self.bearings[first].name:
-                    raise InputError(f"{field}.name = {each.name!r}: {other} has it too; give another")
-                if np.linalg.norm(places[second] - places[first]) < APART:
-                    at = ", ".join(f"{x:g}" for x in places[second][:2])
-                    raise InputError(f"{field}.position = ({at}): {other} is there too; give places apart [m]")
+        places = np.column_stack([self.places, [self._node(i).position[2] for i in range(len(self.bearings))]])
+        named: dict[str, int] = {}
+        for second, bearing in enumerate(self.bearings):
+            first = named.setdefault(bearing.name, second)
+            if bearing.name and first < second:
+                raise InputError(
+                    f"scene.bearings[{second}].name = {bearing.name!r}: scene.bearings[{first}] has it; give another"
+                )
+            (near,) = np.nonzero(np.linalg.norm(places[:second] - places[second], axis=1) < APART)
+            if near.size:
+                at = ", ".join(f"{x:g}" for x in places[second][:2])
+                raise InputError(
+                    f"scene.bearings[{second}].position = ({at}): scene.bearings[{near[0]}] is there too; give places "
+                    "apart [m]"
+                )
 
     def _check_gravity(self) -> None:
         for index, each in enumerate(self.bearings):

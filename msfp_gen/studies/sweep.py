@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.buildings.load import AnyScene, with_absolute_paths
+from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
@@ -125,6 +126,8 @@ def row_of(number: int, variation: Variation, result: Result | BuildingResult | 
     """The row of a run, or of one that failed before its first row; the result itself is not kept."""
     if isinstance(result, RunError):
         summary: Mapping[str, Any] = {"status": result.status, "message": str(result), "name": variation.scene.name}
+        if isinstance(variation.scene, BuildingScene):
+            summary = {**summary, "bearings": []}
         return Row(number, variation.source, variation.varied, summary, "")
     return Row(number, variation.source, variation.varied, result.summary, "" if file is None else file.name)
 

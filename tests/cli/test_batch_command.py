@@ -172,6 +172,14 @@ def test_a_run_without_rows_is_a_row_of_the_table(
     assert rows[1]["message"].endswith("jammed") and rows[1]["peak_force [N]"] == rows[1]["file"] == ""
 
 
+def test_a_building_without_rows_has_the_columns_of_buildings(tmp_path: Path) -> None:
+    (variation,) = variations("hospital-clc", [])
+    row = row_of(1, variation, RunError("stopped at t = 0 s: jammed", status="newton"), None)
+    header = write_table([row], tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "peak_drift_ratio" in header and "axial_load" not in header
+    assert "newton" in str(sweep_table([row]).rows)
+
+
 def test_ctrl_c_keeps_what_has_ended(tmp_path: Any) -> None:
     long = tmp_path / "long.toml"
     long.write_text('bearing = "fenz-tfp"\n[motion]\nkind = "harmonic"\namplitude = 0.05\nfrequency = 0.5\n'

@@ -72,7 +72,7 @@ def test_unlikely_values_are_named_with_the_likely_unit(changes: dict[str, Any],
             {"building.bearing[5].position": [-11.25, -7.5]},
             r"scene.bearings\[5\].position = \(-11.25, -7.5\): scene.bearings\[0\] is there too; give places apart",
         ),
-        ({"building.bearing[5].name": "A1"}, r"scene.bearings\[5\].name = 'A1': scene.bearings\[0\] has it too"),
+        ({"building.bearing[5].name": "A1"}, r"scene.bearings\[5\].name = 'A1': scene.bearings\[0\] has it;"),
         (
             {"building.base.mass_centre": [90.0, 0.0]},
             r"in tension at rest .* the centre of mass of the building at \(27.*\) m is outside the bearings",
