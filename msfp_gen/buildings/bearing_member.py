@@ -59,7 +59,8 @@ def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]
     return found
 
 
-KEPT = ("normal", "sliding", "kinetic", "potential", "rim_stored", "seat_stored", "work")  # of the row of a bearing
+OF_SURFACES = ("normal", "sliding", "rim", "compression")  # of the row of a bearing; the last only with uplift
+KEPT = (*OF_SURFACES, "kinetic", "potential", "rim_stored", "seat_stored", "work")
 
 
 class Asked(NamedTuple):
@@ -100,16 +101,19 @@ class Member:
 
     @property
     def shapes(self) -> list[tuple[str, tuple[int, ...]]]:
-        """The parts of its row that a run keeps: names and shapes, in order."""
-        return [(name, tuple(shape)) for name, shape in self.model.extension.ROW if name in KEPT]
+        """The parts of its row that a run keeps: names and shapes, in order, the same for every model of a layout."""
+        shapes = dict.fromkeys(OF_SURFACES, (self.rest.bearing.layout.surfaces,))
+        shapes |= {name: tuple(shape) for name, shape in self.model.extension.ROW}
+        return [(name, shapes[name]) for name in KEPT]
 
     @property
     def entries(self) -> Array:
-        """Indices into the row of its model of the numbers that are kept."""
+        """Indices into the row of its model of the numbers that are kept; -1 where it has none, which counts as 0."""
         row = [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
         size = sum(int(np.prod(shape, dtype=int)) for _, shape in row)
         indices = parts(np.arange(size), row)
-        return np.concatenate([indices[name].ravel() for name, _ in self.shapes])
+        kept = [indices[name] if name in indices else np.full(shape, -1) for name, shape in self.shapes]
+        return np.concatenate([values.ravel() for values in kept])
 
     @property
     def work(self) -> Array:

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from msfp_gen.buildings.bearing_member import Change, Member, earlier_work
-from msfp_gen.buildings.extremes import BuildingExtremes, padded, vectors
+from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, vectors
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
@@ -231,6 +231,8 @@ def result_of(run: BuildingRun) -> BuildingResult:
         wrench=np.stack([rows[f"wrench {i}"] for i in range(count)], axis=1),
         normal_force=padded([rows[f"normal {i}"] for i in range(count)], np.nan),
         sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
+        rim_force=padded([rows[f"rim {i}"] for i in range(count)], np.nan),
+        lift=padded([lift_of(rows[f"compression {i}"]) for i in range(count)], np.nan),
         dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
         stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
         damped=rows["damped"],

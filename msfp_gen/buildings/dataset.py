@@ -170,6 +170,8 @@ STORED = {
     },
     "normal_force": Stored(SURFACE, "normal_force", WHOLE, "N", "normal force on the surface", "compression"),
     "sliding": Stored(SURFACE, "sliding", WHOLE, "m", "distance s from the centre of the surface (3.20)"),
+    "rim_force": Stored(SURFACE, "rim_force", WHOLE, "N", "force F_c of the rim (2.103)"),
+    "lift": Stored(SURFACE, "lift", WHOLE, "m", "clearance between separated faces; 0 while in contact"),
     **{
         f"support_{name}": Stored(
             ("bearing", "axis"), "support", (..., order, slice(None)), unit, f"{name} of the ground below the bearing"
@@ -184,6 +186,7 @@ STORED = {
     ),
     "energy_input": Stored((), "input", WHOLE, "J", "work of the ground"),
 }
+OF_SURFACES = [variable.field for variable in STORED.values() if variable.dims == SURFACE]
 DERIVED = {
     **{
         f"node_{name}": Derived(
@@ -337,7 +340,7 @@ def _rows(root: StoredGroup, scene: BuildingScene, arrays: Arrays) -> dict[str, 
             rows.setdefault(field, np.empty((count, *more[field])))[part] = values
     missing = np.arange(sizes["surface"]) >= surfaces[:, None]  # a bearing has no such surface
     for field, values in rows.items():
-        unknown = missing if field in ("normal_force", "sliding") else False
+        unknown = missing if field in OF_SURFACES else False
         if not (np.isfinite(values) | unknown).all():
             raise ValueError(f"{field} is not finite")
     return rows

@@ -28,7 +28,8 @@ class BuildingExtremes:
     storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top [m]. Largest
     magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad]; energy:
     kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2) [N];
-    normal_force, shape (bearings, 2, surfaces) [N]. sliding: largest, shape (bearings, surfaces) [m]. A bearing with
+    normal_force, shape (bearings, 2, surfaces) [N]. sliding [m], rim_force [N] and lift, the clearance
+    between separated faces [m]: largest, shape (bearings, surfaces). A bearing with
     fewer surfaces than another has zeros in the place of the others.
     """
 
@@ -46,6 +47,8 @@ class BuildingExtremes:
     top_force: Array
     axial_force: Array
     sliding: Array
+    rim_force: Array
+    lift: Array
     normal_force: Array
 
     @classmethod
@@ -84,6 +87,8 @@ class BuildingExtremes:
             top_force=np.array(of_bearings("force")),
             axial_force=np.array(of_bearings("axial")),
             sliding=padded(of_bearings("most sliding")),
+            rim_force=padded(of_bearings("most rim")),
+            lift=padded([lift_of(values) for values in of_bearings("least compression")]),
             normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
         )
 
@@ -108,7 +113,7 @@ def shapes(scene: BuildingScene) -> dict[str, tuple[int, ...]]:
         "energy": (2,),
         **dict.fromkeys(("bearing_displacement", "top_force"), (bearings, VECTOR)),
         "axial_force": (bearings, 2),
-        "sliding": (bearings, surfaces),
+        **dict.fromkeys(("sliding", "rim_force", "lift"), (bearings, surfaces)),
         "normal_force": (bearings, 2, surfaces),
     }
 
@@ -138,6 +143,12 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     found.append((0, scene.attachments[:, :3].mean(axis=0), mean))
     orders, rows, shares = zip(*found, strict=True)
     return list(orders), np.stack(rows), np.stack(shares)
+
+
+def lift_of(compression: Array) -> Array:
+    """Clearance between separated faces, of the compression of unilateral contacts, shape (..., surfaces) [m]."""
+    opening: Array = np.maximum(0.0, -compression) + 0.0  # no -0.0
+    return opening
 
 
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:

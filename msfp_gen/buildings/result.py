@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
 
 # The variables of the dataset of one bearing that `Result.dataset` has too, and the others with unit and meaning.
-RECORDED = ("normal_force", "sliding", "gap", "base_displacement", "displacement", "top_force", "top_moment")
+OF_SURFACES = ("normal_force", "sliding", "gap", "rim_force", "lift")
+RECORDED = (*OF_SURFACES, "base_displacement", "displacement", "top_force", "top_moment")
 MORE = {
     "axial_force": ("N", "compression between bearing and building"),
     "dissipated": ("J", "energy dissipated in the bearing"),
@@ -55,8 +56,9 @@ class BuildingResult(AnyResult):
     the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
     velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
     (k, bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape
-    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding: of the surfaces of each bearing, shape (k, bearings, most
-    surfaces) [N], [m], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]: dissipated:
+    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding, rim_force, and
+    lift, the clearance between separated faces: of the surfaces of each bearing, shape (k, bearings, most surfaces)
+    [N], [m], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]: dissipated:
     in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
     received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
     counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the number of its
@@ -74,6 +76,8 @@ class BuildingResult(AnyResult):
     wrench: Array
     normal_force: Array
     sliding: Array
+    rim_force: Array
+    lift: Array
     dissipated: Array
     stored: Array
     damped: Array
@@ -171,7 +175,8 @@ class BuildingResult(AnyResult):
         names = [node.name for node in scene.building.nodes]
         nodes = np.reshape([self.node(name) for name in names], (len(names), len(self.time), 3, 6))
         across = -np.moveaxis(self.bearing_displacement, 1, 0)
-        sliding, normal = np.nan_to_num(self.sliding), np.nan_to_num(self.normal_force)
+        normal = np.nan_to_num(self.normal_force)
+        most = {name: np.nan_to_num(getattr(self, name)).max(axis=0) for name in ("sliding", "rim_force", "lift")}
         force, axial = np.moveaxis(self.wrench[:, :, 1, :3], 1, 0), self.axial_force
         base = scene.bearings[0].node
         return BuildingExtremes(
@@ -188,7 +193,7 @@ class BuildingResult(AnyResult):
             bearing_displacement=largest(across),
             top_force=largest(force),
             axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
-            sliding=sliding.max(axis=0),
+            **most,
             normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
         )
 
@@ -329,8 +334,9 @@ class BearingResult(AnyResult, HorizontalMotion):
     values. time: shape (k,) [s]. base_displacement: of the ground below the bearing; displacement: across the bearing
     and its interface, base less top, shape (k, 3) [m]. top_force, top_moment: on the building, the moment about the
     upper end of the bearing, shape (k, 3) [N], [N m]. axial_force: compression between bearing and building, shape (k,)
-    [N]. sliding (3.20), gap to the rims (3.21), normal_force: of the surfaces, shape (k, n-1) [m], [m], [N].
-    dissipated: energy in the bearing since the start; stored: in the bearing and its interface, shape (k,) [J].
+    [N]. sliding (3.20), gap to the rims (3.21), rim_force, normal_force, lift, the clearance between separated faces:
+    of the surfaces, shape (k, n-1) [m], [N]. dissipated: energy in the bearing since the start; stored: in the bearing
+    and its interface, shape (k,) [J].
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
@@ -349,6 +355,8 @@ class BearingResult(AnyResult, HorizontalMotion):
     axial_force: Array
     sliding: Array
     gap: Array
+    rim_force: Array
+    lift: Array
     normal_force: Array
     dissipated: Array
     stored: Array
@@ -359,7 +367,7 @@ class BearingResult(AnyResult, HorizontalMotion):
         scene, bearing = building.scene, building.scene.bearings[index].bearing
         base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
         across = base - building.displacement @ scene.attachments[index, :3].T
-        sliding = building.sliding[:, index, : bearing.layout.surfaces]
+        own = (slice(None), index, slice(bearing.layout.surfaces))
         return cls(
             building=building,
             index=index,
@@ -374,9 +382,11 @@ class BearingResult(AnyResult, HorizontalMotion):
             top_force=-wrench[:, :3],
             top_moment=-wrench[:, 3:],
             axial_force=building.axial_force[:, index],
-            sliding=sliding,
-            gap=bearing.arrays()["capacity"] - sliding,
-            normal_force=building.normal_force[:, index, : bearing.layout.surfaces],
+            sliding=building.sliding[own],
+            gap=bearing.arrays()["capacity"] - building.sliding[own],
+            rim_force=building.rim_force[own],
+            lift=building.lift[own],
+            normal_force=building.normal_force[own],
             dissipated=building.dissipated[:, index],
             stored=building.stored[:, index],
         )
@@ -431,9 +441,18 @@ class BearingResult(AnyResult, HorizontalMotion):
     def extremes(self) -> Extremes:
         """Extremes over all steps."""
         peaks, index = self.building.extremes, self.index
-        sliding, normal = peaks.sliding[index, : self.surfaces], peaks.normal_force[index, :, : self.surfaces]
-        gap = self.capacity - sliding
-        return Extremes(peaks.bearing_displacement[index], peaks.top_force[index], sliding, gap, *normal)
+        own = (index, slice(self.surfaces))
+        least, most = peaks.normal_force[index, :, : self.surfaces]
+        return Extremes(
+            displacement=peaks.bearing_displacement[index],
+            top_force=peaks.top_force[index],
+            sliding=peaks.sliding[own],
+            gap=self.capacity - peaks.sliding[own],
+            least_normal=least,
+            most_normal=most,
+            rim_force=peaks.rim_force[own],
+            lift=peaks.lift[own],
+        )
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -22,7 +22,8 @@ class Extremes:
     displacement [m], top_force [N]: largest magnitude along E1, E2, E3 and in the horizontal plane, shape (4,).
     Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
     the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
-    where a friction law acts; temperature, the highest, where it heats [degC].
+    where a friction law acts; temperature, the highest, where it heats [degC]; rim_force [N] and lift [m], the largest,
+    which a bearing that is not below a building records in rows alone.
     """
 
     displacement: Array
@@ -35,6 +36,8 @@ class Extremes:
     least_friction: Array | None = None
     most_friction: Array | None = None
     temperature: Array | None = None
+    rim_force: Array | None = None
+    lift: Array | None = None
 
     @classmethod
     def of_rows(cls, history: History) -> Extremes:
@@ -52,6 +55,8 @@ class Extremes:
             least_friction=None if mu is None else mu.min(axis=0),
             most_friction=None if mu is None else mu.max(axis=0),
             temperature=None if temperature is None else temperature.max(axis=0),
+            rim_force=history.rim_force.max(axis=0),
+            lift=history.lift.max(axis=0),
         )
 
     @classmethod

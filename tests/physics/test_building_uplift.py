@@ -95,6 +95,8 @@ def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
         left = opened.kinetic + opened.strain + opened.damped - opened.received
         assert np.abs(left).max() < 5e-4 * opened.kinetic.max()
         assert opened.axial_force.min() < 1e-6 * LOAD
+        lifts = [run.extremes.lift.max(axis=1) for run in (opened, whole)]
+        assert np.all(lifts[1][1:3] > 1e-5) and lifts[0] == pytest.approx(lifts[1], abs=path)
 
 
 def closed(given: BuildingScene) -> tuple[float, float]:

@@ -125,6 +125,8 @@ int read_row(msfp_building *b, int bearing);
 
 /* Numbers that are kept of the rows of all bearings. */
 size_t entry_count(const msfp_building *b);
+/* A number that is kept of the row of a bearing; 0 where its model has none (entry < 0). */
+static inline double kept(const member *m, int entry) { return entry < 0 ? 0.0 : m->row[entry]; }
 /* A number that tells what a run computes from, its two-ports aside, which have their own. */
 uint64_t identity_of(const msfp_building *b);
 

@@ -39,7 +39,7 @@ typedef struct {
     const int *ground_of;                     /* [bearings] motion of the ground below */
     const msfp_piecewise *ground;             /* [grounds] motions, of which channels 0 to 2 are used */
     const int *entry_count;                   /* [bearings] numbers kept of the rows of each bearing, */
-    const int *entries;                       /* one bearing after the other: their indices */
+    const int *entries;                       /* one bearing after the other: their indices; -1: 0 */
     double weight;                            /* scale of forces [N] */
     int vectors;                              /* of the building, whose peaks are kept: */
     const int *vector_orders;                 /* [vectors] 0: of the coordinates, 1, 2: of their derivatives; */

@@ -106,7 +106,7 @@ void note_bearing(msfp_building *b, int bearing)
     at[1] = fmax(at[1], -force[2]);
     at += 2;
     for (int k = 0; k < count; ++k) {
-        at[k] = fmin(at[k], m->row[entries[k]]);
-        at[count + k] = fmax(at[count + k], m->row[entries[k]]);
+        at[k] = fmin(at[k], kept(m, entries[k]));
+        at[count + k] = fmax(at[count + k], kept(m, entries[k]));
     }
 }

@@ -64,7 +64,7 @@ int write_row(msfp_building *b)
     for (int i = 0; i < s->bearings; ++i) {
         row = put(row, b->members[i].wrench, 2 * MSFP_WRENCH);
         for (int k = 0; k < s->entry_count[i]; ++k)
-            *row++ = b->members[i].row[*entries++];
+            *row++ = kept(&b->members[i], *entries++);
     }
     ++b->row_count;
     return MSFP_OK;
