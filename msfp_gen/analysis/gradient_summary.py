@@ -76,8 +76,9 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
     for name in ("least_friction", "most_friction"):
         if name in slopes:
             gradient[name] = slopes[name].tolist()
-    if set(gradients.energy) > set(ENERGIES):
-        gradient["energy"] = {name: float(values[index, -1]) for name, values in gradients.energy.items()}
+    energy = {name.removeprefix("energy_"): v for name, v in gradients.arrays.items() if name.startswith("energy_")}
+    if set(energy) > set(ENERGIES):
+        gradient["energy"] = {name: float(values[index, -1]) for name, values in energy.items()}
     return gradient
 
 

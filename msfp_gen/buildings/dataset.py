@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
-from hashlib import sha256
-from itertools import product
-from types import EllipsisType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.extremes import BuildingExtremes
-from msfp_gen.buildings.extremes import shapes as shapes_of_extremes
+from msfp_gen.buildings.extremes import DIMENSIONS, SIZES, BuildingExtremes
 from msfp_gen.buildings.file import stored_bearing
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
-from msfp_gen.results.files import COUNTER, Arrays, attributes_of, motion_in, notes_in, table_of, without
+from msfp_gen.results.dataset import ROWS as ONE_BEARING
+from msfp_gen.results.dataset import labels_of as labels_of_one
+from msfp_gen.results.files import COUNTER, attributes_of, motion_in, notes_in, without
 from msfp_gen.results.history import LABELS
 from msfp_gen.results.stored_group import Attribute, StoredGroup
+from msfp_gen.results.variables import (
+    SURFACES,
+    Arrays,
+    Labels,
+    Places,
+    Variable,
+    column_places,
+    dataset_of,
+    digest_of_names,
+    labelled,
+    stored_fields,
+)
 from msfp_gen.scene.file.loader import bearing_table, plain_table, toml_table
 from msfp_gen.scene.file.stored_motion import GROUP as MOTION
 from msfp_gen.scene.file.stored_motion import PIECES, to_pieces
@@ -33,11 +41,14 @@ from msfp_gen.scene.solver import Solver
 if TYPE_CHECKING:
     import xarray as xr
 
-    from msfp_gen.buildings.scene import BuildingScene
-    from msfp_gen.results.files import ResultFiles
-
+Dimensions = Mapping[str, tuple[str, ...]]  # of arrays, by name
 GROUP = "building"  # group of a result file with the matrices
-MATRICES = ("mass", "damping", "stiffness")
+MATRICES = {  # arrays there, with their dimensions
+    **dict.fromkeys(("mass", "damping", "stiffness"), ("row", "column")),
+    "node_rows": ("node", "freedom", "row"),
+    "node_position": ("node", "axis"),
+    **dict.fromkeys(("deformation", "inertia"), ("storey", "freedom", "row")),
+}
 
 
 def scene_text(scene: BuildingScene) -> str:
@@ -66,26 +77,18 @@ def scene_text(scene: BuildingScene) -> str:
     )
 
 
-def to_arrays(building: Building) -> xr.Dataset:
-    """Matrices, nodes and columns of a building as a dataset."""
-    import xarray as xr
-
-    square = ("row", "column")
-    variables: dict[str, Any] = {name: (square, getattr(building, name)) for name in MATRICES}
-    shape = (-1, FREEDOMS, len(building.mass))
-    node, storey = ("node", "freedom", "row"), ("storey", "freedom", "row")
-    variables["node_rows"] = (node, np.reshape([each.rows for each in building.nodes], shape))
-    variables["node_position"] = (("node", "axis"), np.reshape([each.position for each in building.nodes], (-1, 3)))
-    variables["deformation"] = (storey, np.reshape([each.deformation for each in building.columns], shape))
-    variables["inertia"] = (storey, np.reshape([each.inertia for each in building.columns], shape))
-    return xr.Dataset(variables)
-
-
-def shapes(size: int, nodes: int, columns: int) -> dict[str, tuple[int, ...]]:
-    """The shapes of these arrays."""
-    table: dict[str, tuple[int, ...]] = dict.fromkeys(MATRICES, (size, size))
-    table |= {"node_rows": (nodes, FREEDOMS, size), "node_position": (nodes, 3)}
-    return table | dict.fromkeys(("deformation", "inertia"), (columns, FREEDOMS, size))
+def to_arrays(building: Building) -> Arrays:
+    """Matrices, nodes and columns of a building by name, as in `MATRICES`."""
+    size, nodes, columns = len(building.mass), building.nodes, building.columns
+    return {
+        **{name: getattr(building, name) for name in ("mass", "damping", "stiffness")},
+        "node_rows": np.reshape([node.rows for node in nodes], (-1, FREEDOMS, size)),
+        "node_position": np.reshape([node.position for node in nodes], (-1, 3)),
+        **{
+            name: np.reshape([getattr(column, name) for column in columns], (-1, FREEDOMS, size))
+            for name in ("deformation", "inertia")
+        },
+    }
 
 
 def ground_name(index: int) -> str:
@@ -115,140 +118,130 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
 EXTREMES = "extremes"  # group
 FREEDOM = ("u1", "u2", "u3", "r1", "r2", "r3")
 ON_BEARING = "on the bearing"
-GROUND = ("displacement", "velocity", "acceleration")
-UNITS = ("m", "m/s", "m/s^2")
-BOTH = ("m or rad", "m/s or rad/s", "m/s^2 or rad/s^2")  # of translations and rotations
-SURFACE = ("bearing", "surface")
-Index = tuple[int | slice | EllipsisType, ...]
+MOTION_UNITS = {  # of translations, of translations and rotations
+    "displacement": ("m", "m or rad"),
+    "velocity": ("m/s", "m/s or rad/s"),
+    "acceleration": ("m/s^2", "m/s^2 or rad/s^2"),
+}
 
 
-class Stored(NamedTuple):
-    """A variable of which a result is made again: dimensions after time, field and part of it, unit, meaning, sign."""
-
-    dims: tuple[str, ...]
-    field: str
-    part: Index
-    unit: str
-    meaning: str
-    sign: str = ""
+ALL, STOREYS = ("time",), ("time", "storey", "freedom")  # dimensions
+OF_BEARING, VECTORS = ("time", "bearing"), ("time", "bearing", "axis")
 
 
-class Derived(NamedTuple):
-    """A variable that follows from the stored ones: dimensions after time, values, unit, meaning, sign."""
-
-    dims: tuple[str, ...]
-    values: Callable[[Any], Array]
-    unit: str
-    meaning: str
-    sign: str = ""
+def _of_bearings(name: str, field: str, sign: str = "") -> Variable:
+    """A variable of one bearing alone, of all bearings."""
+    variable = ONE_BEARING[name]
+    return variable._replace(dims=("time", "bearing", *variable.dims[1:]), field=field, sign=sign)
 
 
-def _nodes(order: int, result: Any) -> Array:
-    """A derivative of the motion of every node, shape (k, nodes, 6)."""
-    return np.stack([result.node(node.name)[:, order] for node in result.scene.building.nodes], axis=1)
+def _motions(word: str, dims: tuple[str, ...], meaning: str, kind: int = 0) -> dict[str, Variable]:
+    """Displacement, velocity and acceleration in one array. dims: of each. kind: index of the unit."""
+    whole = (*dims[:-1], "order", dims[-1])
+    return {
+        f"{word}_{name}": Variable(dims, units[kind], meaning.format(name), word, (..., order, slice(None)), whole)
+        for order, (name, units) in enumerate(MOTION_UNITS.items())
+    }
 
 
-WHOLE: Index = (...,)
+def _wrenches(end: int, word: str) -> dict[str, Variable]:
+    """Force and moment of an end of each bearing."""
+    whole = (*OF_BEARING, "end", "freedom")
+    force, moment = f"force of the {word} end", f"moment of the {word} end about it"
+    return {
+        f"{word}_force": Variable(VECTORS, "N", force, "wrench", (..., end, slice(0, 3)), whole, ON_BEARING),
+        f"{word}_moment": Variable(VECTORS, "N m", moment, "wrench", (..., end, slice(3, 6)), whole, ON_BEARING),
+    }
+
+
+COORDINATES = {
+    "displacement": "coordinates, in axes that do not move with the ground",
+    "velocity": "their rates",
+    "acceleration": "absolute",
+}
+# Of these a result is made again.
 STORED = {
-    "coordinate_displacement": Stored(
-        ("coordinate",), "displacement", WHOLE, BOTH[0], "coordinates, in axes that do not move with the ground"
+    "time": ONE_BEARING["time"],
+    **{
+        f"coordinate_{name}": Variable(("time", "coordinate"), MOTION_UNITS[name][1], meaning, name)
+        for name, meaning in COORDINATES.items()
+    },
+    **_motions("ground", ("time", "axis"), "{} of the ground"),
+    **_wrenches(0, "lower"),
+    **_wrenches(1, "upper"),
+    "normal_force": _of_bearings("normal_force", "normal_force", "compression"),
+    **{name: _of_bearings(name, name) for name in ("sliding", "rim_force", "lift")},
+    **_motions("support", VECTORS, "{} of the ground below the bearing"),
+    "dissipated": Variable(OF_BEARING, "J", "energy dissipated in the bearing", "dissipated"),
+    "stored": Variable(OF_BEARING, "J", "energy stored in the bearing and its interface", "stored"),
+    "energy_damped": Variable(ALL, "J", "dissipated by the damping of the building", "damped"),
+    "energy_received": Variable(
+        ALL, "J", "work of the bearings on the building, by their forces beyond those at rest", "received"
     ),
-    "coordinate_velocity": Stored(("coordinate",), "velocity", WHOLE, BOTH[1], "their rates"),
-    "coordinate_acceleration": Stored(("coordinate",), "acceleration", WHOLE, BOTH[2], "absolute"),
-    **{
-        f"ground_{name}": Stored(("axis",), "ground", (..., order, slice(None)), unit, f"{name} of the ground")
-        for order, (name, unit) in enumerate(zip(GROUND, UNITS, strict=True))
-    },
-    **{
-        f"{word}_{what}": Stored(
-            ("bearing", "axis"), "wrench", (..., end, slice(3 * half, 3 * half + 3)), unit, meaning, ON_BEARING
-        )
-        for end, word in enumerate(("lower", "upper"))
-        for half, (what, unit, meaning) in enumerate(
-            (("force", "N", f"force of the {word} end"), ("moment", "N m", f"moment of the {word} end about it"))
-        )
-    },
-    "normal_force": Stored(SURFACE, "normal_force", WHOLE, "N", "normal force on the surface", "compression"),
-    "sliding": Stored(SURFACE, "sliding", WHOLE, "m", "distance s from the centre of the surface (3.20)"),
-    "rim_force": Stored(SURFACE, "rim_force", WHOLE, "N", "force F_c of the rim (2.103)"),
-    "lift": Stored(SURFACE, "lift", WHOLE, "m", "clearance between separated faces; 0 while in contact"),
-    **{
-        f"support_{name}": Stored(
-            ("bearing", "axis"), "support", (..., order, slice(None)), unit, f"{name} of the ground below the bearing"
-        )
-        for order, (name, unit) in enumerate(zip(GROUND, UNITS, strict=True))
-    },
-    "dissipated": Stored(("bearing",), "dissipated", WHOLE, "J", "energy dissipated in the bearing"),
-    "stored": Stored(("bearing",), "stored", WHOLE, "J", "energy stored in the bearing and its interface"),
-    "energy_damped": Stored((), "damped", WHOLE, "J", "dissipated by the damping of the building"),
-    "energy_received": Stored(
-        (), "received", WHOLE, "J", "work of the bearings on the building, by their forces beyond those at rest"
-    ),
-    "energy_input": Stored((), "input", WHOLE, "J", "work of the ground"),
+    "energy_input": Variable(ALL, "J", "work of the ground", "input"),
 }
-OF_SURFACES = [variable.field for variable in STORED.values() if variable.dims == SURFACE]
+FORCE = "force and moment that accelerate the floors above, at half height"
+# These follow from them.
 DERIVED = {
-    **{
-        f"node_{name}": Derived(
-            ("node", "freedom"), partial(_nodes, order), BOTH[order], f"{name} of the node, absolute"
-        )
-        for order, name in enumerate(GROUND)
-    },
-    "bearing_displacement": Derived(
-        ("bearing", "axis"), lambda r: _of_bearings(r, "displacement"), "m", "displacement u across it", "base less top"
+    **_motions("node", ("time", "node", "freedom"), "{} of the node, absolute", 1),
+    "bearing_displacement": _of_bearings("displacement", "bearing_displacement", "base less top"),
+    "top_force": _of_bearings("top_force", "top_force", "on the building"),
+    "axial_force": Variable(
+        OF_BEARING, "N", "force between bearing and building along E3", "axial_force", sign="compression"
     ),
-    "top_force": Derived(
-        ("bearing", "axis"), lambda r: _of_bearings(r, "top_force"), "N", "force of the bearing", "on the building"
+    "base_reaction": Variable(
+        ("time", "axis"), "N", "sum of the forces of the ground", "base_reaction", sign=ON_BEARING
     ),
-    "axial_force": Derived(("bearing",), lambda r: r.axial_force, "N", "force along E3", "compression"),
-    "base_reaction": Derived(("axis",), lambda r: r.base_reaction, "N", "sum of the forces of the ground", ON_BEARING),
-    "base_torsion": Derived((), lambda r: r.base_torsion, "N m", "their moment about E3 through the centre of mass"),
-    "drift": Derived(
-        ("storey", "freedom"), lambda r: r.drift, BOTH[0], "deformation of the columns", "above less below"
-    ),
-    "storey_force": Derived(
-        ("storey", "freedom"),
-        lambda r: r.storey_force,
-        "N or N m",
-        "force and moment that accelerate the floors above, at half height",
-        "on the floors above",
-    ),
-    "energy_kinetic": Derived((), lambda r: r.kinetic, "J", "kinetic energy of the building"),
-    "energy_strain": Derived((), lambda r: r.strain, "J", "strain energy of the building"),
+    "base_torsion": Variable(ALL, "N m", "their moment about E3 through the centre of mass", "base_torsion"),
+    "drift": Variable(STOREYS, "m or rad", "deformation of the columns", "drift", sign="above less below"),
+    "storey_force": Variable(STOREYS, "N or N m", FORCE, "storey_force", sign="on the floors above"),
+    "energy_kinetic": Variable(ALL, "J", "kinetic energy of the building", "kinetic"),
+    "energy_strain": Variable(ALL, "J", "strain energy of the building", "strain"),
 }
+VARIABLES = STORED | DERIVED
+# Of one bearing of a building: variables of a bearing alone, and others that its result has.
+ALONE = ("normal_force", "sliding", "gap", "rim_force", "lift", "base_displacement", "displacement", "top_force")
+OF_ONE = {name: ONE_BEARING[name] for name in ("time", *ALONE, "top_moment")}
+OF_ONE |= {name: VARIABLES[name]._replace(dims=ALL) for name in ("axial_force", "dissipated", "stored")}
 
 
-def _of_bearings(result: Any, name: str) -> Array:
-    """A quantity of every bearing, shape (k, bearings, 3)."""
-    return np.stack([getattr(one, name) for one in result.bearings], axis=1)
+def arrays_of(result: Any) -> Arrays:
+    """The arrays of which the variables are parts."""
+    nodes, bearings = result.scene.building.nodes, result.bearings
+    several = {
+        "node": [result.node(node.name) for node in nodes],
+        "bearing_displacement": [one.displacement for one in bearings],
+        "top_force": [one.top_force for one in bearings],
+    }
+    fields = {variable.field for variable in VARIABLES.values()} - several.keys()
+    arrays = {name: np.stack(columns, axis=1) for name, columns in several.items()}
+    return arrays | {name: getattr(result, name) for name in fields}
 
 
 def to_dataset(result: Any) -> xr.Dataset:
     """All variables along time; scene, status, notes of the monitors and versions in the attributes."""
-    import xarray as xr
-
-    values = {name: (variable, getattr(result, variable.field)[variable.part]) for name, variable in STORED.items()}
-    variables = {name: _array(variable, rows) for name, (variable, rows) in values.items()}
-    variables |= {name: _array(variable, variable.values(result)) for name, variable in _derived(result)}
     counters = {**result.counters, "wall_time": result.wall_time}
     about = attributes_of(result, edition(), scene_text(result.scene), result.monitored, counters)
     about |= {"motion": PIECES, "padding": "NaN: the bearing has no such surface"}
-    return xr.Dataset(variables, dict(_coordinates(result)), attrs=about)
+    return dataset_of(_variables(result.scene), arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
-def _derived(result: Any) -> Iterator[tuple[str, Derived]]:
+def dataset_of_bearing(one: Any) -> xr.Dataset:
+    """The rows of a bearing of a building, for other programs; their names are those of a bearing alone."""
+    given = one.scene.bearings[one.index]
+    parts = {"bearing": bearing_table(given.bearing), "interface": plain_table(given.interface)}
+    text = dumps({"axial_load": one.axial_load, **parts})
+    about = attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label}
+    arrays = {variable.field: getattr(one, variable.field) for variable in OF_ONE.values()}
+    return dataset_of(OF_ONE, arrays, labelled(labels_of_one(one.surfaces)), about)
+
+
+def _variables(scene: BuildingScene) -> dict[str, Variable]:
     """Those of storeys only where there are some."""
-    for name, variable in DERIVED.items():
-        if result.scene.building.columns or "storey" not in variable.dims:
-            yield name, variable
+    return {name: v for name, v in VARIABLES.items() if scene.building.columns or "storey" not in v.dims}
 
 
-def _array(variable: Stored | Derived, values: Array) -> tuple[tuple[str, ...], Array, dict[str, str]]:
-    about = {"units": variable.unit, "long_name": variable.meaning}
-    return ("time", *variable.dims), values, about | ({"sign": variable.sign} if variable.sign else {})
-
-
-def _labels(scene: BuildingScene) -> dict[str, Sequence[Any]]:
+def labels_of(scene: BuildingScene) -> Labels:
     """The labels of the dimensions after time."""
     building, bearings = scene.building, scene.bearings
     return {
@@ -262,53 +255,67 @@ def _labels(scene: BuildingScene) -> dict[str, Sequence[Any]]:
     }
 
 
-def _coordinates(result: Any) -> Iterator[tuple[str, Any]]:
-    meanings = {
-        "freedom": "along and about E1, E2, E3",
-        "coordinate": "of the building, from 0",
-        "bearing": "number of the bearing",
-        "surface": "sliding surface, bottom first",
+def columns(scene: BuildingScene) -> Places:
+    """The columns of a table of all rows, as of `column_places`; none of surfaces that a bearing does not have."""
+    surfaces = [one.bearing.layout.surfaces for one in scene.bearings]
+    return {
+        name: (variable, index)
+        for name, (variable, index) in column_places(VARIABLES, labels_of(scene)).items()
+        if variable.dims[1:] != SURFACES or index[1] < surfaces[index[0]]
     }
-    yield "time", ("time", result.time, {"units": "s", "long_name": "time t"})
-    for dim, labels in _labels(result.scene).items():
-        values = np.array(labels, dtype=None if len(labels) else str)
-        yield dim, (dim, values, {"long_name": meanings[dim]} if dim in meanings else {})
 
 
 def groups_of(result: Any) -> dict[str, xr.Dataset]:
     """The groups of a file beside the dataset: matrices, motions of the ground, extremes."""
-    groups = {GROUP: to_arrays(result.scene.building)}
+    groups = {GROUP: _group_of(to_arrays(result.scene.building), MATRICES)}
     groups |= {ground_name(i): to_pieces(motion) for i, motion in enumerate(result.scene.grounds[0])}
-    return groups | ({} if result.recorded_extremes is None else {EXTREMES: result.recorded_extremes.to_arrays()})
+    extremes = result.recorded_extremes
+    return groups if extremes is None else groups | {EXTREMES: _group_of(vars(extremes), DIMENSIONS)}
+
+
+def _group_of(arrays: Arrays, dims: Dimensions) -> xr.Dataset:
+    import xarray as xr
+
+    return xr.Dataset({name: (dims[name], values) for name, values in arrays.items()})
+
+
+def _arrays_in(root: StoredGroup, name: str, dims: Dimensions, sizes: Mapping[str, int], arrays: Arrays) -> Arrays:
+    """The inverse of `_group_of`. arrays: takes them by their paths in the file."""
+    group = root.group(name)
+    read = {key: group.array(key, tuple(sizes[dim] for dim in own)) for key, own in dims.items()}
+    arrays |= {f"{name}/{key}": values for key, values in read.items()}
+    return read
 
 
 def edition() -> str:
     """A digest of the names that a file of this version has."""
-    table = [*STORED, *(field.name for field in fields(BuildingExtremes))]
-    return sha256(json.dumps(table).encode()).hexdigest()[:12]
+    return digest_of_names([*STORED, *DIMENSIONS])
 
 
 def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
     """Scene, rows, extremes, counters and notes of a file, as `ResultFiles.fields_in`."""
     scene = _scene(root, about, arrays)
-    rows = _rows(root, scene, arrays)
+    sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.length("time")}
+    surfaces = np.array([one.bearing.layout.surfaces for one in scene.bearings])
+    missing = np.arange(sizes["surface"]) >= surfaces[:, None]
+    extremes = _arrays_in(root, EXTREMES, DIMENSIONS, sizes, arrays) if EXTREMES in root else None
     counters: dict[str, Any] = without(COUNTER, about)
     return {
         "scene": scene,
-        **rows,
+        **stored_fields(root, STORED, sizes, arrays, missing),
         "wall_time": counters.pop("wall_time"),
         "counters": counters,
         "monitored": notes_in(about),
-        "recorded_extremes": _extremes(root.group(EXTREMES), scene, arrays) if EXTREMES in root else None,
+        "recorded_extremes": None if extremes is None else BuildingExtremes(**extremes),
     }
 
 
 def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> BuildingScene:
-    text, group = str(about["scene"]), root.group(GROUP)
-    table = toml_table(text)
-    sizes = shapes(group.rows("mass"), len(table.get("node", [])), len(table.get("column", [])))
-    matrices = {name: group.array(name, shape) for name, shape in sizes.items()}
-    arrays |= {f"{GROUP}/{name}": values for name, values in matrices.items()}
+    text = str(about["scene"])
+    table, size = toml_table(text), root.group(GROUP).rows("mass")
+    sizes = {"row": size, "column": size, "freedom": FREEDOMS, "axis": 3}
+    sizes |= {"node": len(table.get("node", [])), "storey": len(table.get("column", []))}
+    matrices = _arrays_in(root, GROUP, MATRICES, sizes, arrays)
     motions = []
     for index in range(int(table.get("grounds", 1))):
         motion, pieces, motion_about = motion_in(root, ground_name(index))
@@ -316,48 +323,3 @@ def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Bu
         about |= motion_about
         motions.append(motion)
     return scene_from(text, matrices, motions)
-
-
-def _extremes(group: StoredGroup, scene: BuildingScene, arrays: Arrays) -> BuildingExtremes:
-    extremes = {name: group.array(name, shape) for name, shape in shapes_of_extremes(scene).items()}
-    arrays |= {f"{EXTREMES}/{name}": values for name, values in extremes.items()}
-    return BuildingExtremes(**extremes)
-
-
-def _rows(root: StoredGroup, scene: BuildingScene, arrays: Arrays) -> dict[str, Any]:
-    """The rows by the names that `BuildingResult` has for them. Raises ValueError where they are not finite."""
-    count, bearings = root.length("time"), len(scene.bearings)
-    surfaces = np.array([one.bearing.layout.surfaces for one in scene.bearings])
-    sizes = {"coordinate": len(scene.building.mass), "axis": 3, "bearing": bearings, "surface": int(surfaces.max())}
-    more = {"ground": (3, 3), "wrench": (bearings, 2, 6), "support": (bearings, 3, 3)}  # shapes of fields of several
-    rows = {"time": root.array("time", (count,), compressed=False)}
-    arrays["time"] = rows["time"]
-    for name, (dims, field, part, *_) in STORED.items():
-        arrays[name] = values = root.array(name, (count, *(sizes[dim] for dim in dims)))
-        if field not in more:
-            rows[field] = values
-        else:
-            rows.setdefault(field, np.empty((count, *more[field])))[part] = values
-    missing = np.arange(sizes["surface"]) >= surfaces[:, None]  # a bearing has no such surface
-    for field, values in rows.items():
-        unknown = missing if field in OF_SURFACES else False
-        if not (np.isfinite(values) | unknown).all():
-            raise ValueError(f"{field} is not finite")
-    return rows
-
-
-def columns_of(result: ResultFiles) -> dict[str, Array]:
-    """Name -> values of every column of an exported table, shape (k,), SI units: `node_acceleration_floor_2_u1`."""
-    return {column.name: column.values for column in table_of(result.dataset)}
-
-
-def column_names(scene: BuildingScene) -> tuple[str, ...]:
-    """Names of the columns that a run of the scene has."""
-    labels, names = _labels(scene), ["time"]
-    surfaces = {number: one.bearing.layout.surfaces for number, one in enumerate(scene.bearings, start=1)}
-    table: dict[str, Stored | Derived] = {**STORED, **DERIVED}
-    for name, variable in table.items():
-        for index in product(*(labels[dim] for dim in variable.dims)):
-            if variable.dims != SURFACE or index[1] <= surfaces[index[0]]:
-                names.append("_".join([name, *map(str, index)]).replace(" ", "_"))
-    return tuple(names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +11,25 @@ import numpy as np
 from msfp_gen.common.arrays import Array, parts
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from msfp_gen.buildings.scene import BuildingScene
 
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
+# The dimensions of the arrays of `BuildingExtremes`, and the sizes of those that are the same of all buildings.
+DIMENSIONS = {
+    **dict.fromkeys(("node_acceleration", "node_displacement"), ("node", "peak")),
+    **dict.fromkeys(("drift", "storey_shear"), ("storey", "peak")),
+    "storey_torsion": ("storey",),
+    "base_twist": ("whole",),
+    **dict.fromkeys(("mean_displacement", "base_reaction"), ("peak",)),
+    "base_torsion": ("whole",),
+    "energy": ("kind",),
+    **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
+    "axial_force": ("bearing", "end"),
+    **dict.fromkeys(("sliding", "rim_force", "lift"), ("bearing", "surface")),
+    "normal_force": ("bearing", "end", "surface"),
+}
+SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,31 +104,6 @@ class BuildingExtremes:
             lift=padded([lift_of(values) for values in of_bearings("least compression")]),
             normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
         )
-
-    def to_arrays(self) -> xr.Dataset:
-        """As a group of a file."""
-        import xarray as xr
-
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        return xr.Dataset({k: (tuple(f"{k}_{axis}" for axis in range(x.ndim)), x) for k, x in values.items()})
-
-
-def shapes(scene: BuildingScene) -> dict[str, tuple[int, ...]]:
-    """The shapes of these arrays."""
-    nodes, storeys, bearings = len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
-    surfaces = max(each.bearing.layout.surfaces for each in scene.bearings)
-    return {
-        **dict.fromkeys(("node_acceleration", "node_displacement"), (nodes, VECTOR)),
-        **dict.fromkeys(("drift", "storey_shear"), (storeys, VECTOR)),
-        "storey_torsion": (storeys,),
-        **dict.fromkeys(("base_twist", "base_torsion"), (1,)),
-        **dict.fromkeys(("mean_displacement", "base_reaction"), (VECTOR,)),
-        "energy": (2,),
-        **dict.fromkeys(("bearing_displacement", "top_force"), (bearings, VECTOR)),
-        "axial_force": (bearings, 2),
-        **dict.fromkeys(("sliding", "rim_force", "lift"), (bearings, surfaces)),
-        "normal_force": (bearings, 2, surfaces),
-    }
 
 
 def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:

@@ -23,27 +23,15 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
-from msfp_gen.results.dataset import coordinates_of, named_columns
 from msfp_gen.results.extremes import Extremes, by_axis, largest
-from msfp_gen.results.files import KINDS, Storage, attributes_of
+from msfp_gen.results.files import KINDS, Storage
 from msfp_gen.results.history import Event, HorizontalMotion
 from msfp_gen.results.note import Note
-from msfp_gen.scene.file.loader import bearing_table, plain_table
-from msfp_gen.scene.file.toml_text import dumps
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.scene.bearing import Bearing
-
-# The variables of the dataset of one bearing that `Result.dataset` has too, and the others with unit and meaning.
-OF_SURFACES = ("normal_force", "sliding", "gap", "rim_force", "lift")
-RECORDED = (*OF_SURFACES, "base_displacement", "displacement", "top_force", "top_moment")
-MORE = {
-    "axial_force": ("N", "compression between bearing and building"),
-    "dissipated": ("J", "energy dissipated in the bearing"),
-    "stored": ("J", "energy stored in the bearing and its interface"),
-}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -508,18 +496,7 @@ class BearingResult(AnyResult, HorizontalMotion):
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Its rows as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
-        import xarray as xr
-
-        rows = [item for name in RECORDED for item in named_columns(name, getattr(self, name))]
-        more = {
-            name: (("time",), getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in MORE.items()
-        }
-        one = self.scene.bearings[self.index]
-        parts = {"bearing": bearing_table(one.bearing), "interface": plain_table(one.interface)}
-        text = dumps({"axial_load": self.axial_load, **parts})
-        about = attributes_of(self, "", text, self.notes, {}) | {"bearing": self.label}
-        return xr.Dataset(dict(rows) | more, coordinates_of(self.time, self.surfaces), about)
+        return building_dataset.dataset_of_bearing(self)
 
     def characterise(self) -> Characterisation:
         """Effective stiffness, damping and remaining capacity, as `Result.characterise`; N of the period is at rest.

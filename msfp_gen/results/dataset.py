@@ -5,19 +5,29 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, asdict, fields
-from hashlib import sha256
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.files import COUNTER, REMEDY, WORDS, Arrays, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.gradient import ENERGIES, ERROR, SERIES, WITH_INTEGRALS, Gradients
+from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
+from msfp_gen.results.gradient import ENERGIES, ERROR, EVENTS, SERIES, WITH_INTEGRALS, Gradients
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import Attribute, StoredGroup
+from msfp_gen.results.variables import (
+    Arrays,
+    Labels,
+    Places,
+    Variable,
+    column_places,
+    dataset_of,
+    digest_of_names,
+    labelled,
+    stored_fields,
+)
 from msfp_gen.scene.parameters import Parameter
 from msfp_gen.scene.scene import Scene
 from msfp_gen.specification.contract import EVENT_KINDS, names
@@ -25,65 +35,67 @@ from msfp_gen.specification.contract import EVENT_KINDS, names
 if TYPE_CHECKING:
     import xarray as xr
 
-Variables = Iterator[tuple[str, tuple[tuple[str, ...], Any, dict[str, str]]]]
+
+def _rows() -> Iterator[tuple[str, Variable]]:
+    """Every quantity of the rows: several variables where each of its components has a name. Then every energy."""
+    for field, rows in quantities().items():
+        dims, several = ("time", *rows.dims), len(rows.names) > 1
+        for index, name in enumerate(rows.names or (field,)):
+            part: Any = {"dims": dims[:-1], "part": (..., index), "whole": dims} if several else {"dims": dims}
+            yield name, Variable(unit=rows.unit, meaning=rows.meaning.format(name), field=field, **part)
+    for name, meaning in ENERGY.items():
+        yield f"energy_{name}", Variable(("time",), "J", meaning, f"energy_{name}")
+
+
+ROWS = dict(_rows())
+VARIABLES = ROWS | {
+    "event_time": Variable(("event",), "s", "time of the event", "event_time"),
+    "event_surface": Variable(("event",), "1", "surface, 0 for a stop", "event_surface", kind=np.int64),
+    "event_kind": Variable(
+        ("event",), "", "kind of the event", "event_kind", kind="<U16", words=tuple(names(EVENT_KINDS))
+    ),
+    "event_displacement": Variable(("event", "axis"), "m", "displacement u then", "event_displacement"),
+    "event_top_force": Variable(("event", "axis"), "N", "F_top then", "event_top_force"),
+}
+OPTIONAL = {field.name for field in fields(History) if field.default is not MISSING}  # of effects
+DERIVED: dict[str, Any] = {}  # all variables are read
 
 
 def to_dataset(result: RunData) -> xr.Dataset:
     """The rows of `result` along `time`, its events along `event`; scene, status and provenance in the attributes."""
-    import xarray as xr
-
-    history = result.history
-    variables = dict([*row_variables(history), *energy_variables(history), *_event_variables(result)])
-    return xr.Dataset(variables, coordinates_of(history.time, history.surfaces), attrs=_attributes(result))
+    labels = labels_of(result.history.surfaces)
+    return dataset_of(VARIABLES, arrays_of(result), labelled(labels), _attributes(result))
 
 
-def coordinates_of(time: Array, surfaces: int) -> dict[str, Any]:
-    """The coordinates of the dataset: time [s], bodies, surfaces, and the labels of dimensions of fixed length."""
-    return {
-        "time": ("time", time, {"units": "s", "long_name": "time t"}),
-        "body": ("body", np.arange(2, surfaces + 2), {"long_name": "moving body k, base is 1"}),
-        "surface": ("surface", np.arange(1, surfaces + 1), {"long_name": "sliding surface, bottom first"}),
-        **{dim: (dim, np.array(labels)) for dim, labels in LABELS.items()},
+def arrays_of(result: RunData) -> Arrays:
+    """The arrays of which the variables are parts."""
+    return rows_of(result.history) | {
+        name: np.array([getattr(event, name.removeprefix("event_")) for event in result.events], variable.kind).reshape(
+            len(result.events), *(len(LABELS[dim]) for dim in variable.dims[1:])
+        )
+        for name, variable in VARIABLES.items()
+        if variable.dims[0] == "event"
     }
 
 
-def row_variables(history: History) -> Variables:
-    """Every quantity of the rows but their time."""
-    for field, values in history.arrays().items():
-        if field != "time":
-            yield from named_columns(field, values)
+def rows_of(history: History) -> Arrays:
+    """Those of the rows."""
+    return history.arrays() | {f"energy_{name}": values for name, values in history.energy.items()}
 
 
-def named_columns(field: str, values: Any) -> Variables:
-    """The variables of one field of `History`: several where each of its components has a name."""
-    rows = quantities()[field]
-    names = rows.columns(field)
-    for column, name in enumerate(names):
-        about = {"units": rows.unit, "long_name": rows.meaning.format(name)}
-        yield name, (("time", *rows.column_dims), values[..., column] if len(names) > 1 else values, about)
+def labels_of(surfaces: int) -> Labels:
+    """Numbers of bodies and surfaces, and the labels of dimensions of fixed length."""
+    return {"body": range(2, surfaces + 2), "surface": range(1, surfaces + 1), **LABELS}
 
 
-def energy_variables(history: History) -> Variables:
-    """Every energy of the rows."""
-    for name, meaning in ENERGY.items():
-        yield f"energy_{name}", (("time",), history.energy[name], {"units": "J", "long_name": meaning})
+@lru_cache(maxsize=16)
+def _columns(surfaces: int) -> Places:
+    return column_places(ROWS, labels_of(surfaces))
 
 
-# Field of an event -> dimensions, type, unit and meaning of its variable `event_...`.
-EVENTS: dict[str, tuple[tuple[str, ...], Any, str, str]] = {
-    "time": ((), np.float64, "s", "time of the event"),
-    "surface": ((), np.int64, "1", "surface, 0 for a stop"),
-    "kind": ((), "<U16", "", "kind of the event"),
-    "displacement": (("axis",), np.float64, "m", "displacement u then"),
-    "top_force": (("axis",), np.float64, "N", "F_top then"),
-}
-
-
-def _event_variables(result: RunData) -> Variables:
-    for field, (dims, kind, unit, meaning) in EVENTS.items():
-        shape = (len(result.events), *(len(LABELS[dim]) for dim in dims))
-        values = np.array([getattr(event, field) for event in result.events], dtype=kind).reshape(shape)
-        yield f"event_{field}", (("event", *dims), values, {"long_name": meaning} | ({"units": unit} if unit else {}))
+def columns(scene: Scene) -> Places:
+    """The columns of a table of all rows, as of `column_places`; a run has those of its effects."""
+    return _columns(scene.bearing.layout.surfaces)
 
 
 def _attributes(result: RunData) -> dict[str, str | int | float]:
@@ -96,27 +108,26 @@ def _attributes(result: RunData) -> dict[str, str | int | float]:
     }
 
 
-DERIVED: dict[str, Any] = {}  # all variables are read
-
-
 def edition() -> str:
-    """A digest of the names that a file of this version has: of rows, energies, counters and labels."""
-    rows = [rows.columns(field) for field, rows in quantities().items()]
-    table = [*rows, ENERGY, *LABELS.items(), [field.name for field in fields(Counters)], WORDS]
-    return sha256(json.dumps([list(each) for each in table]).encode()).hexdigest()[:12]
+    """A digest of the names that a file of this version has: of variables, counters and labels."""
+    return digest_of_names([*VARIABLES, *LABELS.items(), [field.name for field in fields(Counters)], WORDS])
 
 
 def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> dict[str, Any]:
     """Scene, rows, events, counters, notes, extremes and derivatives, as `ResultFiles.fields_in`."""
     scene = _scene(root, about, arrays)
     surfaces = scene.bearing.layout.surfaces
-    history = _history(root, surfaces, arrays)
-    events = _events(root, surfaces, arrays)
+    sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
+    sizes |= {"time": root.length("time"), "event": root.length("event_time")}
+    variables = {name: v for name, v in VARIABLES.items() if v.field not in OPTIONAL or name in root}
+    read = stored_fields(root, variables, sizes, arrays)
+    energy = {name: read.pop(f"energy_{name}") for name in ENERGY}
+    history = History(**{field: read[field] for field in quantities() if field in read}, energy=energy)
     return {
         "scene": scene,
         "history": history,
-        "events": events,
-        "gradients": _gradients(root, history, len(events), about, arrays),
+        "events": _events(read, surfaces),
+        "gradients": _gradients(root, history, sizes, about, arrays),
         "counters": Counters(**without(COUNTER, about)),  # type: ignore[arg-type]
         "notes": notes_in(about),
         "recorded_extremes": _extremes(json.loads(str(about["extremes"])), surfaces) if "extremes" in about else None,
@@ -124,45 +135,31 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
 
 
 def _gradients(
-    root: StoredGroup, history: History, events: int, about: dict[str, Attribute], arrays: Arrays
+    root: StoredGroup, history: History, sizes: dict[str, int], about: dict[str, Attribute], arrays: Arrays
 ) -> Gradients | None:
     """The derivatives with respect to parameters, where the file has some."""
     if GRADIENT not in root:
         return None
-    group, count = root.group(GRADIENT), len(history.time)
-    read = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
-    parameters = tuple(_parameter(table) for table in json.loads(str(read["parameters"])))
-    sizes = dict.fromkeys(STACK, history.surfaces) | {name: len(labels) for name, labels in LABELS.items()}
-    about |= {f"{GRADIENT}/{name}": value for name, value in read.items()}
-
-    def array(name: str, *shape: int) -> Array:
-        values: Array = group.array(name, (len(parameters), *shape))
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} of the gradient is not finite")
-        arrays[f"{GRADIENT}/{name}"] = values
-        return values
+    group = root.group(GRADIENT)
+    attributes = group.attributes(lambda name: name in ("parameters", "extremes", f"extremes{ERROR}"))
+    parameters = tuple(_parameter(table) for table in json.loads(str(attributes["parameters"])))
+    sizes = {**sizes, PARAMETER: len(parameters)}
+    about |= {f"{GRADIENT}/{name}": value for name, value in attributes.items()}
+    quantity = {name for name, variable in ROWS.items() if variable.field in quantities()} - {"time"}
+    energies = [f"energy_{name}" for name in (WITH_INTEGRALS if "energy_input" in group else ENERGIES)]
 
     def gradients(suffix: str = "", error: Gradients | None = None) -> Gradients:
-        extremes = tuple(Extremes.of_table(table) for table in json.loads(str(read[f"extremes{suffix}"])))
+        extremes = tuple(Extremes.of_table(table) for table in json.loads(str(attributes[f"extremes{suffix}"])))
         if len(extremes) != len(parameters) or not extremes:
             raise ValueError("the derivatives of the extremes are not those of the parameters")
-        rows = {}
-        for field, quantity in quantities().items():
-            names = [name for name in (f"{name}{suffix}" for name in quantity.columns(field)) if name in group]
-            if field != "time" and names:
-                shape = (count, *(sizes[dim] for dim in quantity.column_dims))
-                rows[field] = quantity.joined([array(name, *shape) for name in names])
-        energies = WITH_INTEGRALS if "energy_input" in group else ENERGIES
-        energy = {name: array(f"energy_{name}{suffix}", count) for name in energies}
-        time, displacement, force = (
-            array(f"event_{name}{suffix}", events, *(len(LABELS[dim]) for dim in EVENTS[name][0]))
-            for name in EVENT_DERIVATIVES
-        )
-        return Gradients(parameters, rows, energy, time, displacement, force, extremes, error)
+        rows = [name for name in ROWS if name in quantity and name + suffix in group]
+        variables = {f"{name}{suffix}": _derivative(VARIABLES[name]) for name in (*rows, *energies, *EVENTS)}
+        read = stored_fields(group, variables, sizes, arrays, path=f"{GRADIENT}/")
+        return Gradients(parameters, read, extremes, error)
 
-    derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in read else None)
+    derivatives = gradients(error=gradients(ERROR) if f"extremes{ERROR}" in attributes else None)
     needed = {field for field, _ in SERIES.values() if getattr(history, field) is not None}
-    if missing := sorted(needed - derivatives.rows.keys()):
+    if missing := sorted(needed - derivatives.arrays.keys()):
         raise ValueError(f"the gradient has no {missing[0]}")
     return derivatives
 
@@ -191,37 +188,13 @@ def _scene(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) -> Sc
     return scene_from_table(table, motion=motion)
 
 
-def _history(root: StoredGroup, surfaces: int, arrays: Arrays) -> History:
-    """The rows; the time, which is stored as it is, gives their number."""
-    count = root.length("time")
-    sizes = dict.fromkeys(STACK, surfaces) | {name: len(labels) for name, labels in LABELS.items()}
-    optional = {field.name for field in fields(History) if field.default is not MISSING}
-    rows: Arrays = {}
-    for field, quantity in quantities().items():
-        if field in optional and not any(name in root for name in quantity.columns(field)):
-            continue  # a quantity of an effect that the run did not model
-        shape = (count, *(sizes[dim] for dim in quantity.column_dims))
-        columns = {name: root.array(name, shape, compressed=name != "time") for name in quantity.columns(field)}
-        arrays |= columns
-        rows[field] = quantity.joined(list(columns.values()))
-    energy = {name: root.array(f"energy_{name}", (count,)) for name in ENERGY}
-    arrays |= {f"energy_{name}": values for name, values in energy.items()}
-    return History(**rows, energy=energy)
-
-
-def _events(root: StoredGroup, surfaces: int, arrays: Arrays) -> tuple[Event, ...]:
-    count, columns = root.length("event_time"), dict[str, Any]()
-    for field, (dims, kind, *_) in EVENTS.items():
-        name, shape = f"event_{field}", (count, *(len(LABELS[dim]) for dim in dims))
-        texts = field == "kind"
-        values = root.texts(name, count, names(EVENT_KINDS)) if texts else root.array(name, shape, kind)
-        arrays[name] = columns[field] = np.array(values, dtype=object) if texts else values
-        if kind is np.float64 and not np.isfinite(values).all():
-            raise ValueError("an event is not finite")
-    surface = columns["surface"]
+def _events(read: Arrays, surfaces: int) -> tuple[Event, ...]:
+    """The events of arrays by field."""
+    surface = read["event_surface"]
     if np.any((surface < 0) | (surface > surfaces)):
         raise ValueError("an event is of no surface")
-    rows = zip(*columns.values(), strict=True)
+    columns = (read[name] for name, variable in VARIABLES.items() if variable.dims[0] == "event")
+    rows = zip(*columns, strict=True)
     return tuple(Event(float(t), int(s), kind, u, force) for t, s, kind, u, force in rows)
 
 
@@ -237,7 +210,6 @@ def _extremes(given: dict[str, list[float]], surfaces: int) -> Extremes:
 
 PARAMETER = "parameter"
 GRADIENT = "gradient"  # group of the file
-EVENT_DERIVATIVES = ("time", "displacement", "top_force")  # in the order of `Gradients`
 
 
 def gradients_of(result: RunData) -> Gradients:
@@ -254,51 +226,31 @@ def to_gradient_dataset(result: RunData) -> xr.Dataset:
     Attributes of a variable: `units`, those of the quantity over `parameter_unit`, which differs between parameters;
     coordinate `parameter_unit`: unit of each parameter; `parameter_value`: its value in the scene.
     """
-    import xarray as xr
-
     gradients = gradients_of(result)
     about = (("path", "", str), ("unit", "_unit", str), ("value", "_value", float))
     coordinates: dict[str, Any] = {
         f"{PARAMETER}{suffix}": (PARAMETER, np.array([getattr(p, name) for p in gradients.parameters], kind))
         for name, suffix, kind in about
     }
-    variables = dict(_variables(gradients))
+    time = ROWS["time"]
+    coordinates |= {"time": (time.dims, result.history.time, time.about)}
+    variables = {name: _derivative(variable) for name, variable in VARIABLES.items()}
+    arrays = dict(gradients.arrays)
     if gradients.error is not None:
-        for name, (dims, values, meaning) in _variables(gradients.error):
-            variables[f"{name}{ERROR}"] = (
-                dims,
-                values,
-                meaning | {"long_name": f"error of the {meaning['long_name']}"},
-            )
-    return xr.Dataset(variables, coordinates_of(result.history.time, result.history.surfaces) | coordinates)
+        errors = {f"{name}{ERROR}": v._replace(field=f"{v.field}{ERROR}") for name, v in variables.items()}
+        variables |= {name: v._replace(meaning=f"error of the {v.meaning}") for name, v in errors.items()}
+        arrays |= {f"{field}{ERROR}": values for field, values in gradients.error.arrays.items()}
+    return dataset_of(variables, arrays, labelled(labels_of(result.history.surfaces)) | coordinates, {})
 
 
-def _variables(gradients: Gradients) -> Variables:
-    yield from _rows(gradients)
-    yield from _energies(gradients)
-    yield from _event_derivatives(gradients)
-
-
-def _derivative(unit: str, meaning: str) -> dict[str, str]:
-    return {"units": f"{unit}/parameter_unit", "long_name": f"derivative of: {meaning}"}
-
-
-def _rows(gradients: Gradients) -> Variables:
-    for field, values in gradients.rows.items():
-        for name, (dims, array, about) in named_columns(field, values):
-            yield name, ((PARAMETER, *dims), array, _derivative(about["units"], about["long_name"]))
-
-
-def _energies(gradients: Gradients) -> Variables:
-    for name, values in gradients.energy.items():
-        yield f"energy_{name}", ((PARAMETER, "time"), values, _derivative("J", ENERGY[name]))
-
-
-def _event_derivatives(gradients: Gradients) -> Variables:
-    for field in EVENT_DERIVATIVES:
-        dims, _, unit, meaning = EVENTS[field]
-        name = f"event_{field}"
-        yield name, ((PARAMETER, "event", *dims), getattr(gradients, name), _derivative(unit, meaning))
+def _derivative(variable: Variable) -> Variable:
+    """The derivatives of a variable."""
+    return variable._replace(
+        dims=(PARAMETER, *variable.dims),
+        whole=(PARAMETER, *variable.whole),
+        unit=f"{variable.unit}/parameter_unit",
+        meaning=f"derivative of: {variable.meaning}",
+    )
 
 
 def gradient_group(result: RunData) -> xr.Dataset:

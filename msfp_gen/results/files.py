@@ -26,6 +26,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.note import Note
 from msfp_gen.results.sign import DEFAULT, VARIABLES, sign_of
 from msfp_gen.results.stored_group import ArrayDigest, Attribute, StoredGroup, digest, seal, stored_groups
+from msfp_gen.results.variables import Arrays, Places, columns_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +45,6 @@ KINDS = {  # of results, by the attribute `source`: what they are of, and how th
 # What h5py, json, tomllib and NumPy raise for content that they cannot read.
 DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
 REMEDY = "give a file that `run -o` wrote"
-Arrays = dict[str, Any]
 F = TypeVar("F", bound="ResultFiles")
 
 
@@ -55,6 +55,12 @@ class Storage(Protocol):
 
     def to_dataset(self, result: Any) -> xr.Dataset:
         """The dataset of a result."""
+
+    def arrays_of(self, result: Any) -> Arrays:
+        """The arrays of which the variables of the dataset are parts, by field."""
+
+    def columns(self, scene: Any) -> Places:
+        """The columns of an exported table, each with its variable and its index in that."""
 
     def groups_of(self, result: Any) -> dict[str, xr.Dataset]:
         """The groups of the netCDF-4 file beside the dataset, by name."""
@@ -250,19 +256,18 @@ class Column(NamedTuple):
 
 
 def table_of(dataset: xr.Dataset) -> list[Column]:
-    """Every variable along time as columns, one for each component: `displacement_E1`, `sliding_2`, `tilt_3_psi`.
+    """Every variable along time as columns, as of `columns_of`.
 
-    Blanks in labels are underscores. Surfaces that a bearing of a building does not have are left out.
+    Surfaces that a bearing of a building does not have are left out.
     """
     columns = [_column(dataset["time"], "time", dataset["time"].to_numpy())]
     for name, variable in dataset.data_vars.items():
         if variable.dims[:1] == ("time",):
-            values = variable.to_numpy()
-            for index in np.ndindex(values.shape[1:]):
-                labels = [str(dataset[dim].values[i]) for dim, i in zip(variable.dims[1:], index, strict=True)]
-                column = values[(slice(None), *index)]
-                if not (column.size and np.isnan(column[0])):
-                    columns.append(_column(variable, "_".join([str(name), *labels]).replace(" ", "_"), column))
+            labels = {str(dim): dataset[dim].to_numpy() for dim in variable.dims[1:]}
+            for column, index in columns_of(str(name), labels, labels):
+                values = variable.to_numpy()[:, *index]
+                if not (values.size and np.isnan(values[0])):
+                    columns.append(_column(variable, column, values))
     return columns
 
 

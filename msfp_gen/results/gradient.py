@@ -23,6 +23,7 @@ CONSTANT = ("time", "lift", "separation", "temperature", "energy")  # fields of 
 ENERGIES = ("kinetic", "potential", "restraint", "rim_stored")  # terms of the state; the others are integrals
 WITH_INTEGRALS = tuple(name for name in ENERGY if not name.startswith("seat_"))  # which only models with uplift have
 ERROR = "_error"  # ends the name of the variable with the error of a derivative
+EVENTS = ("event_time", "event_displacement", "event_top_force")  # fields
 EVENT = 7  # numbers of an event: time, displacement, top force
 
 
@@ -32,19 +33,15 @@ class Gradients:
 
     Attributes:
         parameters: k of them.
-        rows: derivatives of the fields of `History`, each an ndarray, shape (k, T, ...), [unit of the field/unit].
-        energy: the same of energies, shape (k, T): of those that the state determines, or also of the integrals.
-        event_time, event_displacement, event_top_force: shape (k, e), (k, e, 3), (k, e, 3).
+        arrays: derivatives by field: of `History`, shape (k, T, ...), [unit of the field/unit]; of energies
+            `energy_...`, of those that the state determines, or also of the integrals, shape (k, T); of `EVENTS`,
+            shape (k, e), (k, e, 3), (k, e, 3).
         extremes: k of them, of `RunData.extremes`.
         error: errors of all of these, measured where a rim was met (`simulation.gradients`); None: not measured.
     """
 
     parameters: tuple[Parameter, ...]
-    rows: dict[str, Array]
-    energy: dict[str, Array]
-    event_time: Array
-    event_displacement: Array
-    event_top_force: Array
+    arrays: dict[str, Array]
     extremes: tuple[Extremes, ...]
     error: Gradients | None = None
 
@@ -68,13 +65,12 @@ class Gradients:
         names = [name for name, values in found[0].items() if name not in CONSTANT and values is not None]
         vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
         displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
+        arrays = {name: np.array([each[name] for each in found]) for name in names}
+        arrays |= {f"energy_{name}": np.array([each["energy"][name] for each in found]) for name in energies}
+        arrays |= dict(zip(EVENTS, (events[:, :, 0].T, displacement, force), strict=True))
         return cls(
             parameters,
-            {name: np.array([each[name] for each in found]) for name in names},
-            {name: np.array([each["energy"][name] for each in found]) for name in energies},
-            events[:, :, 0].T,
-            displacement,
-            force,
+            arrays,
             tuple(
                 Extremes.of_run(model.extension.EXTREMES, numbers, azimuth)
                 for numbers in run.gradient_extremes(len(parameters))
@@ -83,7 +79,7 @@ class Gradients:
 
     def largest_numbers(self) -> Array:
         """Largest magnitude of all derivatives with respect to each parameter, shape (k,); not finite if one is not."""
-        arrays = (*self.rows.values(), *self.energy.values(), self.event_time, self.event_top_force)
+        arrays = self.arrays.values()
         largest: Array = np.max([np.abs(a).max(axis=tuple(range(1, a.ndim)), initial=0.0) for a in arrays], axis=0)
         return largest
 
@@ -122,7 +118,7 @@ def gradients_of_extremes(gradients: Gradients, history: History, recorded: Extr
 def _series(name: str, gradients: Gradients, history: History) -> tuple[Array, Array]:
     """The values of which an extreme is taken, shape (T, m), and their derivatives, (k, T, m)."""
     field, kind = SERIES[name]
-    values, slopes = getattr(history, field), gradients.rows[field]
+    values, slopes = getattr(history, field), gradients.arrays[field]
     if not kind:
         return values, slopes
     size = np.hypot(values[..., 0], values[..., 1])

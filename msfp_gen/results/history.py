@@ -6,7 +6,6 @@ dataset in `dataset.py` are based on them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Literal, get_origin, get_type_hints
@@ -65,19 +64,6 @@ class Rows:
     unit: str
     meaning: str
     names: tuple[str, ...] = ()
-
-    def columns(self, field: str) -> tuple[str, ...]:
-        """Names of its variables in the dataset. field: of `History`."""
-        return self.names or (field,)
-
-    @property
-    def column_dims(self) -> tuple[str, ...]:
-        """Dimensions of each of these after time."""
-        return self.dims[:-1] if len(self.names) > 1 else self.dims
-
-    def joined(self, columns: Sequence[Array]) -> Array:
-        """The array of these variables."""
-        return np.stack(columns, axis=-1) if len(self.names) > 1 else columns[0]
 
 
 class HorizontalMotion:

@@ -12,7 +12,7 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS, Gradients, gradients_of_extremes
+from msfp_gen.results.gradient import ENERGIES, EVENTS, WITH_INTEGRALS, Gradients, gradients_of_extremes
 from msfp_gen.results.note import Note
 from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.parameters import Parameter, parameters_of
@@ -210,15 +210,11 @@ def measured_errors(result: Result, finer: Result) -> Gradients:
     def of_events(values: Array, other: Array) -> Array:
         return ERROR_FACTOR * np.abs(values - other) if same else np.abs(values)
 
-    return Gradients(
-        ours.parameters,
-        {name: of_rows(values, theirs.rows[name]) for name, values in ours.rows.items()},
-        {name: of_rows(values, theirs.energy[name]) for name, values in ours.energy.items()},
-        of_events(ours.event_time, theirs.event_time),
-        of_events(ours.event_displacement, theirs.event_displacement),
-        of_events(ours.event_top_force, theirs.event_top_force),
-        _of_extremes(result, finer),
-    )
+    errors = {
+        name: (of_events if name in EVENTS else of_rows)(values, theirs.arrays[name])
+        for name, values in ours.arrays.items()
+    }
+    return Gradients(ours.parameters, errors, _of_extremes(result, finer))
 
 
 def _of_extremes(result: Result, finer: Result) -> tuple[Extremes, ...]:

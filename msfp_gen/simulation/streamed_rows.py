@@ -19,7 +19,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import replacing
-from msfp_gen.results.dataset import energy_variables, row_variables, to_dataset
+from msfp_gen.results.dataset import ROWS, rows_of, to_dataset
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import DIGEST, digest_of_dataset
 from msfp_gen.results.history import History
@@ -132,10 +132,11 @@ def _write_rows(file: Any, disk: _Disk, blocks: Iterable[History]) -> dict[str, 
     start = 0
     for block in blocks:
         end = start + len(block.time)
-        columns = {name: values for name, (_, values, _) in [*row_variables(block), *energy_variables(block)]}
-        for name, values in ({"time": block.time} | columns).items():
-            file[name][start:end] = values
-            digests.setdefault(name, ArrayDigest()).add(values)
+        arrays = rows_of(block)
+        for name, variable in ROWS.items():
+            if variable.field in arrays:
+                file[name][start:end] = values = variable.of(arrays)
+                digests.setdefault(name, ArrayDigest()).add(values)
         disk.raise_failure()
         start = end
     return digests

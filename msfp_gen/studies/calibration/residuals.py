@@ -279,7 +279,7 @@ class Residuals:
         force = np.interp(at, time, result.history.top_force[:, 0])
         if result.gradients is None:
             return force, np.zeros((len(at), 0))
-        rows = dict(zip(paths, result.gradients.rows["top_force"][:, :, 0], strict=True))
+        rows = dict(zip(paths, result.gradients.arrays["top_force"][:, :, 0], strict=True))
         columns = [sum(rows[member.path] for member in unknown.members) for unknown in self.unknowns]
         return force, np.column_stack([np.interp(at, time, np.asarray(column)) for column in columns])
 

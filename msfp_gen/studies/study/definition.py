@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import prod
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from msfp_gen.buildings.dataset import column_names
+from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings.load import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -18,6 +18,7 @@ from msfp_gen.common.fields import Quantity, check_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, recording
 from msfp_gen.errors import InputError
+from msfp_gen.results import dataset
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
@@ -199,7 +200,7 @@ def _tried_study(study: Study) -> Study:
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
     surfaces, building = 0, None
-    columns: tuple[str, ...] = ()
+    columns: dict[str, None] = {}
     first, base, opened = {}, "", {}
     for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
         if place is None:
@@ -208,14 +209,21 @@ def _tried_study(study: Study) -> Study:
             opened[place] = fingerprint(own)
         surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in _bearings(scene)))
         building = _larger(building, _counts(scene))
-        if isinstance(scene, BuildingScene) and study.keep.formulas and not columns:
-            columns = column_names(scene)
-    keep = replace(study.keep, surfaces=surfaces, building=building, building_columns=columns)
+        if study.keep.formulas:
+            columns |= dict.fromkeys(_columns(scene))
+    keep = replace(study.keep, surfaces=surfaces, building=building, history=tuple(columns))
     return replace(study, keep=keep, base=base, opened=opened)
 
 
 def _bearings(scene: AnyScene) -> list[Bearing]:
     return [each.bearing for each in scene.bearings] if isinstance(scene, BuildingScene) else [scene.bearing]
+
+
+def _columns(scene: AnyScene) -> Iterable[str]:
+    """Of the history of a run, as in an exported file."""
+    if isinstance(scene, BuildingScene):
+        return building_dataset.columns(scene)
+    return dataset.columns(scene)
 
 
 def _larger(one: _Counts | None, other: _Counts | None) -> _Counts | None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.buildings.dataset import columns_of
-from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
-from msfp_gen.results.history import LABELS, STACK, quantities
+from msfp_gen.results.files import Storage
+from msfp_gen.results.variables import Arrays, Places
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
 from msfp_gen.studies.columns import Quantity, Source, catalogue, plain_cell
@@ -67,7 +66,7 @@ class Keep:
         surfaces: the most surfaces of any bearing of the study.
         axes: names of the axes that hold numbers.
         building: floors, storeys and bearings where the base is a building.
-        building_columns: of its history, as in an exported file.
+        history: columns of the history, as in an exported file.
     """
 
     names: tuple[str, ...]
@@ -75,7 +74,7 @@ class Keep:
     surfaces: int
     axes: tuple[str, ...]
     building: tuple[int, int, int] | None = None
-    building_columns: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
 
     @cached_property
     def known(self) -> dict[str, Source]:
@@ -85,11 +84,6 @@ class Keep:
         if self.building is None:
             sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.surfaces)}
         return sources
-
-    @property
-    def history(self) -> Collection[str]:
-        """Columns of the history of which extremes can be taken."""
-        return history_columns(self.surfaces) if self.building is None else self.building_columns
 
     def columns(self) -> tuple[Column, ...]:
         """The columns, in the order of the study file. Raises InputError: an unknown quantity, or no valid formula."""
@@ -144,14 +138,14 @@ def _columns(keep: Keep) -> tuple[Column, ...]:
 @lru_cache(maxsize=64)
 def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[str, str]]]:
     """Syntax tree of a formula, and the extremes in it: symbol -> (word, column of the history)."""
-    columns, extremes = keep.history, {}
+    columns, extremes = keep.history, dict[str, tuple[str, str]]()
 
     def symbol(match: re.Match[str]) -> str:
         word, column = match.groups()
         if column not in columns:
             hint = suggestion(column, list(columns)) or "; `msfp-gen export` writes them all"
             raise InputError(f"quantities.{name}: {column!r} is no column of a history{hint}")
-        extremes[replaced := f"{word}_of_column_{list(columns).index(column) + 1}"] = (word, column)
+        extremes[replaced := f"{word}_of_column_{columns.index(column) + 1}"] = (word, column)
         return replaced
 
     plain = _EXTREME.sub(symbol, text)
@@ -164,21 +158,6 @@ def _tree(keep: Keep, name: str, text: str) -> tuple[ast.expr, dict[str, tuple[s
         raise InputError(f"quantities.{name} = {text!r}: {why}") from None
 
 
-@lru_cache(maxsize=16)
-def history_columns(surfaces: int) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Column of a history, named as in an exported file -> field of `History`, and index after time."""
-    numbers = {dim: [str(index + (2 if dim == "body" else 1)) for index in range(surfaces)] for dim in STACK}
-    labels: dict[str, Any] = {**LABELS, **numbers}
-    columns = {}
-    for field, rows in quantities().items():
-        several = len(rows.names) > 1
-        for index in np.ndindex(*(len(labels[dim]) for dim in rows.dims)):
-            name = rows.names[index[-1] if several else 0] if rows.names else field
-            shown = list(zip(rows.dims, index, strict=True))[: -1 if several else None]
-            columns["_".join([name, *(labels[dim][i] for dim, i in shown)])] = (field, index)
-    return columns
-
-
 def _finite(value: Any) -> float | None:
     number = float(value)
     return number if math.isfinite(number) else None
@@ -189,6 +168,7 @@ class _Reader:
 
     def __init__(self, result: Any, keep: Keep) -> None:
         self.result = result
+        self._storage: Storage = result.storage()
         self.problem = ""
         self._keep = keep
         self._known = keep.known
@@ -208,26 +188,22 @@ class _Reader:
 
         Over all steps where the run records it, else of the rows.
         """
-        if self._keep.building:
-            values = self._building_columns.get(column)
-        else:
-            values = self._history_column(column)
-            field, index = history_columns(self._keep.surfaces)[column]
-            if values is not None and (name := _OVER_STEPS.get((word, field))):
-                return _finite(getattr(self.result.extremes, name)[index[0]])
-        return None if values is None else _finite(EXTREMES[word](values))
+        if column not in self._columns:
+            return None
+        variable, index = self._columns[column]
+        if variable.field not in self._arrays:
+            return None
+        if not self._keep.building and (name := _OVER_STEPS.get((word, variable.field))):
+            return _finite(getattr(self.result.extremes, name)[index[0]])
+        return _finite(EXTREMES[word](variable.of(self._arrays)[:, *index]))
 
     @cached_property
-    def _building_columns(self) -> dict[str, Array]:
-        return columns_of(self.result)
+    def _columns(self) -> Places:
+        return self._storage.columns(self.result.scene)
 
-    def _history_column(self, column: str) -> Array | None:
-        field, index = history_columns(self._keep.surfaces)[column]
-        values = self.result.history.arrays().get(field)
-        if values is None or any(place >= length for place, length in zip(index, values.shape[1:], strict=True)):
-            return None
-        column_values: Array = values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])]
-        return column_values
+    @cached_property
+    def _arrays(self) -> Arrays:
+        return self._storage.arrays_of(self.result)
 
     def _capacity_used(self, surface: int) -> float | None:
         surfaces = self.result.scene.bearing.surfaces

@@ -18,9 +18,9 @@ from support.synthetic import opened
 from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
 from msfp_gen.analysis.characterise import loops
 from msfp_gen.analysis.characterise.tables import characterisation_tables, csv_rows
-from msfp_gen.buildings.dataset import column_names, columns_of
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops
+from msfp_gen.results.files import table_of
 from msfp_gen.results.note import Note
 from msfp_gen.results.resample import at_times
 from msfp_gen.studies.columns import catalogue
@@ -114,7 +114,14 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
 
 
 def test_columns_of_a_scene_are_those_of_its_result():
-    assert set(column_names(made())) == set(columns_of(result()))
+    """In order, and with the same values; of a bearing those of the effects that are modelled."""
+    for run in (result(), loops_of_one()):
+        storage, exported = run.storage(), {column.name: column.values for column in table_of(run.dataset)}
+        columns, arrays = storage.columns(run.scene), storage.arrays_of(run)
+        assert list(exported) == [name for name, (variable, _) in columns.items() if variable.field in arrays]
+        for name, values in exported.items():
+            variable, index = columns[name]
+            assert np.array_equal(values, variable.of(arrays)[:, *index])
 
 
 def test_torsion_of_the_base_is_that_of_the_masses():

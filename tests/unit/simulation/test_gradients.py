@@ -305,14 +305,16 @@ def test_an_error_is_three_times_the_difference_until_the_next_event() -> None:
     gradients = given.gradients
     assert gradients is not None
     before = given.history.time < given.events[0].time
-    sliding = gradients.rows["sliding"]
+    sliding = gradients.arrays["sliding"]
     shifted = sliding + np.where(before, 1.0, -2.0)[:, None] * np.linspace(1.0, 0.0, len(before))[:, None]
-    other = replace(gradients, rows=gradients.rows | {"sliding": shifted})
-    error = measured_errors(given, replace(given, gradients=other)).rows["sliding"]
+    other = replace(gradients, arrays=gradients.arrays | {"sliding": shifted})
+    error = measured_errors(given, replace(given, gradients=other)).arrays["sliding"]
     expected = 3 * np.where(before, 1.0, 2.0) * np.linspace(1.0, 0.0, len(before))
     assert np.allclose(error, np.broadcast_to(expected[:, None], error.shape))
-    late = replace(gradients, rows=gradients.rows | {"sliding": sliding + np.linspace(0.0, 1.0, len(before))[:, None]})
-    error = measured_errors(given, replace(given, gradients=late)).rows["sliding"]
+    late = replace(
+        gradients, arrays=gradients.arrays | {"sliding": sliding + np.linspace(0.0, 1.0, len(before))[:, None]}
+    )
+    error = measured_errors(given, replace(given, gradients=late)).arrays["sliding"]
     assert np.allclose(error[:, ~before], 3.0)
     assert np.allclose(error[:, before], 3 * np.linspace(0.0, 1.0, len(before))[before][-1])
 
@@ -321,8 +323,8 @@ def test_an_event_that_the_other_run_has_not_is_uncertain_as_a_whole() -> None:
     given = after_contact()
     assert given.gradients is not None
     error = measured_errors(given, replace(given, events=()))
-    assert np.array_equal(error.event_time, np.abs(given.gradients.event_time))
-    assert np.all(measured_errors(given, given).event_time == 0)
+    assert np.array_equal(error.arrays["event_time"], np.abs(given.gradients.arrays["event_time"]))
+    assert np.all(measured_errors(given, given).arrays["event_time"] == 0)
 
 
 def test_a_large_error_is_noted_and_one_that_is_not_known() -> None:
@@ -330,8 +332,8 @@ def test_a_large_error_is_noted_and_one_that_is_not_known() -> None:
     assert given.gradients is not None
     assert not [note for note in with_gradient_errors(given, lambda scene: given).notes if note.kind == "gradient"]
     changed = [Extremes(**{name: 1.1 * values for name, values in e.arrays.items()}) for e in given.gradients.extremes]
-    rows = {name: 1.1 * values for name, values in given.gradients.rows.items()}
-    other = replace(given, gradients=replace(given.gradients, rows=rows, extremes=tuple(changed)))
+    rows = {name: 1.1 * values for name, values in given.gradients.arrays.items()}
+    other = replace(given, gradients=replace(given.gradients, arrays=rows, extremes=tuple(changed)))
     (note,) = [note for note in with_gradient_errors(given, lambda scene: other).notes if note.kind == "gradient"]
     assert note.value == pytest.approx(0.3)
     assert "derivatives of peaks with respect to " in note.text

@@ -181,6 +181,7 @@ def test_quantities_are_those_of_the_summary_the_characterisation_and_formulas()
         "ratio": "peak_force / 112e3 * friction",
         "least_force": "least(normal_force_1)",
         "end": "last(displacement_E1)",
+        "lost": "last(energy_friction_dissipated)",
     }
     keep = ["peak_force", "peak_sliding", "minimum_gap_2", "effective_damping", "rims_met", "capacity_used"]
     study = load_study(cheap_study(keep=keep, quantities=text, scene="fenz-test2"))
@@ -194,6 +195,7 @@ def test_quantities_are_those_of_the_summary_the_characterisation_and_formulas()
     assert found["ratio"] == pytest.approx(found["peak_force"] / 112e3 * 2.0)
     assert found["least_force"] == result.history.normal_force[:, 0].min()
     assert found["end"] == result.history.displacement[-1, 0]
+    assert found["lost"] == result.history.energy["friction_dissipated"][-1] > 0
     capacity = result.scene.bearing.surfaces[3].capacity
     assert found["capacity_used_4"] == 1 - summary["minimum_gap"][3] / capacity
     assert [column.unit for column in study.keep.columns()][:2] == ["N", "m"]
