@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
+from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.analysis.characterise.loops import Path
-from msfp_gen.analysis.characterise.report import Characterisation, characterise_rows
+from msfp_gen.analysis.characterise.report import characterised, effective_period
+from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands
 from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run
 from msfp_gen.analysis.tables import surface_table
 from msfp_gen.buildings import dataset as building_dataset
@@ -32,6 +34,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.scene.bearing import Bearing
+
+
+NOT_RECORDED = (
+    "the rows of a building have no slip velocities: no sliding regimes, velocities and heat of surfaces; periods are "
+    "with N at rest"
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -289,13 +297,19 @@ class BuildingResult(AnyResult):
 
         Raises InputError where the bearings did not move.
         """
-        mean = np.mean([one.displacement for one in self.bearings], axis=0)
-        return BuildingCharacterisation.of(
-            Path.of(self.time, mean, self.base_reaction, "the bearings"),
-            self.scene.gravity,
-            self.extremes.mean_displacement,
-            self.summary,
-            [BearingDemand.of(one.summary, float(np.hypot(*one.displacement[-1, :2]))) for one in self.bearings],
+        mean, summary = np.mean([one.displacement for one in self.bearings], axis=0), self.summary
+        path = Path.of(self.time, mean, self.base_reaction, "the building")
+        peaks = (float(self.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
+        load, gravity = self.scene.weight, self.scene.gravity
+        system = characterised(self.scene.name, self.status, path, peaks, load, gravity, self.dissipated.sum(axis=1))
+        return BuildingCharacterisation(
+            **vars(system),
+            secant_period=effective_period(system.secant_stiffness, load, gravity),
+            peak_floor_acceleration=summary["peak_floor_acceleration"]["radial"],
+            peak_drift_ratio=summary["peak_drift_ratio"],
+            bearings=tuple(
+                BearingDemand.of(one.summary, float(np.hypot(*one.displacement[-1, :2]))) for one in self.bearings
+            ),
         )
 
     @classmethod
@@ -504,7 +518,23 @@ class BearingResult(AnyResult, HorizontalMotion):
         What the rows of a building do not have (slip velocities) is None, and the notes say so. Raises InputError where
         the bearing did not move.
         """
-        path = Path.of(self.time, self.displacement, self.top_force)
-        return characterise_rows(
-            self.title, self.status, path, self.bearing, self.axial_load, self.gap, self.dissipated, self.extremes
+        path, peaks = Path.of(self.time, self.displacement, self.top_force), self.extremes
+        largest_of_run = (peaks.displacement[3], peaks.top_force[3])
+
+        lifts = self.scene.modelled[self.index].uplift or bool(self.lift.any())
+
+        def demands(rows: slice | None) -> tuple[SurfaceDemand, ...]:
+            gap, lift = (peaks.gap, peaks.lift) if rows is None else (self.gap[rows].min(0), self.lift[rows].max(0))
+            return capacity_demands(self.bearing, gap, lift if lifts else None)
+
+        found = characterised(
+            self.title,
+            self.status,
+            path,
+            largest_of_run,
+            self.axial_load,
+            self.bearing.gravity,
+            self.dissipated,
+            demands,
         )
+        return replace(found, notes=(*found.notes, NOT_RECORDED))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msfp_gen.cli.console import AsJson, Progress, SceneName, answer, note, note_written, say, show
-from msfp_gen.cli.inputs import build, load_source, one_bearing, result_of
+from msfp_gen.cli.inputs import build, load_source, result_of
 from msfp_gen.errors import RunError
 
 if TYPE_CHECKING:
@@ -31,20 +31,16 @@ def characterise(
     as_json: AsJson = False,
 ) -> None:
     """Effective stiffness, damping, sliding regimes, capacity left, velocity and heat of a run, with envelopes."""
-    from msfp_gen.analysis.characterise.tables import CSV_SUFFIXES, write_csv
-    from msfp_gen.buildings.characterise import characterisation_tables
+    from msfp_gen.analysis.characterise.characterisation import CSV_SUFFIXES, write_csv
     from msfp_gen.common.output import check_output
 
     if output is not None:
         check_output(output, CSV_SUFFIXES, "--output")
-    loaded = load_source(source)
-    if output is not None:
-        one_bearing(loaded, f"--output = {str(output)!r}")
-    result, failure = result_of(loaded)
+    result, failure = result_of(load_source(source))
     if failure is not None:
         raise failure
     characterisation = result.characterise()
-    answer(characterisation.as_dict(), characterisation_tables(characterisation), as_json)
+    answer(characterisation.as_dict(), characterisation.tables(), as_json)
     if output is not None:
         note(f"wrote {write_csv(characterisation, output)}")
 

@@ -101,10 +101,8 @@ def summary_page(result: Result) -> list[Table]:
 
 def characterisation_page(result: AnyResult) -> list[Table]:
     """Tables of the characterisation; none if no bearing moved."""
-    from msfp_gen.buildings.characterise import characterisation_tables
-
     try:
-        return characterisation_tables(result.characterise())
+        return result.characterise().tables()
     except InputError:
         return []
 

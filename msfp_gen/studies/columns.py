@@ -37,6 +37,11 @@ RUN = {
     "secant_stiffness": Quantity("N/m", "secant_stiffness", characterised=True),
     "energy_dissipated": Quantity("J", "energy_dissipated", characterised=True),
     "residual_displacement": Quantity("m", "residual_displacement", "most", characterised=True, at_rest=True),
+    # of cycles, their mean
+    "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
+    "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
+    "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
+    "zero_displacement_force": Quantity("N", "envelope.zero_displacement_force.mean", characterised=True),
 }
 BEARING = RUN | {
     "axial_load": Quantity("N", "axial_load"),
@@ -49,11 +54,6 @@ BEARING = RUN | {
     "least_friction": Quantity("", "least_friction.*"),
     "most_friction": Quantity("", "most_friction.*"),
     "peak_temperature": Quantity("degC", "peak_temperature.*"),
-    # of cycles, their mean
-    "effective_stiffness": Quantity("N/m", "envelope.effective_stiffness.mean", characterised=True),
-    "effective_period": Quantity("s", "envelope.effective_period.mean", characterised=True),
-    "effective_damping": Quantity("", "envelope.effective_damping.mean", characterised=True),
-    "zero_displacement_force": Quantity("N", "envelope.zero_displacement_force.mean", characterised=True),
     "maximum_uplift": Quantity("m", "maximum_uplift", "most", characterised=True),
     "capacity_left": Quantity("m", "surfaces.*.capacity_left", "least", characterised=True),
     "peak_velocity": Quantity("m/s", "surfaces.*.peak_velocity", "most", characterised=True),

@@ -47,7 +47,7 @@ class Path(NamedTuple):
     """A horizontal motion and its force, at T times.
 
     time: shape (T,) [s]. u, force: shape (T, 2) [m], [N]. direction: unit vector of the largest displacement. row: of
-    it. peak: it [m].
+    it. peak: it [m]. what: moves.
     """
 
     time: Array
@@ -56,6 +56,7 @@ class Path(NamedTuple):
     direction: Array
     row: int
     peak: float
+    what: str
 
     @classmethod
     def of(cls, time: Array, displacement: Array, force: Array, what: str = "the bearing") -> Path:
@@ -65,7 +66,7 @@ class Path(NamedTuple):
         row = first_peak(size)
         if not size[row]:
             raise InputError(f"characterise: {what} did not move in this run; give a motion, or a longer duration")
-        return cls(time, u, force[:, :2], u[row] / size[row], row, float(size.max()))
+        return cls(time, u, force[:, :2], u[row] / size[row], row, float(size.max()), what)
 
     @property
     def along(self) -> tuple[Array, Array]:

@@ -51,8 +51,9 @@ def surface_demands(result: RunData, rows: slice | None = None) -> tuple[Surface
     heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
     fastest = extremes.slip_speed if whole and extremes.slip_speed is not None else speed.max(axis=0)
     has_uplift = result.scene.modelled.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
+    gap, lift = extremes.gap if whole else history.gap[rows].min(axis=0), history.lift[rows].max(axis=0)
     demands = []
-    for i, basic in enumerate(capacity_demands(bearing, extremes.gap if whole else history.gap[rows].min(axis=0))):
+    for i, basic in enumerate(capacity_demands(bearing, gap, lift if has_uplift else None)):
         area = basic.contact_area
         demands.append(
             replace(
@@ -60,19 +61,28 @@ def surface_demands(result: RunData, rows: slice | None = None) -> tuple[Surface
                 peak_velocity=float(fastest[i]),
                 peak_heat_flux=float(power[:, i].max()) / area if area else None,
                 heat=float(heat[i]) / area if area else None,
-                maximum_uplift=float(history.lift[rows, i].max()) if has_uplift else None,
             )
         )
     return tuple(demands)
 
 
-def capacity_demands(bearing: Bearing, gap: Array) -> tuple[SurfaceDemand, ...]:
-    """What the least gaps of the surfaces tell, shape (n-1,) [m]; velocity, heat and uplift are None."""
+def capacity_demands(bearing: Bearing, gap: Array, lift: Array | None) -> tuple[SurfaceDemand, ...]:
+    """What least gaps and largest openings tell, shape (n-1,) [m]; velocity and heat are None.
+
+    lift: None without uplift.
+    """
     return tuple(
         SurfaceDemand(
-            i + 1, float(least), float(least) / surface.capacity, None, None, None, _contact_area(bearing, i), None
+            surface=i + 1,
+            capacity_left=float(gap[i]),
+            capacity_left_share=float(gap[i]) / surface.capacity,
+            peak_velocity=None,
+            peak_heat_flux=None,
+            heat=None,
+            contact_area=_contact_area(bearing, i),
+            maximum_uplift=None if lift is None else float(lift[i]),
         )
-        for i, (surface, least) in enumerate(zip(bearing.surfaces, gap, strict=True))
+        for i, surface in enumerate(bearing.surfaces)
     )
 
 

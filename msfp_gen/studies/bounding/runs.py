@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.friction_parameters import proportional, select_friction
@@ -60,7 +59,7 @@ class Case:
     name: str
     scene: AnyScene
     result: Result | BuildingResult | None
-    characterisation: Characterisation | BuildingCharacterisation | None
+    characterisation: Characterisation | None
     failure: str = ""
 
 

@@ -16,8 +16,9 @@ from support.synthetic import loops as loops_of_one
 from support.synthetic import opened
 
 from msfp_gen import BuildingScene, Effects, InputError, Motion, RunError, Solver, characterise, simulate
-from msfp_gen.analysis.characterise import loops
-from msfp_gen.analysis.characterise.tables import characterisation_tables, csv_rows
+from msfp_gen.analysis.characterise.characterisation import csv_rows
+from msfp_gen.analysis.characterise.loops import Path as Motions
+from msfp_gen.analysis.characterise.report import characterised
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops
 from msfp_gen.results.files import table_of
@@ -104,7 +105,7 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     assert found.as_dict().keys() == alone.characterise().as_dict().keys()
     assert found.peak_force == one.summary["peak_force"]["radial"] and found.secant_stiffness > 0
     assert found.surfaces[0].capacity_left == one.summary["minimum_gap"][0] and "slip velocities" in found.notes[-1]
-    assert all(table.text for table in characterisation_tables(found)) and csv_rows(found)
+    assert all(table.text for table in found.tables()) and csv_rows(found)
     path = one.save(tmp_path / "one.csv")
     assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top") and plot_loops(one)
     file = one.save(tmp_path / "one.nc")
@@ -233,17 +234,38 @@ def test_characterisation_of_the_isolation_system():
 
 
 def test_cycles_of_a_motion_along_one_axis():
-    """Base shear k u + Q sign(v) over u = A sin: k_eff = k + Q/A, energy 4 Q A."""
+    """Base shear k u + Q sign(v) over u = A sin: k_eff = k + Q/A, energy 4 Q A; as of one bearing under the weight."""
     time = np.linspace(0.25, 3.25, 3001)
-    k, strength, amplitude, direction = 2e6, 3e5, 0.1, np.array([0.6, 0.8])
+    k, strength, amplitude, direction, weight = 2e6, 3e5, 0.1, np.array([0.6, 0.8]), 9.81e5
     u, rate = amplitude * np.sin(2 * np.pi * time), np.cos(2 * np.pi * time)
-    force = k * u + strength * np.sign(rate)
-    found = [loop for *_, loop in loops.Path.of(time, np.outer(u, direction), np.outer(force, direction)).cycles()]
-    assert len(found) == 3
-    assert found[0].energy_dissipated == pytest.approx(4 * strength * amplitude, rel=1e-2)
-    assert found[0].zero_displacement_force == pytest.approx(strength, rel=1e-6)
+    force, lost = k * u + strength * np.sign(rate), 4 * strength * amplitude * (time - time[0])
+    path = Motions.of(time, np.outer(u, direction), np.outer(force, direction))
+    system = characterised("", "ok", path, (amplitude, 5e5), weight, 9.81, lost)
+    assert len(system.cycles) == 3 and system.kind == "cycles"
+    loop = system.cycles[0].loop
+    assert loop.energy_dissipated == pytest.approx(4 * strength * amplitude, rel=1e-2)
+    assert loop.energy_dissipated == pytest.approx(system.cycles[0].balance_energy, rel=1e-2)
+    assert loop.zero_displacement_force == pytest.approx(strength, rel=1e-6)
+    stiffness = system.envelope["effective_stiffness"].mean
+    assert stiffness == pytest.approx(k + strength / amplitude, rel=1e-6)
+    period = 2 * np.pi * np.sqrt(1e5 / stiffness)
+    assert system.envelope["effective_period"].mean == pytest.approx(period, rel=1e-12)
+    given = result().characterise()
+    found = replace(given, **{name: getattr(system, name) for name in ("cycles", "envelope", "kind", "axial_load")})
+    assert len(repr(found).splitlines()) <= 10 and "of the weight" in repr(found)
+    titles = [table.title for table in found.tables()]
+    assert titles[0].startswith("isolation system of frame") and "closed cycles" in titles
+    assert [row["scope"] for row in csv_rows(found)] == [
+        "cycle 1",
+        "cycle 2",
+        "cycle 3",
+        "least",
+        "mean",
+        "most",
+        "run",
+    ]
     sideways = np.outer(u, direction) + np.outer(np.cos(time), [0.01, 0.0])
-    assert list(loops.Path.of(time, sideways, np.outer(force, direction)).cycles()) == []
+    assert list(Motions.of(time, sideways, np.outer(force, direction)).cycles()) == []
 
 
 def test_effects_of_each_bearing_are_selected_and_explained():
@@ -288,8 +310,9 @@ def test_a_bearing_at_other_times():
 
 
 def test_every_quantity_of_the_catalogue_is_in_a_result():
+    cycles = preset_run("fenz-test2").characterise().envelope
     for run, counts in ((preset_run("fenz-test2"), None), (result(), (len(result().floors), len(result().storeys), 4))):
-        characterisation = run.characterise()
+        characterisation = replace(run.characterise(), envelope=cycles)  # the building moves for less than a cycle
         values = {name: source.value(run.summary, characterisation) for name, source in catalogue(4, counts).items()}
         missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
         # no friction law, no uplift; and both runs end in motion
