@@ -14,9 +14,10 @@ from datetime import date
 from os import getloadavg
 from pathlib import Path
 
+from plain import plain_scene
 from quick import docs_folder, parser, pick
 
-from msfp_gen import RunError, Scene, load_scene
+from msfp_gen import RunError, Scene
 from msfp_gen.common.output import replacing
 from msfp_gen.studies.accuracy import model_errors, output, simulate_within, work_precision
 from msfp_gen.studies.accuracy.error_target import largest_error
@@ -50,7 +51,7 @@ class Case:
 
     @property
     def loaded(self) -> Scene:
-        scene = without_stop(load_scene(self.scene))
+        scene = without_stop(plain_scene(self.scene))
         return scene if self.duration is None else replace(scene, duration=self.duration)
 
 
@@ -265,7 +266,7 @@ def estimate_table() -> str:
     """The error that `--error` estimated, and the true error, by scene and requested error."""
     rows = []
     for name in ESTIMATED:
-        scene = without_stop(load_scene(name))
+        scene = without_stop(plain_scene(name))
         truth = run_native("esdirk4", scene, 1e-8 if name in ("double-push", "fenz-test2") else 1e-7, 120.0, 0)
         for target in TARGETS:
             try:

@@ -17,9 +17,10 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+from plain import plain_scene
 from quick import parser, pick
 
-from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, load_scene, presets, simulate
+from msfp_gen import Auto, Effects, Load, Motion, Scene, Top, presets, simulate
 from msfp_gen.generator import generate
 from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.result import Result
@@ -69,7 +70,7 @@ def fastest(scenes: list[Scene], repeats: int = REPEATS) -> list[Result]:
 
 def costs() -> None:
     """Print the cost of one effect at a time."""
-    scene = load_scene(SCENE)
+    scene = plain_scene(SCENE)
     results = fastest([with_effects(scene, effects) for effects in VARIANTS.values()])
     first = results[0].counters
     print(f"Over `{SCENE}`, {first.wall_time * 1e3:.2f} ms, {first.steps} steps.\n")
@@ -99,11 +100,11 @@ def sizes(scene: Scene, effects: Effects) -> tuple[int, int]:
 def pairs() -> Iterator[tuple[str, Scene, Scene]]:
     """Name, scene with all effects, scene with selected effects."""
     for name in ("fenz-test1", "fenz-test2", "fenz-test3", "fenz-test4", "fenz-test5"):
-        scene = replace(load_scene(name), output_step=0.02)
+        scene = replace(plain_scene(name), output_step=0.02)
         yield name, replace(scene, effects=FULL), replace(scene, effects=Auto())
-    orbit = replace(load_scene("becker-circle-50"), output_step=0.02)
+    orbit = replace(plain_scene("becker-circle-50"), output_step=0.02)
     yield "becker-circle-50", replace(orbit, effects=FULL), replace(orbit, effects=Auto())
-    strong = replace(load_scene("ridgecrest-clc"), output_step=0.02)
+    strong = replace(plain_scene("ridgecrest-clc"), output_step=0.02)
     for share in (0.3, 1.0):
         record = replace(strong.motion, coefficients=share * strong.motion.coefficients)
         scene = replace(strong, motion=record, motion_table=None)
@@ -183,11 +184,11 @@ def main() -> None:
     parser(__doc__).parse_args()
     costs()
     selection_table()
-    pair = [replace(load_scene(SCENE), effects=effects) for effects in (FULL, SMALL)]
+    pair = [replace(plain_scene(SCENE), effects=effects) for effects in (FULL, SMALL)]
     at_an_error(*pair)
     each = [f"{1e6 * cost_of_a_row(scene):.2f} us" for scene in pair]
     print(f"\nA row at an even time: {each[0]} with all effects, {each[1]} with selected effects")
-    scene = load_scene(SCENE)
+    scene = plain_scene(SCENE)
     full, small = fastest([replace(scene, effects=FULL), replace(scene, effects=Auto())])
     ratio = full.counters.wall_time / small.counters.wall_time
     print(f"\n{SCENE}: spatial and inertial over selected effects, {_short(small.provenance['model'])}: {ratio:.1f}")

@@ -10,9 +10,10 @@ from dataclasses import replace
 from time import thread_time
 from typing import Any
 
+from plain import plain_scene
 from quick import parser, pick
 
-from msfp_gen import Scene, load_scene, simulate
+from msfp_gen import Scene, simulate
 from msfp_gen.result import Result
 
 SCENES = pick(("fenz-test2", "fenz-test5", "becker-eight-125", "ridgecrest-clc"), ("fenz-test2",))
@@ -51,7 +52,7 @@ def main() -> None:
     parser(__doc__).parse_args()
     print("| scene | law | run [ms] | over constant | steps | Newton iterations | per iteration |\n|" + "---|" * 7)
     for name in SCENES:
-        scenes = variants(load_scene(name))
+        scenes = variants(plain_scene(name))
         turns = [{law: timed(scene) for law, scene in scenes.items()} for _ in range(REPEATS)]
         fastest = {law: min(turn[law][0] for turn in turns) for law in scenes}
         counts = {law: turns[0][law][1].counters for law in scenes}

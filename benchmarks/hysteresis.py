@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from plain import plain_scene
 from quick import parser, pick
 
 from msfp_gen import (
@@ -23,7 +24,6 @@ from msfp_gen import (
     Solver,
     Surface,
     Top,
-    load_scene,
     simulate,
 )
 
@@ -40,7 +40,7 @@ SCENES = pick(ALL_SCENES, {"fenz-test2": "cycles"})
 
 def scene_of(name: str, law: str, T: float) -> Scene:
     """A preset scene with a hysteresis law and a damping time [s]."""
-    scene = load_scene(name)
+    scene = plain_scene(name)
     bearing, effects = scene.bearing.replace(contact_damping=T), replace(scene.effects, bouc_wen=law)
     return replace(scene, bearing=bearing, effects=effects, output_step=0.005)
 

@@ -22,9 +22,12 @@ from msfp_gen import Layout, Scene, load_scene
 
 CALLS = pick(200, 2)
 RUN = """
+import sys
 from dataclasses import replace
-from msfp_gen import Effects, load_scene, simulate
-scene = load_scene({name!r})
+sys.path.insert(0, {folder!r})
+from plain import plain_scene
+from msfp_gen import Effects, simulate
+scene = plain_scene({name!r})
 simulate(replace(scene, effects=Effects(**{effects!r}), solver=replace(scene.solver, rtol={rtol}), output_step=None))
 """
 RUNS = {
@@ -68,7 +71,7 @@ def main() -> None:
         return
     print("| what | instructions |\n|---|---|")
     for text, (name, effects, rtol) in pick(list(RUNS.items()), list(RUNS.items())[:1]):
-        program = RUN.format(name=name, effects=effects, rtol=rtol)
+        program = RUN.format(folder=str(Path(__file__).parent), name=name, effects=effects, rtol=rtol)
         os.environ["MSFP_GEN_CFLAGS"] = AVX2  # of the processes that follow
         subprocess.run([sys.executable, "-c", program], check=True)  # builds the model
         count = instructions([sys.executable, "-c", program], "msfp_5_2_2_run_advance")

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import auto_scenes
+from plain import plain_scene
 from quick import parser, pick
 
-from msfp_gen import Effects, Load, Motion, RunError, Scene, Top, load_scene
+from msfp_gen import Effects, Load, Motion, RunError, Scene, Top
 from msfp_gen.scene.effect_switching import all_effects
 from msfp_gen.studies.accuracy.error_target import simulate_within
 from msfp_gen.studies.accuracy.timed_run import Errors, errors, largest_error, run_native
@@ -48,8 +49,8 @@ class Promise:
 def scenes() -> Iterator[tuple[str, Scene]]:
     """Name and scene: tests and orbits of PEER 2017/07, records, rims, light and heavy loads, uplift, a friction law."""
     for name in ("fenz-test1", "fenz-test3", "fenz-test5", "becker-circle-50", "becker-eight-125", "double-push"):
-        yield name, replace(load_scene(name), stop=None)
-    test = load_scene("fenz-test4")
+        yield name, replace(plain_scene(name), stop=None)
+    test = plain_scene("fenz-test4")
     damped = test.bearing.replace(contact_damping=1e-4)
     yield "fenz-test4, damped", replace(test, bearing=damped)
     yield "light load", replace(test, bearing=damped, top=replace(test.top, axial_load=5e3))
@@ -57,9 +58,9 @@ def scenes() -> Iterator[tuple[str, Scene]]:
     yield "heavy sliders, 18 Hz", heavy_sliders()
     varying = Load.harmonic((0.0, 0.0, 0.7 * 112e3), frequency=0.05, cycles=5.0, lead_in=20.0)
     yield "axial load varying by 70 %", replace(test, bearing=damped, load=varying)
-    record = replace(load_scene("ridgecrest-clc"), duration=20.0)
+    record = replace(plain_scene("ridgecrest-clc"), duration=20.0)
     yield "ridgecrest-clc, 20 s", record
-    yield "ridgecrest-ccc, 20 s", replace(load_scene("ridgecrest-ccc"), duration=20.0)
+    yield "ridgecrest-ccc, 20 s", replace(plain_scene("ridgecrest-ccc"), duration=20.0)
     law = record.bearing.replace(friction_slow=[0.04, 0.02, 0.02, 0.05], velocity_rate=50.0)
     yield "friction of velocity", replace(record, bearing=law, effects=replace(record.effects, friction="velocity"))
     shaken = Motion.harmonic(0.02, 2.0, cycles=4.0)
@@ -69,7 +70,7 @@ def scenes() -> Iterator[tuple[str, Scene]]:
 
 def heavy_sliders() -> Scene:
     """Sliders so heavy under so small a load that they ring at 18 Hz: part of the motion, not noise above it."""
-    test = load_scene("fenz-test2")
+    test = plain_scene("fenz-test2")
     bodies = [
         replace(body, mass=20.0 * body.mass, inertia=tuple(20.0 * each for each in body.moments))
         for body in test.bearing.bodies

@@ -10,9 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from plain import plain_scene
 from quick import parser, pick
 
-from msfp_gen import Auto, Bearing, RunError, Scene, load_scene, presets, simulate
+from msfp_gen import Auto, Bearing, RunError, Scene, presets, simulate
 from msfp_gen.scene.top import MassTop
 
 WEIGHT = 112e3
@@ -70,7 +71,7 @@ def run(scene: Scene, rtol: float) -> str:
 def rows(scene_name: str, bearing_names: Iterable[str]) -> None:
     """Lines of the table of one scene."""
     for bearing_name in bearing_names:
-        scene = replace(load_scene(scene_name), bearing=presets.bearing(bearing_name))
+        scene = replace(plain_scene(scene_name), bearing=presets.bearing(bearing_name))
         assert isinstance(scene.top, MassTop)
         for support in supports(scene.top.mass):
             carried = replace(scene, top=support.of(scene.top))
@@ -80,7 +81,7 @@ def rows(scene_name: str, bearing_names: Iterable[str]) -> None:
 
 def dampings(scene_name: str, bearing_name: str) -> None:
     """The same with other damping, and with uplift in the model: what unloads a bearing is no error of the tolerance."""
-    scene = replace(load_scene(scene_name), bearing=presets.bearing(bearing_name))
+    scene = replace(plain_scene(scene_name), bearing=presets.bearing(bearing_name))
     assert isinstance(scene.top, MassTop)
     parting = replace(scene.modelled, uplift=True)
     for ratio, effects in ((0.02, parting), *((ratio, scene.modelled) for ratio in (0.02, 0.03, 0.05, 0.1))):
@@ -101,7 +102,7 @@ def with_slider_masses(bearing: Bearing, share: float = SLIDER_SHARE) -> Bearing
 
 def full_scale(scene_name: str, bearing_name: str) -> None:
     """Lines of the table of real slider masses, effects chosen by `Auto`: displacement [mm], shear and N over W."""
-    scene = load_scene(scene_name)
+    scene = plain_scene(scene_name)
     assert isinstance(scene.top, MassTop)
     bearing = with_slider_masses(presets.bearing(bearing_name))
     for support in supports(scene.top.mass)[:2]:

@@ -13,9 +13,10 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from plain import plain_scene
 from quick import installed, parser, pick
 
-from msfp_gen import Effects, Scene, load_scene, simulate
+from msfp_gen import Effects, Scene, simulate
 from msfp_gen.result import Result
 from msfp_gen.studies.accuracy.opensees import run_opensees
 
@@ -26,7 +27,7 @@ REPEATS = pick(7, 1)
 
 def fixed(name: str, effects: Effects = FULL) -> Scene:
     """A preset scene with given effects."""
-    scene = replace(load_scene(name), effects=effects)
+    scene = replace(plain_scene(name), effects=effects)
     return pick(scene, replace(scene, duration=0.05 * scene.end))
 
 

@@ -54,7 +54,9 @@ def warm_build(cache: str) -> float:
 def main() -> None:
     """Print both tables, then run the other scripts."""
     parser(__doc__).parse_args()
-    from msfp_gen import load_scene, simulate
+    from plain import plain_scene
+
+    from msfp_gen import simulate
 
     with tempfile.TemporaryDirectory() as cache:
         print(f"first build of a cache, which translates the wrapper: {cold_build('2 1 0', cache):.2f} s\n")
@@ -67,7 +69,7 @@ def main() -> None:
         print(f"\nwarm build_model: {min(warm_build(cache) for _ in range(REPEATS)):.4f} s\n")
     print("| scene | run [s] | times real time | steps | Newton iterations |\n|---|---|---|---|---|")
     for name in SCENES:
-        runs = [simulate(load_scene(name)) for _ in range(REPEATS)]
+        runs = [simulate(plain_scene(name)) for _ in range(REPEATS)]
         best = min(runs, key=lambda run: run.counters.wall_time)
         count = best.counters
         speed = best.history.time[-1] / count.wall_time

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+from plain import plain_hospital
 from quick import parser, pick
 from scipy.optimize import brentq
 
@@ -133,7 +134,7 @@ def neutral() -> None:
         parts = [(r.normal_force / rest, r.top_force[:, :2] / friction) for r in runs]
         print(row(f"{'rig' if rig else 'mass'} on {stiffness:.2g} N/m, {ratio:.0%}", *parts), flush=True)
     for name in ("hospital-clc", "hospital-ccc"):
-        scene = replace(load_scene(name), duration=25.0)
+        scene = replace(plain_hospital(name), duration=25.0)
         parts = []
         for uplift in (False, True):
             bearings = [replace(each, effects=Effects(uplift=uplift)) for each in scene.bearings]

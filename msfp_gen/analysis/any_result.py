@@ -14,8 +14,9 @@ from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.results.files import ResultFiles
 from msfp_gen.results.history import HorizontalMotion
+from msfp_gen.results.note import by_importance
 
-MAX_NOTES = 2  # printed; the others are counted
+MAX_NOTES = 3  # printed, the most important ones; the others are counted
 MAX_POINTS = 600  # of the curve
 WIDTH, HEIGHT, MARGIN = 320, 200, 8  # of the curve [px]
 Rows = list[tuple[str, str]]  # label and value
@@ -64,10 +65,16 @@ class AnyResult(ResultFiles):
 
     def printed_rows(self) -> Rows:
         """Label and value of the main results after the status, with the first notes."""
-        notes = [note.line for note in self.notes]
-        more = f"; {len(notes) - MAX_NOTES} more in .notes" if len(notes) > MAX_NOTES else ""
-        shown = [("notes", "; ".join(notes[:MAX_NOTES]) + more)] if notes else []
+        lines, others = self.first_notes
+        more = f"; {others} more in .notes" if others else ""
+        shown = [("notes", "; ".join(lines) + more)] if lines else []
         return [("status", self.status_text), *self.main_results(), *shown]
+
+    @property
+    def first_notes(self) -> tuple[list[str], int]:
+        """The lines of the most important notes, `MAX_NOTES` at most, and how many others there are."""
+        lines = [note.line for note in by_importance(self.notes)]
+        return lines[:MAX_NOTES], max(0, len(lines) - MAX_NOTES)
 
     def __repr__(self) -> str:
         """The main results in ten lines at most."""

@@ -296,8 +296,11 @@ def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None
         say(json.dumps(result.summary | (more or {}), indent=2, allow_nan=False))
         return
     show(result.tables())
-    for line in (entry.line for entry in result.notes):
+    lines, others = result.first_notes
+    for line in lines:
         note(line)
+    if others:
+        note(f"{others} more note{'s' * (others > 1)}: --json prints all of them, and `msfp-gen report` shows them")
 
 
 def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:

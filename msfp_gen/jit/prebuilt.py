@@ -26,7 +26,8 @@ LAYOUTS = (Layout(2, 1, 0), Layout.dfp(), Layout.tfp())
 
 def prebuilt_specs() -> list[ModelSpec]:
     """The models of a wheel: single, double and triple pendulum, planar and spatial, sliders and rims as selected; and
-    those that a building moves at both ends, without and with uplift.
+    those that a building moves at both ends, without and with uplift. The triple one also with the friction of
+    earthquakes, as the presets have it.
     """
     alone = [
         ModelSpec(layout, Effects(dimension=dimension, sliders=sliders, rims=rims))
@@ -36,7 +37,9 @@ def prebuilt_specs() -> list[ModelSpec]:
         for rims in (True, False)
     ]
     below = [Effects(top_rotation=True, uplift=uplift) for uplift in (False, True)]
-    return [*alone, *(ModelSpec(layout, effects) for layout in LAYOUTS for effects in below)]
+    shaken = [*(Effects(rims=rims) for rims in (True, False)), *below]
+    heated = [ModelSpec(Layout.tfp(), replace(each, friction="pvt", bouc_wen="plastic")) for each in shaken]
+    return [*alone, *(ModelSpec(layout, effects) for layout in LAYOUTS for effects in below), *heated]
 
 
 def prebuilt_folder() -> Path:

@@ -10,6 +10,7 @@ from msfp_gen.analysis.tables import transition_table
 from msfp_gen.common.tables import Table, yes
 from msfp_gen.errors import InputError
 from msfp_gen.results.files import COUNTER, PROVENANCE, without
+from msfp_gen.results.note import by_importance
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult
@@ -97,6 +98,12 @@ def summary_page(result: Result) -> list[Table]:
     if result.events:
         tables.append(_event_table(result))
     return tables
+
+
+def note_tables(result: AnyResult) -> list[Table]:
+    """A table of all notes of the run, the most important first; none without notes."""
+    rows = [(f"t = {note.time:.6g} s", note.told) for note in by_importance(result.notes)]
+    return [Table("notes, the most important first", (), rows)] if rows else []
 
 
 def characterisation_page(result: AnyResult) -> list[Table]:

@@ -14,6 +14,7 @@ from msfp_gen.report.content import (
     TitleBlock,
     characterisation_page,
     kind_of,
+    note_tables,
     outcome,
     provenance_table,
     summary_page,
@@ -87,6 +88,7 @@ def report_html(
         content = _of_building(result, frames, progress)
     else:
         content = _of_bearing(result, frames, progress)
+    content["summary"] += note_tables(result)
     scripts, data = content.pop("scripts"), content.pop("data")
     return render(
         "page.html.jinja",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from msfp_gen.scene.effect_switching import JAM_STATUSES, REQUIRED_EFFECTS
-from msfp_gen.scene.friction_parameters import RANGES
+from msfp_gen.scene.friction_parameters import RANGES, published_softening
 
 if TYPE_CHECKING:
     from msfp_gen.scene.effect_switching import Ending
@@ -38,7 +38,12 @@ class Note:
     @property
     def line(self) -> str:
         """Time, text and action."""
-        return f"t = {self.time:.6g} s: {self.text}" + (f"; continued with {self.action}" if self.action else "")
+        return f"t = {self.time:.6g} s: {self.told}"
+
+    @property
+    def told(self) -> str:
+        """Text and action."""
+        return self.text + (f"; continued with {self.action}" if self.action else "")
 
 
 _MAX_VELOCITY = RANGES["v"][-1]
@@ -57,6 +62,21 @@ TEXTS = {
 }
 
 
+CONSEQUENCES = {
+    "rims": "a rim would stop it with a force that is missing here: give effects.rims = true",
+    "uplift": "the bearing may lift off, and forces are wrong where it does: give effects.uplift = true",
+    "inertia": "forces are wrong by about that share of N: give effects.sliders = 'inertial'",
+    "heat": "friction is then some {softening:.0%} lower than here: give effects.friction = 'pvt'",
+    "law_speed": "friction at such velocities is extrapolated",
+    "law_load": "friction at such loads is extrapolated",
+    "law_temperature": "friction at such temperatures is extrapolated",
+}
+"""What follows for the results where the run goes on without the effect."""
+IMPORTANCE = (
+    *("value", "jammed", "energy", "peak", "footprint", "uplift", "rims", "heat", "law_load", "law_speed"),
+    *("law_temperature", "creep", "tolerance", "rattle", "damping", "inertia", "plane", "ringing", "gradient"),
+)
+"""Kinds of notes, those first that question most of the results."""
 RISING = ("rims", "inertia", "heat", "law_speed")
 """Kinds of notes with one limit, from above."""
 
@@ -74,24 +94,28 @@ def monitor_notes(ending: Ending, after: Effects | None) -> list[Note]:
         trips["uplift"] = (time, ending.surface, ending.value)
     if after is not None and status in JAM_STATUSES:
         trips["jammed"] = (time, ending.surface, ending.value)
-    return [
-        Note(
-            tripped,
-            kind,
-            surface,
-            value,
-            _text(kind, surface, value, status, went_on=tripped < time),
-            ", ".join(_changes(kind, ending.effects, after)),
-        )
-        for kind, (tripped, surface, value) in sorted(trips.items(), key=lambda item: item[1][0])
-    ]
+    notes = []
+    for kind, (tripped, surface, value) in sorted(trips.items(), key=lambda item: item[1][0]):
+        action = ", ".join(_changes(kind, ending.effects, after))
+        text = _text(kind, surface, value, status, went_on=tripped < time, alone=not action)
+        notes.append(Note(tripped, kind, surface, value, text, action))
+    return notes
 
 
-def _text(kind: str, surface: int, value: float, status: str, went_on: bool) -> str:
+def by_importance(notes: Iterable[Note]) -> list[Note]:
+    """Those first that question most of the results; last those after which the run continued with the effect."""
+    return sorted(notes, key=lambda note: (bool(note.action), IMPORTANCE.index(note.kind), note.time))
+
+
+def _text(kind: str, surface: int, value: float, status: str, went_on: bool, alone: bool) -> str:
+    """The text of a monitor. went_on: the run did not end there. alone: and no effect was added."""
     text = TEXTS[kind].format(
         surface=surface, value=value, body=surface + 1, status=status, most="up to " if went_on else ""
     )
-    return f"from here on, {text}" if went_on and kind not in ("plane", "jammed") else text
+    if not went_on or kind not in CONSEQUENCES:
+        return text
+    consequence = CONSEQUENCES[kind].format(softening=published_softening(value) if kind == "heat" else 0.0)
+    return f"from here on, {text}" + (f"; {consequence}" if alone else "")
 
 
 def joined_notes(earlier: Iterable[Note], later: Iterable[Note]) -> list[Note]:

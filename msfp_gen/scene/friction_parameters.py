@@ -239,6 +239,12 @@ def thermal_softening(law: Law | None, bearing: Bearing) -> float:
     return max(slopes)
 
 
+def published_softening(rise: float) -> float:
+    """Relative decrease of friction by a temperature rise from 20 degC [K], after Kumar et al. (2015) [-]."""
+    cold, warm = (0.7 ** (temperature / 50.0) + 0.4 for temperature in (20.0, 20.0 + rise))
+    return float(1.0 - warm / cold)
+
+
 def heated_contacts(bearing: Bearing) -> list[tuple[float, float]]:
     """sqrt(D/pi)/k over the contact area of every surface, with the defaults of `HEAT` [K s^1/2/J]; and the sliding
     displacement up to which the contact covers the centre of the surface [m].

@@ -33,8 +33,8 @@ TEXTS = {
     "vibrations after a change of the load may be filtered; give a smaller solver.rtol",
     "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
     "give a smaller contact_damping",
-    "creep": "the bearing moved by {value:.3g} m or more while no surface slid: Bouc-Wen friction creeps under small "
-    "cycles; give bouc_wen = 'plastic'",
+    "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which the bearing moved while no "
+    "surface slid: Bouc-Wen friction creeps under small cycles; give effects.bouc_wen = 'plastic'",
     "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
     "face: a real slider would tip; give effects.uplift = true",
     "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
@@ -126,7 +126,7 @@ def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[N
 def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """A note where a bearing with a Bouc-Wen law was stuck off its centre for long and moved nevertheless.
 
-    Stuck surfaces deform by up to their yield displacements; movement beyond that is creep.
+    Stuck surfaces deform by up to twice their yield displacements, each time they stick; movement beyond that is creep.
     """
     across = np.linalg.norm(history.displacement[:, :2], axis=1)
     off_centre = across > max(CREEP_SHARE * float(across.max()), 1e-12)
@@ -134,9 +134,10 @@ def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note,
     long = [(start, start + length) for start, length in stuck if length > 1.0]
     if is_plastic(effects.bouc_wen) or sum(end - start for start, end in long) < CREEP_TIME:
         return ()
-    moved = float(sum(np.abs(np.diff(np.interp(pair, history.time, across)))[0] for pair in long))
+    moves = [float(np.abs(np.diff(np.interp(pair, history.time, across)))[0]) for pair in long]
     elastic = 2 * sum(surface.yield_displacement for surface in scene.bearing.surfaces)
-    if moved <= max(CREEP_SHARE * float(across.max()), elastic):
+    moved = sum(move for move in moves if move > elastic)
+    if moved <= CREEP_SHARE * float(across.max()):
         return ()
     return (Note(long[0][0], "creep", 0, moved, TEXTS["creep"].format(value=moved)),)
 

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from plain import plain_scene
 
 from msfp_gen import (
     Effects,
@@ -128,7 +129,7 @@ def test_equations_are_regular_at_the_reports_friction_and_not_at_any():
 
 def test_rigid_mass_makes_the_normal_force_follow_the_sliders():
     """Strongly different friction inside and outside: every change of stage throws the mass."""
-    scene = load_scene("ridgecrest-clc")
+    scene = plain_scene("ridgecrest-clc")
     peak = {}
     for name in ("prototype-tfp", "becker-tfp"):
         history = simulate(replace(scene, bearing=presets.bearing(name))).history

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain import plain_scene
 from reference import stack
 from reference import top as reference
 from scipy.integrate import solve_ivp
@@ -359,7 +360,7 @@ def test_library_integrators_refuse_a_spring():
 @pytest.mark.parametrize("frequency", [None, 12.4])
 def test_records_complete_with_sliders_of_real_mass(scene_name, bearing_name, frequency):
     """Sliders of a thousandth of the mass that they carry, full scale: one answer at every tolerance."""
-    scene, bearing = load_scene(scene_name), presets.bearing(bearing_name)
+    scene, bearing = plain_scene(scene_name), presets.bearing(bearing_name)
     mass = scene.top.mass
     factors = [1e-3 * mass / body.mass for body in bearing.bodies[:-1]] + [1.0]
     bodies = [

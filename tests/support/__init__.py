@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain import plain_scene
 
-from msfp_gen import Bearing, Body, Effects, Layout, RunError, Scene, Surface, build_model, load_scene, simulate
+from msfp_gen import Bearing, Body, Effects, Layout, RunError, Scene, Surface, build_model, simulate
 from msfp_gen.model.model import Model
 from msfp_gen.result import Result
 
@@ -55,8 +56,8 @@ Changes = dict[str, Any]
 
 
 def scene_of(name: str, effects: Changes | None = None, solver: Changes | None = None, **changes: Any) -> Scene:
-    """A preset scene with some effects, settings of the solver and other parts changed."""
-    scene = load_scene(name)
+    """A scene of `plain_scene` with some effects, settings of the solver and other parts changed."""
+    scene = plain_scene(name)
     changes["effects"] = replace(scene.effects, **(effects or {}))
     changes["solver"] = replace(scene.solver, **(solver or {}))
     return replace(scene, **changes)

@@ -107,7 +107,7 @@ def test_presets_are_among_the_prebuilt_models() -> None:
     from msfp_gen.scene.effect_selection import select_effects
 
     names = {spec.key for spec in prebuilt.prebuilt_specs()}
-    assert len(names) == 30
+    assert len(names) == 34
     for preset in ("fenz-test1", "becker-circle-50", "single-push", "double-push", "triple-push", "ridgecrest-clc"):
         scene = load_scene(preset)
         assert scene.spec.key in names

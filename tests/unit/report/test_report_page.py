@@ -24,6 +24,7 @@ from msfp_gen.report.frames import instants, main_direction, packed, pieces, sel
 from msfp_gen.report.page import FIGURES
 from msfp_gen.result import Result
 from msfp_gen.results.geometry.shape import poses
+from msfp_gen.results.note import Note
 
 ALL = dict(FIGURES)
 
@@ -161,6 +162,13 @@ def test_page_is_the_same_on_every_machine(page, saved):
     assert str(saved.parent) not in page and "wall time" not in page
     told = dict(provenance_table(result).rows)
     assert told["model"] == result.scene.spec.key and told["method"] == "implicit" and told["msfp gen"]
+
+
+def test_every_note_is_in_the_page(page):
+    assert "notes, the most important first" not in page
+    notes = (Note(2.0, "inertia", 1, 0.1, "light & fast"), Note(3.0, "energy", 0, 0.2, "it leaks"))
+    told = report_html(dataclasses.replace(preset_run("fenz-test2"), notes=notes))
+    assert told.index("it leaks") < told.index("light &amp; fast") and "t = 3 s" in told
 
 
 def test_frames_are_rows_of_the_run():

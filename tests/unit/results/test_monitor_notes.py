@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from msfp_gen import Effects
-from msfp_gen.results.note import joined_notes, monitor_notes
+from msfp_gen.results.note import Note, by_importance, joined_notes, monitor_notes
 from msfp_gen.scene.effect_switching import Ending
 
 
@@ -39,6 +39,8 @@ def test_a_note_gives_the_largest_value_since_its_time() -> None:
         ("plane", 2.0, 0, 0.0),
     ]
     assert notes[0].text.startswith("from here on, friction may heat surface 3 by up to 65 K")
+    assert notes[0].text.endswith("friction is then some 25% lower than here: give effects.friction = 'pvt'")
+    assert notes[1].text.endswith("a force that is missing here: give effects.rims = true") and ";" not in notes[2].text
     (stopped,) = monitor_notes(first._replace(status="guard", trips={"rims": (2.0, 2, 0.01)}), None)
     assert stopped.text.startswith("a slider is 0.01 m beyond the capacity of surface 2")
     switched = replace(notes[0], action="friction = pvt")
@@ -52,3 +54,14 @@ def test_a_jam_names_the_effects_that_follow(status: str) -> None:
     assert (note.kind, note.action, note.surface) == ("jammed", "sliders = inertial", 2)
     (note,) = monitor_notes(ending._replace(effects=Effects()), Effects(uplift=True))
     assert note.action == "uplift = True" and f"({status})" in note.text
+
+
+def test_those_come_first_that_question_most() -> None:
+    kinds = ("inertia", "creep", "heat", "value", "energy")
+    notes = [Note(float(time), kind, 1, 0.0, "") for time, kind in enumerate(kinds)]
+    added = Note(0.0, "value", 1, 0.0, "", "uplift = True")
+    assert [note.kind for note in by_importance([added, *notes])] == [
+        *("value", "energy", "heat", "creep"),
+        "inertia",
+        "value",
+    ]

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain import plain_scene
 from scipy.stats import t
 from support import Array, scene_of
 
@@ -241,7 +242,7 @@ def test_scenes_that_are_no_test_are_refused() -> None:
     with pytest.raises(InputError, match="no contact damping"):
         fit(load_scene("fenz-test2"), [measured(0.05)], ["friction[0]"])
     with pytest.raises(InputError, match=r'top\.kind = "mass"'):
-        fit(load_scene("ridgecrest-clc"), [measured(0.05)], ["friction[0]"])
+        fit(plain_scene("ridgecrest-clc"), [measured(0.05)], ["friction[0]"])
     with pytest.raises(InputError, match=r"tests = .*give a list"):
         fit(start(), [], ["friction[0]"])
 

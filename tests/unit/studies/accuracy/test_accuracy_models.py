@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from plain import plain_scene
 from support import scene_of
 from support.peers import opensees_runs
 
@@ -92,7 +93,7 @@ def test_linearised_run_is_near_the_full_one():
 
 
 def test_linearised_mass_follows_the_full_one_while_it_slides():
-    scene = short("ridgecrest-clc", 10.0)
+    scene = replace(plain_scene("ridgecrest-clc"), duration=10.0)
     found = errors(run_series(scene, 1000, arms=True), METHODS["implicit"].attempt(scene, 1e-3, 20.0))
     assert found.force_rms < 0.08 and found.force_peak < 0.05
 
