@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
@@ -11,13 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain import plain_scene
 
 from msfp_gen import Bearing, Body, Effects, Layout, RunError, Scene, Surface, build_model, simulate
 from msfp_gen.model.model import Model
 from msfp_gen.result import Result
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "benchmarks"))  # also in the processes that tests start
+from plain import plain_scene  # noqa: E402
+
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 

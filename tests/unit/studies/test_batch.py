@@ -213,7 +213,7 @@ def test_an_error_of_the_caller_ends_all_runs(processes: bool) -> None:
 PROGRAM = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell are started ignoring it
-sys.path[:0] = ["{tests}", "{tests}/../benchmarks"]
+sys.path.insert(0, "{tests}")
 from support import endless
 from msfp_gen import build_model, simulate_batch
 if __name__ == "__main__":
