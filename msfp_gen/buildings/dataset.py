@@ -251,13 +251,13 @@ def labels_of(scene: BuildingScene) -> Labels:
         "node": [node.name for node in building.nodes],
         "storey": [column.name for column in building.columns],
         "bearing": range(1, len(bearings) + 1),
-        "surface": range(1, max(one.bearing.layout.surfaces for one in bearings) + 1),
+        "surface": range(1, max(bearing.layout.surfaces for bearing in scene.every_bearing) + 1),
     }
 
 
 def columns(scene: BuildingScene) -> Places:
     """The columns of a table of all rows, as of `column_places`; none of surfaces that a bearing does not have."""
-    surfaces = [one.bearing.layout.surfaces for one in scene.bearings]
+    surfaces = [bearing.layout.surfaces for bearing in scene.every_bearing]
     return {
         name: (variable, index)
         for name, (variable, index) in column_places(VARIABLES, labels_of(scene)).items()
@@ -296,7 +296,7 @@ def fields_in(root: StoredGroup, about: dict[str, Attribute], arrays: Arrays) ->
     """Scene, rows, extremes, counters and notes of a file, as `ResultFiles.fields_in`."""
     scene = _scene(root, about, arrays)
     sizes = SIZES | {dim: len(labels) for dim, labels in labels_of(scene).items()} | {"time": root.length("time")}
-    surfaces = np.array([one.bearing.layout.surfaces for one in scene.bearings])
+    surfaces = np.array([bearing.layout.surfaces for bearing in scene.every_bearing])
     missing = np.arange(sizes["surface"]) >= surfaces[:, None]
     extremes = _arrays_in(root, EXTREMES, DIMENSIONS, sizes, arrays) if EXTREMES in root else None
     counters: dict[str, Any] = without(COUNTER, about)

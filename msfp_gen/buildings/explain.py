@@ -54,7 +54,7 @@ def frame_table(scene: BuildingScene) -> Table:
 
 def bearing_table(scene: BuildingScene) -> Table:
     """The bearings: kind, place, load at rest."""
-    kinds = grouped(one.bearing for one in scene.bearings)
+    kinds = grouped(scene.every_bearing)
     kind_of = {index: str(number) for number, members in enumerate(kinds, start=1) for index in members}
     rows = [
         (
@@ -96,7 +96,7 @@ def grouped(keys: Iterable[Hashable]) -> list[list[int]]:
 
 
 def _kinds(scene: BuildingScene) -> Iterator[Table]:
-    for number, members in enumerate(grouped(one.bearing for one in scene.bearings), start=1):
+    for number, members in enumerate(grouped(scene.every_bearing), start=1):
         bearing, where = scene.bearings[members[0]].bearing, _numbers(members, len(scene.bearings))
         doubts = tables.doubt_tables(doubtful_values(bearing))
         for table in (tables.surface_table(bearing), *doubts, tables.body_table(bearing)):

@@ -235,6 +235,11 @@ class BuildingScene:
         return tuple(each.effects for each in self.effect_selections)
 
     @property
+    def every_bearing(self) -> tuple[Bearing, ...]:
+        """The values of its bearings, in their order."""
+        return tuple(one.bearing for one in self.bearings)
+
+    @property
     def specs(self) -> tuple[ModelSpec, ...]:
         """Layouts and effects of the models of the bearings, each once."""
         pairs = zip(self.bearings, self.modelled, strict=True)

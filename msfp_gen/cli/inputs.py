@@ -63,10 +63,9 @@ def one_bearing(loaded: Any, what: str) -> Any:
 def build(scene: AnyScene, gradients: bool = False) -> None:
     """Build the models of a scene, with progress, unless they are in the cache. gradients: ones that have them."""
     from msfp_gen.model.model import build_model
-    from msfp_gen.studies.batch import specs_of
 
     with building() as progress:
-        for spec in specs_of(scene):
+        for spec in scene.specs:
             build_model(spec.layout, spec.effects, gradients, progress=progress)
 
 

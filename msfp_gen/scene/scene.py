@@ -80,6 +80,16 @@ class Scene(SceneFields):
         return ModelSpec(self.bearing.layout, self.modelled)
 
     @property
+    def specs(self) -> tuple[ModelSpec, ...]:
+        """The same, as of a building."""
+        return (self.spec,)
+
+    @property
+    def every_bearing(self) -> tuple[Bearing, ...]:
+        """Its bearing, as of a building."""
+        return (self.bearing,)
+
+    @property
     def modelled(self) -> Effects:
         """The effects at the start of the run: as given, or selected from the scene."""
         return self.effect_selection.effects

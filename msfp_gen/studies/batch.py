@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msfp_gen.buildings.load import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
@@ -16,12 +16,8 @@ from msfp_gen.scene.effect_switching import check
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.run_any import simulate
-from msfp_gen.simulation.settling import needs_settling
-from msfp_gen.simulation.simulate import RunSequence, settle
+from msfp_gen.simulation.simulate import RunSequence
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
-
-if TYPE_CHECKING:
-    from msfp_gen.specification.layout import ModelSpec
 
 Proceed = Callable[[float, float], None]
 ENDED = ("ok", "stopped")  # statuses of runs that did not fail
@@ -37,7 +33,7 @@ def simulate_batch(
 ) -> list[Any]:
     """Integrate many scenes at the same time; every result is bit by bit that of `simulate`.
 
-    All models are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
+    The models of all are built before the first run starts. Ctrl-C ends all runs within a few thousand steps.
 
     Parameters
     ----------
@@ -125,22 +121,11 @@ def _completed(
 ) -> Generator[tuple[int, Any], None, None]:
     shared = None if progress is None else SharedProgress(len(scenes), progress)
     threads = max(1, usable_cores() // max(1, min(workers, len(scenes))))
+    build_models(scenes)
+    # Long runs start first, so that all workers end at about the same time.
+    order = sorted(range(len(scenes)), key=lambda index: -scenes[index].end)
+    calls = ((i, (labels[i], scenes[i], strict, None if shared is None else shared.of(i), threads)) for i in order)
     with local_pool(workers, processes) as pool:
-        settled = dict(enumerate(scenes))
-        tilted = [i for i, scene in settled.items() if isinstance(scene, Scene) and needs_settling(scene)]
-        for i, outcome in pool.results(_settled, ((i, (labels[i], scenes[i])) for i in tilted)):
-            if isinstance(outcome, RunError):
-                del settled[i]
-                yield i, outcome
-            else:
-                settled[i] = outcome
-        build_models(settled.values())
-        # Long runs start first, so that all workers end at about the same time.
-        order = sorted(settled, key=lambda index: -settled[index].end)
-        calls = (
-            (i, (labels[i], scenes[i], settled[i], strict, None if shared is None else shared.of(i), threads))
-            for i in order
-        )
         for index, result in pool.results(_run, calls):
             yield index, result if isinstance(result, RunError) else replace(result, scene=scenes[index])
             del result
@@ -152,32 +137,24 @@ def check_method(scene: AnyScene) -> None:
         check(scene, scene.modelled)
 
 
-def specs_of(scene: AnyScene) -> tuple[ModelSpec, ...]:
-    """The models with which a run starts: one, or those of the bearings of a building."""
-    return (scene.spec,) if isinstance(scene, Scene) else scene.specs
-
-
 def build_models(scenes: Iterable[AnyScene]) -> None:
     """Build the models with which these scenes start, unless the cache of this host has them."""
-    for spec in dict.fromkeys(spec for scene in scenes for spec in specs_of(scene)):
+    for spec in dict.fromkeys(spec for scene in scenes for spec in scene.specs):
         build_model(spec.layout, spec.effects)
 
 
-def run_to_end(
-    scene: AnyScene, settled: AnyScene, strict: bool = False, proceed: Proceed = raise_if_stopped, threads: int = 1
-) -> Any:
+def run_to_end(scene: AnyScene, strict: bool = False, proceed: Proceed = raise_if_stopped, threads: int = 1) -> Any:
     """The result of `simulate`, also for a run that fails. proceed: called often; its exceptions end the run.
 
-    settled: the scene after `settle`. threads: for the bearings of a building; other runs have the other cores.
+    threads: for the bearings of a building; other runs have the other cores. Raises RunError: failed at its start.
     """
-    if isinstance(settled, Scene):
-        assert isinstance(scene, Scene)
-        sequence = RunSequence.of(scene, strict, settled)
+    if isinstance(scene, Scene):
+        sequence = RunSequence.of(scene, strict)
         while sequence.effects is not None:
             sequence.run_segment(proceed)
         return sequence.result(with_initial_row=True)
     try:
-        return simulate(settled, progress=proceed, threads=threads)
+        return simulate(scene, progress=proceed, threads=threads)
     except RunError as error:
         if error.result is None:
             raise
@@ -195,19 +172,10 @@ def _located(label: str) -> Iterator[None]:
         raise RunError(f"{label}: {error}", status=error.status, result=error.result) from error
 
 
-def _settled(label: str, scene: Scene) -> AnyScene | RunError:
-    """A scene of a batch after settling, in a worker, or why it failed."""
-    try:
-        with _located(label):
-            return settle(scene)
-    except RunError as error:
-        return error
-
-
-def _run(label: str, scene: AnyScene, settled: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
+def _run(label: str, scene: AnyScene, strict: bool, proceed: Proceed | None, threads: int) -> Any:
     """One run of a batch, in a worker; its RunError if it has no rows."""
     try:
         with _located(label):
-            return run_to_end(scene, settled, strict, proceed or raise_if_stopped, threads)
+            return run_to_end(scene, strict, proceed or raise_if_stopped, threads)
     except RunError as error:
         return error

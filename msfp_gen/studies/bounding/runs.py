@@ -256,9 +256,7 @@ def _bounded(bearing: Bearing, law: Law | None, table: FactorTable, case: str) -
 
 def _typical(scene: AnyScene) -> Bearing:
     """The bearing of a scene; of a building that with the most surfaces."""
-    if isinstance(scene, Scene):
-        return scene.bearing
-    return max((each.bearing for each in scene.bearings), key=lambda bearing: len(bearing.surfaces))
+    return max(scene.every_bearing, key=lambda bearing: len(bearing.surfaces))
 
 
 def _scaled(bearing: Bearing, column: str, factors: tuple[float, ...]) -> Bearing:

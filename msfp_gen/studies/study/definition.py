@@ -19,7 +19,6 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Files, expecting, recording
 from msfp_gen.errors import InputError
 from msfp_gen.results import dataset
-from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
 from msfp_gen.studies.study.axes import Axis
@@ -207,16 +206,12 @@ def _tried_study(study: Study) -> Study:
             first, base = files, fingerprint((scene, sorted(files.values())))
         elif own := sorted(digest for path, digest in files.items() if path not in first):
             opened[place] = fingerprint(own)
-        surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in _bearings(scene)))
+        surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in scene.every_bearing))
         building = _larger(building, _counts(scene))
         if study.keep.formulas:
             columns |= dict.fromkeys(_columns(scene))
     keep = replace(study.keep, surfaces=surfaces, building=building, history=tuple(columns))
     return replace(study, keep=keep, base=base, opened=opened)
-
-
-def _bearings(scene: AnyScene) -> list[Bearing]:
-    return [each.bearing for each in scene.bearings] if isinstance(scene, BuildingScene) else [scene.bearing]
 
 
 def _columns(scene: AnyScene) -> Iterable[str]:
@@ -250,7 +245,7 @@ def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:
                 multiplied_table(factory.recipe.scene, path, 1.0, axis.surfaces)
         except InputError as error:
             raise InputError(f"{axis.change} = {path!r}: {str(error).removeprefix(f'{path}: ')}") from None
-    count = min(len(bearing.surfaces) for bearing in _bearings(factory.base))
+    count = min(len(bearing.surfaces) for bearing in factory.base.every_bearing)
     for surface in axis.surfaces or ():
         if surface > count:
             raise InputError(f"surfaces has {surface}: this bearing has surfaces 1 to {count}")

@@ -1,22 +1,31 @@
-"""`study`: runs what is missing of a study, on any engine, and keeps every chunk as it ends."""
+"""`study`: runs what is missing of a study, on any engine: each chunk in a worker, whose rows are kept as it ends."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from msfp_gen.common.inputs import Files, expecting
 from msfp_gen.common.output import make_folder, write_bytes
+from msfp_gen.common.tables import parquet_bytes
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.studies.batch import build_models
-from msfp_gen.studies.pool import Pool, pool_from
-from msfp_gen.studies.study.chunk_worker import Order, run_chunk
+from msfp_gen.studies.batch import ENDED, build_models, check_method, run_to_end
+from msfp_gen.studies.pool import Pool, pool_from, raise_if_stopped
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, failures, parts_in
-from msfp_gen.studies.study.definition import Study
+from msfp_gen.studies.study.definition import Study, Task
 from msfp_gen.studies.study.loader import load_study
+from msfp_gen.studies.study.quantities import Column, Keep
+from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.load import AnyScene
 
 Progress = Callable[[int, int], None]
+BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run
 
 
 class Outcome(NamedTuple):
@@ -149,3 +158,92 @@ def _check_failures(study: Study, failed: int, done: int, folder: Path) -> None:
             f"{failed} of {done} runs failed, more than limits.failures = {limit}; see the column message in {folder}, "
             "where they are kept"
         )
+
+
+class Order(NamedTuple):
+    """What workers need for any chunk of a study.
+
+    identity: of the whole study. digest: of what its parts have in common. files: path -> sha256 of those that its
+    scenes open.
+    """
+
+    identity: str
+    digest: str
+    recipe: Recipe
+    files: Files
+    keep: Keep
+    run_seconds: float | None
+
+
+class _OutOfTimeError(Exception):
+    """Ends a run at the limit of its wall time."""
+
+
+_factories: dict[str, SceneFactory] = {}  # of the last study only
+
+
+def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
+    """The part of a chunk as the bytes of a Parquet file, and how many of its runs failed.
+
+    Raises ChangedFileError where a file is not as it was when the study was checked.
+    """
+    with expecting(order.files):
+        return _chunk(order, task)
+
+
+def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
+    factory = _factories.get(order.identity)
+    if factory is None:
+        factory = SceneFactory(order.recipe)
+        _factories.clear()
+        _factories[order.identity] = factory
+    axes = order.recipe.axes
+    rows = []
+    for offset, (values, labels) in enumerate(task.rows(axes), start=1):
+        at = {axis.name: label for axis, label in zip(axes, labels, strict=True)}
+        intensity = order.recipe.intensity(at)
+        numbers = {**{axis.name: at[axis.name] for axis in axes if axis.numeric}, **intensity}
+        status, message, kept = _row(partial(factory.scene, values), order, numbers)
+        rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
+    failed = sum(row["status"] not in ENDED for row in rows)
+    return _part(order, rows, failed), failed
+
+
+def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
+    """Status, message and quantities of one run."""
+    try:
+        scene = make()
+        check_method(scene)
+    except InputError as error:
+        return BAD_SCENE, str(error), {}
+    try:
+        result = _result(scene, order.run_seconds)
+    except RunError as error:  # failed before its first row
+        return error.status, str(error), {}
+    except _OutOfTimeError:
+        return OUT_OF_TIME, f"ended after {order.run_seconds:g} s of wall time; see limits.run_seconds", {}
+    kept, problem = order.keep.values(result, at)
+    return result.status, result.message or problem, kept
+
+
+def _result(scene: AnyScene, seconds: float | None) -> Any:
+    """The result of a run. seconds: of wall time, after which it ends by _OutOfTimeError; None: no limit."""
+    end = None if seconds is None else time.monotonic() + seconds
+
+    def proceed(reached: float, of: float) -> None:
+        raise_if_stopped(reached, of)
+        if end is not None and time.monotonic() > end and reached < of:
+            raise _OutOfTimeError
+
+    return run_to_end(scene, proceed=proceed)
+
+
+def _part(order: Order, rows: list[dict[str, Any]], failed: int) -> bytes:
+    """The columns of every part: run, axes, status, message, intensity, quantities."""
+    axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
+    intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
+    texts = [Column("status", "", text=True), Column("message", "", text=True)]
+    columns = [*axes, *texts, *intensity, *order.keep.columns()]
+    types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
+    values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
+    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed)})

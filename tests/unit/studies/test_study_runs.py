@@ -20,7 +20,6 @@ from support.study_tables import cheap_study, rows_of
 import msfp_gen
 from msfp_gen import InputError, RunError, simulate
 from msfp_gen.studies import load_study, read_study, study_status
-from msfp_gen.studies.study import chunk_worker
 from msfp_gen.studies.study import run as running
 
 LONG = {  # a run of about a minute
@@ -57,10 +56,8 @@ def test_what_is_missing_is_computed_and_nothing_else(tmp_path: Path, monkeypatc
     whole = contents(tmp_path)
     lost = sorted(whole)[1]
     (tmp_path / lost).unlink()
-    asked = []
-    monkeypatch.setattr(
-        running, "run_chunk", lambda order, task: asked.append(task.number) or chunk_worker.run_chunk(order, task)
-    )
+    asked, run_chunk = [], running.run_chunk
+    monkeypatch.setattr(running, "run_chunk", lambda order, task: asked.append(task.number) or run_chunk(order, task))
     assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 8, 4, 0)
     assert asked == [1] and contents(tmp_path) == whole
     assert msfp_gen.study(cheap_study(), tmp_path, threads=True) == (12, 12, 0, 0) and asked == [1]
