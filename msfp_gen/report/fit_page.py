@@ -53,7 +53,7 @@ def write_fit_report(fit: Fit, path: str | Path) -> Path:
 
 def fit_html(fit: Fit) -> str:
     """The page of a fit as text."""
-    from msfp_gen.scene.explain import explain
+    from msfp_gen.buildings.explain import explain
     from msfp_gen.scene.file.loader import scene_text
     from msfp_gen.studies.calibration.figure import plot_fit, plot_residuals
 

@@ -270,8 +270,8 @@ def test_explain_names_every_number_and_choice(capsys):
 def test_explain_has_a_meaning_for_every_choice():
     from typing import get_args, get_type_hints
 
+    from msfp_gen.buildings.explain import METHODS, TOPS
     from msfp_gen.common.fields import Choice, ruled_fields
-    from msfp_gen.scene.explain import METHODS, TOPS
     from msfp_gen.scene.file.loader import _TOPS
     from msfp_gen.scene.solver import Solver
     from msfp_gen.specification.layout import Effects
