@@ -19,9 +19,8 @@ from scipy.stats import t
 
 from msfp_gen import Measurement, Motion, Scene, fit, load_scene, simulate
 from msfp_gen.common.arrays import Array
-from msfp_gen.studies.calibration.fitting import search_range, start_fit
+from msfp_gen.studies.calibration.fitting import least_squares, search_range, solve, start_fit
 from msfp_gen.studies.calibration.residuals import Residuals, changed_scene, unknowns_of
-from msfp_gen.studies.calibration.solution import least_squares, solve
 
 AMPLITUDES = (0.02, 0.06, 0.12)  # [m]
 ROWS, NOISE, OFFSET = 200, 0.01, 0.01  # noise and deviation of the offsets over the peak of all tests

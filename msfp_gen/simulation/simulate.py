@@ -17,11 +17,10 @@ from msfp_gen.errors import RunError
 from msfp_gen.model.model import build_model
 from msfp_gen.result import Result
 from msfp_gen.results.history import Counters, History
-from msfp_gen.results.joining import joined
+from msfp_gen.results.joining import joined, thinned_history
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.restart_state import RestartState
 from msfp_gen.results.row_unpacking import events_of, finite_rows, history_of
-from msfp_gen.results.thinning import thinned_history
 from msfp_gen.scene.effect_switching import check, next_effects, stopping_monitors
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.checkpoint import (
@@ -107,7 +106,7 @@ def simulate(
     -------
     Result
         Rows, events, counters and notes of the run. With `stream`, of many rows a selection that fits into memory, with
-        the extremes of all (`results.thinning`).
+        the extremes of all (`results.joining`).
 
     Raises
     ------

@@ -23,11 +23,10 @@ from msfp_gen.results.dataset import ROWS, rows_of, to_dataset
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import DIGEST, digest_of_dataset
 from msfp_gen.results.history import History
-from msfp_gen.results.joining import Joint, concatenated, taken
+from msfp_gen.results.joining import BLOCK, Joint, blocks, concatenated, taken, thinned
 from msfp_gen.results.row_unpacking import finite_rows, history_of
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import ArrayDigest, seal
-from msfp_gen.results.thinning import BLOCK, blocks, thinned
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.segment import Segment, start_temperatures
 

@@ -17,8 +17,7 @@ from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.file.changes import keys_of
 from msfp_gen.scene.file.loader import scene_table
 from msfp_gen.studies.columns import BEARING, BUILDING, Quantity, of_building, plain_cell, value_at
-from msfp_gen.studies.study.axes import Axis, located
-from msfp_gen.studies.study.scene_factory import Recipe, SceneFactory, motion_of
+from msfp_gen.studies.study.axes import Axis, Recipe, SceneFactory, located, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.result import BuildingResult

@@ -1,4 +1,4 @@
-/* One run of a model for a page: everything that a run takes comes in one array, see `packed` in problem.py. */
+/* One run of a model for a page: everything that a run takes comes in one array, see `packed` in page.py. */
 #include <stdlib.h>
 #include <string.h>
 #include "msfp_model.h"

@@ -13,7 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.studies.assessment.rows import complete, demands, intensities, unit_of, unknown_column
-from msfp_gen.studies.study.scene_factory import INTENSITY
+from msfp_gen.studies.study.axes import INTENSITY
 
 FRACTILES = (0.16, 0.5, 0.84)
 POINTS = 50  # of the fractiles of curves with different intensities

@@ -21,10 +21,9 @@ from msfp_gen.errors import InputError
 from msfp_gen.results import dataset
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
-from msfp_gen.studies.study.axes import Axis
+from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, SceneFactory
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.sampling import Distribution, Sampling
-from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 MOST_RUNS = 100_000_000
 _Counts = tuple[int, int, int]  # floors, storeys and bearings of a building

@@ -16,11 +16,10 @@ from msfp_gen.scene.file.catalogue import known_keys, parsed
 from msfp_gen.scene.file.loader import scene_table, toml_file
 from msfp_gen.scene.file.suite import Suite, load_suite, suite_from_table
 from msfp_gen.studies.bounding import load_factors
-from msfp_gen.studies.study.axes import Axis, axis_from, grid, located
+from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, axis_from, grid, located, motion_of
 from msfp_gen.studies.study.definition import Limits, Study, check_study
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.sampling import Sampling
-from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, motion_of
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion

@@ -15,11 +15,11 @@ from msfp_gen.common.tables import parquet_bytes
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.studies.batch import ENDED, build_models, check_method, run_to_end
 from msfp_gen.studies.pool import Pool, pool_from, raise_if_stopped
+from msfp_gen.studies.study.axes import INTENSITY, Recipe, SceneFactory
 from msfp_gen.studies.study.chunks import Chunks, chunks_in, failures, parts_in
 from msfp_gen.studies.study.definition import Study, Task
 from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.quantities import Column, Keep
-from msfp_gen.studies.study.scene_factory import INTENSITY, Recipe, SceneFactory
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.load import AnyScene

@@ -15,8 +15,7 @@ import pytest
 from msfp_gen import build_model, changed_scene, simulate
 from msfp_gen.analysis.characterise.loops import REVERSAL, closed_cycles, effective_properties, turning_points
 from msfp_gen.explorer import EXPLORED, write_explorer
-from msfp_gen.explorer.page import explored_scene
-from msfp_gen.explorer.problem import Problem, fixed_scene, problem_of, run_arguments
+from msfp_gen.explorer.page import Problem, explored_scene, fixed_scene, problem_of, run_arguments
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")

@@ -10,8 +10,7 @@ import pytest
 
 from msfp_gen import InputError, Rotation, build_model, changed_scene, load_scene, presets
 from msfp_gen.cli import main
-from msfp_gen.explorer.page import EXPLORED, explored_scene
-from msfp_gen.explorer.problem import fixed_scene, problem_of
+from msfp_gen.explorer.page import EXPLORED, explored_scene, fixed_scene, problem_of
 from msfp_gen.specification import contract
 
 

@@ -17,8 +17,8 @@ from support.resuming import assert_same, interrupted, stopping_at
 from msfp_gen import Auto, InputError, Load, Motion, RunError, Scene, Top, load_scene, presets, simulate
 from msfp_gen.cli import main
 from msfp_gen.result import Result
-from msfp_gen.results import thinning
-from msfp_gen.results.thinning import thinned_history
+from msfp_gen.results import joining
+from msfp_gen.results.joining import thinned_history
 from msfp_gen.scene.file.loader import scene_text
 from msfp_gen.scene.scene_fields import Stop
 from msfp_gen.simulation import memory, streamed_rows
@@ -36,7 +36,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "STEPS_PER_CALL", 20)
     monkeypatch.setattr(simulation, "ROWS_HELD", 16)
     monkeypatch.setattr(streamed_rows, "BLOCK", PIECE)
-    monkeypatch.setattr(streamed_rows, "blocks", lambda count, rows: thinning.blocks(count, rows, PIECE))
+    monkeypatch.setattr(streamed_rows, "blocks", lambda count, rows: joining.blocks(count, rows, PIECE))
 
 
 def leaving() -> Scene:
@@ -97,8 +97,8 @@ def test_several_models_are_one_file(scene: Any, tmp_path: Path) -> None:
 
 
 def test_a_long_run_keeps_its_summary_in_few_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(thinning, "GROUPS", 64)
-    monkeypatch.setattr(thinning, "BLOCK", 128)
+    monkeypatch.setattr(joining, "GROUPS", 64)
+    monkeypatch.setattr(joining, "BLOCK", 128)
     scene = scene_of("fenz-test2", output_step=0.01)
     whole, part = simulate(scene), simulate(scene, stream=tmp_path / "run.nc")
     count, rows = len(whole.history.time), part.history
@@ -116,7 +116,7 @@ def test_short_sliding_is_among_the_rows_that_are_kept(monkeypatch: pytest.Monke
     fast = np.zeros((len(history.time), 4, 2))
     fast[101] = 0.3  # one row, which is no extreme of any surface
     fast[7] = 0.5
-    monkeypatch.setattr(thinning, "GROUPS", 16)
+    monkeypatch.setattr(joining, "GROUPS", 16)
     rows = thinned_history(replace(history, slip_velocity=fast))
     assert history.time[101] in rows.time and len(rows.time) < len(history.time)
 
@@ -244,7 +244,7 @@ def test_rows_of_one_long_step_are_limited(tmp_path: Path, monkeypatch: pytest.M
         take(self, run)
 
     monkeypatch.setattr(RowFile, "take", counted)
-    monkeypatch.setattr(streamed_rows, "blocks", thinning.blocks)
+    monkeypatch.setattr(streamed_rows, "blocks", joining.blocks)
     scene = scene_of("fenz-test2", motion=Motion.harmonic(1e-4, 1e-4), duration=200.0, output_step=0.002)
     simulate(scene, stream=tmp_path / "run.nc")
     assert 5000 < max(held) < 10_020
@@ -284,8 +284,7 @@ FULL = """
 import resource, sys
 from pathlib import Path
 from msfp_gen.result import Result
-from msfp_gen.results.joining import taken
-from msfp_gen.results.thinning import blocks
+from msfp_gen.results.joining import blocks, taken
 from msfp_gen.simulation.streamed_rows import write_blocks
 path = Path(sys.argv[1])
 result = Result.from_netcdf(path)

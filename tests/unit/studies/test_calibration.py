@@ -18,7 +18,7 @@ from support import Array, scene_of
 from msfp_gen import InputError, Measurement, Motion, RunError, Scene, fit, load_scene, simulate
 from msfp_gen.cli import main
 from msfp_gen.scene.file.loader import scene_text
-from msfp_gen.studies.calibration import read_measurement, solution
+from msfp_gen.studies.calibration import fitting, read_measurement
 from msfp_gen.studies.calibration.fitting import search_range, start_fit
 from msfp_gen.studies.calibration.intervals import Noise, identified, spread_of
 
@@ -330,10 +330,10 @@ def test_the_search_ends_where_a_step_is_within_the_errors(monkeypatch: pytest.M
     Exact tests: the errors of the runs decide. The fit says so, and its intervals contain the true values.
     """
     short, whole = (start_fit(start(), [measured(0.12, seed=1)], FRICTION) for _ in range(2))
-    x, end = solution.least_squares(short, *search_range(short), 100)
+    x, end = fitting.least_squares(short, *search_range(short), 100)
     with monkeypatch.context() as patched:
-        patched.setattr(solution, "WITHIN", 0.0)
-        other, _ = solution.least_squares(whole, *search_range(whole), 100)
+        patched.setattr(fitting, "WITHIN", 0.0)
+        other, _ = fitting.least_squares(whole, *search_range(whole), 100)
     assert short.count < whole.count
     assert end.step_in_errors(x - other) < 1
     exact = fit(start(), [Measurement("exact", *loop(0.05))], FRICTION)

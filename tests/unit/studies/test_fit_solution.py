@@ -9,9 +9,9 @@ import pytest
 from support import Array
 
 from msfp_gen.errors import RunError
+from msfp_gen.studies.calibration.fitting import LEAST, SMALL, Solution, least_squares, solve
 from msfp_gen.studies.calibration.intervals import identified, lag_one, noise_of, spread_of
 from msfp_gen.studies.calibration.residuals import Evaluation
-from msfp_gen.studies.calibration.solution import LEAST, SMALL, Solution, least_squares, solve
 
 ROWS = 60
 TIMES = np.linspace(0, 1, ROWS)
