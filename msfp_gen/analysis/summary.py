@@ -31,6 +31,8 @@ def summarise(result: RunData) -> dict[str, Any]:
         peak_force_ratio: peak radial force over axial load [-]; None without a constant load.
         peak_sliding, minimum_gap: [m].
         minimum_normal_force, maximum_normal_force: [N].
+        friction: coefficients at the surfaces. friction_at_pivot: the same as data sheets give them
+            (`Bearing.friction_at_pivot`); None where there are none [-].
         rims_met: surfaces (1..n-1) that reached their rim.
         energy: see `energy_balance`.
         counters: work of the solver.
@@ -42,9 +44,13 @@ def summarise(result: RunData) -> dict[str, Any]:
     """
     extremes, load, counters = result.extremes, axial_load(result), asdict(result.counters)
     wall_time = counters.pop("wall_time")
+    bearing = result.scene.bearing
+    sheet = bearing.friction_at_pivot
     summary = {
         **summary_of_run(result, result.history.time, counters, wall_time),
         **peaks_of_bearing(extremes, load),
+        "friction": [surface.friction for surface in bearing.surfaces],
+        "friction_at_pivot": None if sheet is None else list(sheet),
         "rims_met": rims_met(result),
         "energy": energy_balance(result.history),
     }

@@ -15,7 +15,8 @@ class BearingDemand:
     """Demand on one bearing.
 
     number: from 1. name. peak_displacement: horizontal [m]. capacity_left: least of its surfaces [m].
-    minimum_load_ratio, maximum_load_ratio: N over N at rest [-]. residual_displacement [m]. dissipated [J].
+    minimum_load_ratio, maximum_load_ratio: N over N at rest [-]. residual_displacement: None where the bearing still
+    moves when the run ends [m]. dissipated [J].
     """
 
     number: int
@@ -24,11 +25,11 @@ class BearingDemand:
     capacity_left: float
     minimum_load_ratio: float
     maximum_load_ratio: float
-    residual_displacement: float
+    residual_displacement: float | None
     dissipated: float
 
     @classmethod
-    def of(cls, summary: Mapping[str, Any], residual_displacement: float) -> BearingDemand:
+    def of(cls, summary: Mapping[str, Any], residual_displacement: float | None) -> BearingDemand:
         """From the summary of a bearing."""
         return cls(
             summary["number"],
@@ -89,7 +90,7 @@ class BuildingCharacterisation(Characterisation):
                 f"{1e3 * demand.capacity_left:.1f}",
                 yes(demand.capacity_left <= 0),
                 f"{demand.minimum_load_ratio:.2f} ... {demand.maximum_load_ratio:.2f}",
-                f"{1e3 * demand.residual_displacement:.2f}",
+                "moves" if (last := demand.residual_displacement) is None else f"{1e3 * last:.2f}",
                 f"{1e-3 * demand.dissipated:.1f}",
             )
             for demand in self.bearings

@@ -177,14 +177,19 @@ def surface_table(bearing: Bearing) -> Table:
     """Surfaces of a bearing."""
     layout, shapes = bearing.layout, {1: "up", -1: "down"}
     rows = [
-        (str(number), shapes[sign], *_cells(surface, SURFACE_COLUMNS))
+        [str(number), shapes[sign], *_cells(surface, SURFACE_COLUMNS)]
         for number, (sign, surface) in enumerate(zip(layout.signs, bearing.surfaces, strict=True), start=1)
     ]
+    columns = ["surface", "concave", *SURFACE_COLUMNS]
+    if (sheet := bearing.friction_at_pivot) is not None:
+        place = columns.index("friction [-]") + 1
+        for row, coefficient in zip([columns, *rows], ["at pivot [-]", *map("{:.5g}".format, sheet)], strict=True):
+            row.insert(place, coefficient)
     title = (
         f"bearing {layout.name}: {layout.n} bodies, {layout.surfaces} surfaces, bottom first; "
         f"base {bearing.base_height * 1e3:g} mm high, g = {bearing.gravity:g} m/s^2"
     )
-    return Table(title, ("surface", "concave", *SURFACE_COLUMNS), rows)
+    return Table(title, tuple(columns), [tuple(row) for row in rows])
 
 
 def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.analysis.characterise.loops import Path
+from msfp_gen.analysis.characterise.loops import Path, rests
 from msfp_gen.analysis.characterise.report import characterised, effective_period
 from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands
 from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run
@@ -308,7 +308,9 @@ class BuildingResult(AnyResult):
             peak_floor_acceleration=summary["peak_floor_acceleration"]["radial"],
             peak_drift_ratio=summary["peak_drift_ratio"],
             bearings=tuple(
-                BearingDemand.of(one.summary, float(np.hypot(*one.displacement[-1, :2]))) for one in self.bearings
+                BearingDemand.of(one.summary, float(np.hypot(*u[-1])) if rests(self.time, u) else None)
+                for one in self.bearings
+                for u in [one.displacement[:, :2]]
             ),
         )
 

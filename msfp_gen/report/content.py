@@ -155,6 +155,8 @@ def _run_table(result: Result) -> Table:
 def _surface_table(result: Result) -> Table:
     surfaces, met = result.scene.bearing.surfaces, result.summary["rims_met"]
     columns = {
+        "friction [-]": ("friction", 1.0),
+        "friction at the pivot [-]": ("friction_at_pivot", 1.0),
         "peak sliding [mm]": ("peak_sliding", MILLI),
         "least gap [mm]": ("minimum_gap", MILLI),
         "least normal force [kN]": ("minimum_normal_force", KILO),
@@ -163,7 +165,7 @@ def _surface_table(result: Result) -> Table:
         "peak friction coefficient [-]": ("most_friction", 1.0),
         "peak temperature [degC]": ("peak_temperature", 1.0),
     }
-    columns = {name: column for name, column in columns.items() if column[0] in result.summary}
+    columns = {name: column for name, column in columns.items() if result.summary.get(column[0])}
     rows = [
         (
             str(index + 1),

@@ -218,6 +218,27 @@ class Bearing:
         heights = (changed.base_height, *(body.height for body in changed.bodies))
         return changed.replace(friction=friction_from_pivot(changed.layout, radii, heights, friction))
 
+    @property
+    def friction_at_pivot(self) -> tuple[float, ...] | None:
+        """Coefficients of a data sheet, of which `friction_from_pivot` makes those of the surfaces, bottom first [-].
+
+        None where the pivot is not the middle of a slider, or where a surface has the arm of the next one.
+        """
+        if self.layout.m != self.layout.p:
+            return None
+        surfaces = self.surfaces
+        radii, heights = [s.radius for s in surfaces], (self.base_height, *(body.height for body in self.bodies))
+        sheet = [0.0] * len(surfaces)
+        for chain in _pivot_chains(self.layout, radii, heights):
+            inner_arm = inner_moment = 0.0
+            for index, arm in chain:
+                moment = surfaces[index].friction * radii[index]
+                if arm == inner_arm:
+                    return None
+                sheet[index] = (moment - inner_moment) / (arm - inner_arm)
+                inner_arm, inner_moment = arm, moment
+        return tuple(sheet)
+
     def two_port(self, interface: NodeTop, axial_load: float | None = None, **parts: Any) -> Any:
         """The bearing between two moving ends: `TwoPort(self, interface, axial_load, **parts)`, with its errors."""
         # What this shortcut makes lies above this package, so it is found by its public name when it is called.
@@ -293,19 +314,27 @@ def friction_from_pivot(
             f"bearing.friction_at = 'pivot': layout {layout.name} has {layout.m} surfaces concave up and {layout.p} "
             "down, so its pivot is not the middle of its inner slider; give the coefficients at the surfaces"
         )
-    interfaces = [sum(heights[: index + 1]) for index in range(layout.surfaces)]
-    pivot = (interfaces[layout.m - 1] + interfaces[layout.m]) / 2
-    arms = [abs(z + sign * R - pivot) for z, sign, R in zip(interfaces, layout.signs, radii, strict=True)]
     converted = [0.0] * layout.surfaces
-    for chain in (range(layout.m - 1, -1, -1), range(layout.m, layout.surfaces)):
+    for chain in _pivot_chains(layout, radii, heights):
         inner_arm = inner_moment = 0.0
-        for index in chain:
-            moment = coefficients[index] * (arms[index] - inner_arm) + inner_moment
+        for index, arm in chain:
+            moment = coefficients[index] * (arm - inner_arm) + inner_moment
             if moment < 0:
                 raise InputError(
                     f"bearing.surfaces[{index}].friction = {coefficients[index]:g} at the pivot: that of the surface "
                     "itself would be negative; give a larger one, or coefficients at the surfaces"
                 )
             converted[index] = moment / radii[index]
-            inner_arm, inner_moment = arms[index], moment
+            inner_arm, inner_moment = arm, moment
     return converted
+
+
+def _pivot_chains(
+    layout: Layout, radii: Sequence[float], heights: Sequence[float]
+) -> tuple[list[tuple[int, float]], list[tuple[int, float]]]:
+    """Index and R_eff [m] of the surfaces below and above the pivot, from it outwards; arguments as above."""
+    interfaces = [sum(heights[: index + 1]) for index in range(layout.surfaces)]
+    pivot = (interfaces[layout.m - 1] + interfaces[layout.m]) / 2
+    arms = [abs(z + sign * R - pivot) for z, sign, R in zip(interfaces, layout.signs, radii, strict=True)]
+    below, above = range(layout.m - 1, -1, -1), range(layout.m, layout.surfaces)
+    return [(index, arms[index]) for index in below], [(index, arms[index]) for index in above]

@@ -76,11 +76,19 @@ BUILDING = RUN | {
 }
 
 
+MOVING = "the run ends while the bearing still moves: give motion.hold, such as 20 s, for time without motion"
+
+
 class Source(NamedTuple):
     """A quantity, or that of one surface, floor, storey or bearing, by its place from 0."""
 
     quantity: Quantity
     place: int | None = None
+
+    def reason(self, characterisation: Any) -> str:
+        """Why a run that was characterised has no value; "" where no reason is known."""
+        rests = getattr(characterisation, "at_rest", True)
+        return "" if rests or not self.quantity.at_rest else MOVING
 
     @property
     def compared(self) -> bool:

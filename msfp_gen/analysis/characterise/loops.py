@@ -91,9 +91,8 @@ class Path(NamedTuple):
 
     @property
     def at_rest(self) -> bool:
-        """Whether it moves by less than `REST_MOVEMENT` of its peak in the last part of the run."""
-        begin = self.time[-1] - REST_INTERVAL * (self.time[-1] - self.time[0])
-        return bool(np.hypot(*np.ptp(self.u[self.time >= begin], axis=0)) <= REST_MOVEMENT * self.peak)
+        """Whether it is at rest when the run ends."""
+        return rests(self.time, self.u)
 
     @property
     def turning(self) -> list[int]:
@@ -107,6 +106,15 @@ class Path(NamedTuple):
         for start, middle, end in closed_cycles(u, self.turning):
             rows = slice(start, end + 1)
             yield start, middle, end, effective_properties(u[rows], force[rows], middle - start)
+
+
+def rests(time: Array, u: Array) -> bool:
+    """Whether a path moves by less than `REST_MOVEMENT` of its peak in the last part of the run.
+
+    time: shape (T,) [s]. u: horizontal displacement, shape (T, 2) [m].
+    """
+    begin = time[-1] - REST_INTERVAL * (time[-1] - time[0])
+    return bool(np.hypot(*np.ptp(u[time >= begin], axis=0)) <= REST_MOVEMENT * np.hypot(*u.T).max())
 
 
 def turning_points(u: Array, threshold: float) -> list[int]:

@@ -135,6 +135,9 @@ def _envelope(cycles: Sequence[Cycle]) -> dict[str, Range]:
     return ranges
 
 
+REMEDY = "give motion.hold, such as 20 s, for time without motion in which it comes to rest"
+
+
 def _notes(kind: Kind, path: Path, demands: Sequence[SurfaceDemand], regimes: bool) -> list[str]:
     """What is not defined in this run, and why. regimes: whether those of sliding are known."""
     notes = []
@@ -148,8 +151,8 @@ def _notes(kind: Kind, path: Path, demands: Sequence[SurfaceDemand], regimes: bo
         notes.append(f"no cycle closes: {NO_LOOP}{regime}")
     if not path.at_rest:
         notes.append(
-            f"{path.what} still moves when the run ends, so its last displacement is no residual displacement; "
-            "hold the motion at its end to let it come to rest"
+            f"{path.what} still moves when the run ends, so its last displacement, {1e3 * path.residual:.4g} mm, is no "
+            f"residual displacement: {REMEDY}"
         )
     unknown = [str(demand.surface) for demand in demands if demand.contact_area is None]
     if unknown:

@@ -109,6 +109,14 @@ class Bounds:
             for name, source in self.compared.items()
         }
 
+    def undefined(self) -> dict[str, str]:
+        """Quantity -> the cases without a value, and why; only where the reason is known."""
+        reasons = {
+            name: {c.name: why for c in self.cases if (why := source.reason(c.characterisation))}
+            for name, source in self.compared.items()
+        }
+        return {name: f"{', '.join(why)}: {next(iter(why.values()))}" for name, why in reasons.items() if why}
+
     def governing(self) -> dict[str, str]:
         """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
         worst = {}
@@ -134,6 +142,7 @@ class Bounds:
             },
             "quantities": self.quantities(),
             "governing": self.governing(),
+            "undefined": self.undefined(),
             "cases": {
                 case.name: {
                     "failure": case.failure,

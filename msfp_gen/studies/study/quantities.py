@@ -179,6 +179,8 @@ class _Reader:
         if source.quantity is _CAPACITY_USED:
             return self._capacity_used(source.place or 0)
         value = source.value(self.result.summary, self._characterisation if source.quantity.characterised else None)
+        if value is None and source.quantity.characterised and (why := source.reason(self._characterisation)):
+            self.problem = f"no {name}: {why}"
         if name in TEXTS:
             return plain_cell(value)
         return None if value is None else _finite(value)

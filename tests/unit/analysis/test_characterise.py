@@ -153,7 +153,7 @@ def test_a_loop_away_from_zero_is_no_cycle() -> None:
 
 def test_residual_displacement_needs_rest() -> None:
     moving, resting = characterise(bilinear((0, D, 0.2 * D))), characterise(_held(bilinear((0, D, 0.2 * D))))
-    assert not moving.at_rest and any("still moves" in note for note in moving.notes)
+    assert not moving.at_rest and any("still moves" in note and "motion.hold" in note for note in moving.notes)
     assert resting.at_rest and resting.residual_displacement == pytest.approx(0.2 * D)
     assert not any("still moves" in note for note in resting.notes)
 

@@ -9,6 +9,7 @@ from support import scene_of
 
 from msfp_gen import InputError, load_scene, presets, simulate
 from msfp_gen.buildings.explain import explain
+from msfp_gen.report.content import summary_page
 from msfp_gen.scene.effect_selection import doubtful_values
 
 TFP = presets.bearing("fenz-tfp")
@@ -50,6 +51,40 @@ def test_scene_files_take_coefficients_at_the_pivot(tmp_path) -> None:
         '[top]\nkind = "rig"\naxial_load = 112e3\nstiffness = 1e8\n'
     )
     assert load_scene(path).bearing == TFP.replace(friction=PUBLISHED, friction_at="pivot")
+
+
+@pytest.mark.parametrize("name", ["fenz-tfp", "double-fp", "quintuple-fp"])
+def test_what_was_given_at_the_pivot_is_shown_again(name: str) -> None:
+    """Also after factors of bounds, which multiply both."""
+    bearing = presets.bearing(name)
+    given = [0.05 + 0.01 * index for index in range(bearing.layout.surfaces)][::-1]
+    converted = bearing.replace(friction=given, friction_at="pivot")
+    assert converted.friction_at_pivot == pytest.approx(given, rel=1e-12)
+    doubled = converted.replace(friction=[2 * surface.friction for surface in converted.surfaces])
+    assert doubled.friction_at_pivot == pytest.approx([2 * mu for mu in given], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["single-fp", "single-articulated-fp", "double-articulated-fp"])
+def test_bearings_without_such_a_pivot_have_no_such_coefficients(name: str) -> None:
+    bearing = presets.bearing(name)
+    expected = None if bearing.layout.m != bearing.layout.p else len(bearing.surfaces)
+    assert (bearing.friction_at_pivot and len(bearing.friction_at_pivot)) == expected
+
+
+def test_explain_summary_and_report_show_both() -> None:
+    scene = scene_of("fenz-test1")
+    scene = replace(scene, bearing=scene.bearing.replace(friction=PUBLISHED, friction_at="pivot"))
+    table, result = explain(scene)[0], simulate(scene)
+    at_surface, at_pivot = (
+        [row[table.columns.index(name)] for row in table.rows] for name in ("friction [-]", "at pivot [-]")
+    )
+    assert list(map(float, at_pivot)) == PUBLISHED
+    assert list(map(float, at_surface)) == pytest.approx(result.summary["friction"], rel=1e-3)
+    assert result.summary["friction_at_pivot"] == pytest.approx(PUBLISHED, rel=1e-12)
+    (shown,) = (table for table in summary_page(result) if "friction at the pivot [-]" in table.columns)
+    assert [row[shown.columns.index("friction at the pivot [-]")] for row in shown.rows] == [
+        f"{x:.5g}" for x in PUBLISHED
+    ]
 
 
 BAD = {

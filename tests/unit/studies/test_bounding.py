@@ -333,6 +333,9 @@ def test_command_on_a_test_of_the_report(tmp_path: Path, capsys: Any) -> None:
     stiffness = found["quantities"]["effective_stiffness"]
     assert stiffness["lower"] < stiffness["nominal"] < stiffness["upper"]
     assert found["governing"]["peak_force"] == "upper"
+    why = "lower, nominal, upper: the run ends while the bearing still moves: give motion.hold"
+    assert found["undefined"]["residual_displacement"].startswith(why)
+    assert "what is not defined, and why" in out and why in (folder / "bounds.csv").read_text()
 
 
 @pytest.mark.slow

@@ -319,3 +319,13 @@ def test_a_file_is_named_in_its_errors(tmp_path: Any) -> None:
     with pytest.raises(InputError, match=r"no such file; `msfp-gen study --example`"):
         load_study(tmp_path / "none.toml")
     assert (ROOT / "msfp_gen/studies/study/example.toml").is_file()
+
+
+def test_a_residual_displacement_without_rest_has_its_reason() -> None:
+    keep = Keep(("residual_displacement",), (), 4, ())
+    kept, problem = keep.values(simulate(load_scene("fenz-test1")), {})
+    assert kept == {"residual_displacement": None}
+    assert problem.startswith("no residual_displacement: the run ends while the bearing still moves: give motion.hold")
+    held = simulate(changed_scene("fenz-test1", {"motion.hold": 20.0}))
+    kept, problem = keep.values(held, {})
+    assert kept["residual_displacement"] > 0.0 and not problem
