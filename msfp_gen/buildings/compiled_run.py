@@ -22,7 +22,7 @@ from msfp_gen.jit.driver import load_driver
 from msfp_gen.model.compiled import AnyRun, Port
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.motions.motion import Motion
-from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.note import Note, joined_notes, monitor_notes
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_switching import Ending, monitor_options, next_effects, stopping_monitors
@@ -276,7 +276,8 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     """
     members = [Member.of(scene, index, effects) for index, effects in enumerate(scene.modelled)]
     grounds, ground_of = scene.grounds
-    grid, building, solver = time_grid(scene, grounds), scene.building, scene.solver
+    building, solver = scene.building, scene.solver
+    grid = TimeGrid.of_histories(grounds, scene.end, (solver.max_step, *(each.max_step for each in grounds)))
     attached = np.flatnonzero(np.any(scene.attachments, axis=(0, 1)))
     pieces = [snapped(each.knots, each.coefficients, grid.stops) for each in grounds]
     module, key = load_driver("msfp_gen.buildings")
@@ -306,14 +307,6 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
     )
     keys = [key, *(member.model.info.key for member in members)]
     return BuildingRun(run, scene, members, grounds, hashlib.sha256(" ".join(keys).encode()).hexdigest())
-
-
-def time_grid(scene: BuildingScene, grounds: list[Motion]) -> TimeGrid:
-    """Times at which steps of the run must end, and limits of the step, from the motions of the ground."""
-    steps = [scene.solver.max_step, *(each.max_step for each in grounds)]
-    jumps = np.concatenate([times for each in grounds for times in (each.jumps, short_pieces(each.knots))])
-    longest = min((step for step in steps if step is not None), default=np.inf)
-    return TimeGrid.of([each.resolution for each in grounds], jumps, scene.end, longest)
 
 
 def columns(run: BuildingRun) -> Iterator[tuple[str, tuple[int, ...]]]:

@@ -8,7 +8,7 @@ hundredth of its magnitude.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import factorial
 from typing import Protocol
@@ -42,6 +42,14 @@ class History(Protocol):
     @property
     def coefficients(self) -> Array:
         """Ascending powers of (t - knots[piece]): ndarray, shape (k, channels, 6)."""
+
+    @property
+    def jumps(self) -> Array:
+        """Times at which it jumps: ndarray, shape (j,), [s]."""
+
+    @property
+    def resolution(self) -> Resolution:
+        """Its requirements on the steps of a run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +105,16 @@ class TimeGrid:
     jumps: Array
     ends: Array
     steps: Array
+
+    @classmethod
+    def of_histories(cls, histories: Sequence[History], end: float, steps: Iterable[float | None]) -> TimeGrid:
+        """The grid of histories with their jumps; what changes in a piece shorter than any step is one too.
+
+        end: of the run [s]. steps: longest that are permitted [s]; None: not limited.
+        """
+        jumps = np.concatenate([times for each in histories for times in (each.jumps, short_pieces(each.knots))])
+        longest = min((step for step in steps if step is not None), default=np.inf)
+        return cls.of([each.resolution for each in histories], jumps, end, longest)
 
     @classmethod
     def of(cls, parts: Sequence[Resolution], jumps: Array, end: float, max_step: float) -> TimeGrid:

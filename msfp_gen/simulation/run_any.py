@@ -8,10 +8,12 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, overload
 
 from msfp_gen.buildings.compiled_run import BuildingRun, result_of, start_run
+from msfp_gen.buildings.dataset import scene_text
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint
@@ -133,18 +135,9 @@ def failure(run: BuildingRun, status: str) -> str:
 
 
 def identity(run: BuildingRun) -> Identity:
-    """The identity of the run of a building, for its checkpoint. The text states what users recognise a scene by."""
-    import tomli_w
-
-    scene = run.scene
-    known = {
-        "name": scene.name,
-        "building": {"coordinates": len(scene.building.mass), "bearings": len(scene.bearings)},
-        "motion": {"name": scene.motion.name, "duration": scene.motion.duration},
-        "solver": {"method": scene.solver.method, "rtol": scene.solver.rtol},
-        "duration": scene.end,
-    }
-    return Identity(run.build, tomli_w.dumps(known), fingerprint(scene))
+    """The identity of the run of a building, for its checkpoint."""
+    motion = {"name": run.scene.motion.name, "duration": run.scene.motion.duration}
+    return Identity(run.build, scene_text(run.scene) + dumps({"motion": motion}), fingerprint(run.scene))
 
 
 _ADDED = """

@@ -20,7 +20,7 @@ from msfp_gen.model.plane import (
     wrench_in_plane,
 )
 from msfp_gen.motions.piecewise import ORDER
-from msfp_gen.motions.time_grid import TimeGrid, short_pieces, snapped
+from msfp_gen.motions.time_grid import TimeGrid, snapped
 from msfp_gen.results.restart_state import RestartState, transferred_heights, transferred_state
 from msfp_gen.scene.effect_selection import EffectSelection, quasistatic
 from msfp_gen.scene.effect_switching import Ending, monitor_options
@@ -175,11 +175,7 @@ def _support_rotation(scene: Scene, coefficients: Array) -> tuple[Array, Array]:
 def time_grid(scene: Scene) -> TimeGrid:
     """Times at which steps of a run of `scene` must end, and limits of the step."""
     histories = [each for each in (scene.motion, scene.load, scene.top_rotation) if each is not None]
-    steps = [step for step in (scene.solver.max_step, scene.motion.max_step) if step is not None]
-    jumps = [scene.motion.jumps, *([] if scene.load is None else [scene.load.jumps])]
-    jumps += [short_pieces(each.knots) for each in histories]
-    parts = [each.resolution for each in histories]
-    return TimeGrid.of(parts, np.concatenate(jumps), scene.end, min(steps, default=np.inf))
+    return TimeGrid.of_histories(histories, scene.end, (scene.solver.max_step, scene.motion.max_step))
 
 
 def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, Array, Array]:

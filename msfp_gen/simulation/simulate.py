@@ -161,9 +161,9 @@ class RunSequence:
     energies: bool = False
 
     @classmethod
-    def of(cls, scene: Scene, strict: bool = False, settled: Scene | None = None) -> RunSequence:
-        """The sequence before its first segment. settled: the result of `settle(scene)`; None: it is computed here."""
-        settled = settle(scene) if settled is None else settled
+    def of(cls, scene: Scene, strict: bool = False) -> RunSequence:
+        """The sequence before its first segment. Raises RunError as `settle`."""
+        settled = settle(scene)
         return cls(scene, settled, strict, settled.effect_selection.effects, [], [])
 
     def start_segment(self, model: Model) -> tuple[Run, float]:
