@@ -11,30 +11,43 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
-    from msfp_gen.analysis.any_result import characterise
-    from msfp_gen.buildings.building import Building
-    from msfp_gen.buildings.load import changed_scene, load_scene
-    from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
-    from msfp_gen.buildings.soil import Soil
-    from msfp_gen.buildings.storey import BaseSlab, Storey
-    from msfp_gen.coupling.two_port import TwoPort
-    from msfp_gen.errors import CompileError, InputError, MsfpError, RunError
-    from msfp_gen.model.model import build_model
-    from msfp_gen.motions.motion import Motion
-    from msfp_gen.motions.prescribed import Load, Rotation
-    from msfp_gen.result import Result
-    from msfp_gen.scene.bearing import Bearing, Body, Surface
-    from msfp_gen.scene.file import presets
-    from msfp_gen.scene.scene import Scene
-    from msfp_gen.scene.scene_fields import InitialState, Stop
-    from msfp_gen.scene.solver import Solver
-    from msfp_gen.scene.top import Top
-    from msfp_gen.simulation.run_any import simulate
-    from msfp_gen.specification.layout import Auto, Effects, Layout
-    from msfp_gen.studies.batch import simulate_batch
-    from msfp_gen.studies.bounding import bound
-    from msfp_gen.studies.calibration import Measurement, fit
-    from msfp_gen.studies.study.run import study
+    from msfp_gen.analysis.any_result import characterise as characterise
+    from msfp_gen.buildings.building import Building as Building
+    from msfp_gen.buildings.load import changed_scene as changed_scene
+    from msfp_gen.buildings.load import load_scene as load_scene
+    from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
+    from msfp_gen.buildings.scene import BuildingScene as BuildingScene
+    from msfp_gen.buildings.soil import Soil as Soil
+    from msfp_gen.buildings.storey import BaseSlab as BaseSlab
+    from msfp_gen.buildings.storey import Storey as Storey
+    from msfp_gen.coupling.two_port import TwoPort as TwoPort
+    from msfp_gen.errors import CompileError as CompileError
+    from msfp_gen.errors import InputError as InputError
+    from msfp_gen.errors import MsfpError as MsfpError
+    from msfp_gen.errors import RunError as RunError
+    from msfp_gen.model.model import build_model as build_model
+    from msfp_gen.motions.motion import Motion as Motion
+    from msfp_gen.motions.prescribed import Load as Load
+    from msfp_gen.motions.prescribed import Rotation as Rotation
+    from msfp_gen.result import Result as Result
+    from msfp_gen.scene.bearing import Bearing as Bearing
+    from msfp_gen.scene.bearing import Body as Body
+    from msfp_gen.scene.bearing import Surface as Surface
+    from msfp_gen.scene.file import presets as presets
+    from msfp_gen.scene.scene import Scene as Scene
+    from msfp_gen.scene.scene_fields import InitialState as InitialState
+    from msfp_gen.scene.scene_fields import Stop as Stop
+    from msfp_gen.scene.solver import Solver as Solver
+    from msfp_gen.scene.top import Top as Top
+    from msfp_gen.simulation.run_any import simulate as simulate
+    from msfp_gen.specification.layout import Auto as Auto
+    from msfp_gen.specification.layout import Effects as Effects
+    from msfp_gen.specification.layout import Layout as Layout
+    from msfp_gen.studies.batch import simulate_batch as simulate_batch
+    from msfp_gen.studies.bounding import bound as bound
+    from msfp_gen.studies.calibration import Measurement as Measurement
+    from msfp_gen.studies.calibration import fit as fit
+    from msfp_gen.studies.study.run import study as study
 
 # Public name -> the module that defines it; `presets` is a module itself.
 _MODULES = {
@@ -77,46 +90,7 @@ _MODULES = {
     "study": "studies.study.run",
 }
 
-__all__ = [
-    "Auto",
-    "BaseSlab",
-    "Bearing",
-    "Body",
-    "Building",
-    "BuildingBearing",
-    "BuildingScene",
-    "CompileError",
-    "Effects",
-    "InitialState",
-    "InputError",
-    "Layout",
-    "Load",
-    "Measurement",
-    "Motion",
-    "MsfpError",
-    "Result",
-    "Rotation",
-    "RunError",
-    "Scene",
-    "Soil",
-    "Solver",
-    "Stop",
-    "Storey",
-    "Surface",
-    "Top",
-    "TwoPort",
-    "__version__",
-    "bound",
-    "build_model",
-    "changed_scene",
-    "characterise",
-    "fit",
-    "load_scene",
-    "presets",
-    "simulate",
-    "simulate_batch",
-    "study",
-]
+__all__ = [*_MODULES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

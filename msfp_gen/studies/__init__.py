@@ -7,21 +7,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from msfp_gen.studies.assessment.figures import (
-        plot_fragility,
-        plot_ida,
-        plot_pareto,
-        plot_sobol,
-        plot_tornado,
-    )
-    from msfp_gen.studies.assessment.fragility import fragility
-    from msfp_gen.studies.assessment.ida import ida
-    from msfp_gen.studies.assessment.pareto import Goals, pareto
-    from msfp_gen.studies.assessment.rows import read_study
-    from msfp_gen.studies.assessment.sensitivity import sobol, tornado
-    from msfp_gen.studies.study.chunks import Status, study_status
-    from msfp_gen.studies.study.loader import load_study
-    from msfp_gen.studies.study.run import Outcome
+    from msfp_gen.studies.assessment.figures import plot_fragility as plot_fragility
+    from msfp_gen.studies.assessment.figures import plot_ida as plot_ida
+    from msfp_gen.studies.assessment.figures import plot_pareto as plot_pareto
+    from msfp_gen.studies.assessment.figures import plot_sobol as plot_sobol
+    from msfp_gen.studies.assessment.figures import plot_tornado as plot_tornado
+    from msfp_gen.studies.assessment.fragility import fragility as fragility
+    from msfp_gen.studies.assessment.ida import ida as ida
+    from msfp_gen.studies.assessment.pareto import Goals as Goals
+    from msfp_gen.studies.assessment.pareto import pareto as pareto
+    from msfp_gen.studies.assessment.rows import read_study as read_study
+    from msfp_gen.studies.assessment.sensitivity import sobol as sobol
+    from msfp_gen.studies.assessment.sensitivity import tornado as tornado
+    from msfp_gen.studies.study.chunks import Status as Status
+    from msfp_gen.studies.study.chunks import study_status as study_status
+    from msfp_gen.studies.study.loader import load_study as load_study
+    from msfp_gen.studies.study.run import Outcome as Outcome
 
 # Public name -> the module that defines it.
 _MODULES = {
@@ -43,24 +44,7 @@ _MODULES = {
     "study_status": "study.chunks",
 }
 
-__all__ = [
-    "Goals",
-    "Outcome",
-    "Status",
-    "fragility",
-    "ida",
-    "load_study",
-    "pareto",
-    "plot_fragility",
-    "plot_ida",
-    "plot_pareto",
-    "plot_sobol",
-    "plot_tornado",
-    "read_study",
-    "sobol",
-    "study_status",
-    "tornado",
-]
+__all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:
