@@ -193,6 +193,9 @@ DERIVED = {
         ("time", "axis"), "N", "sum of the forces of the ground", "base_reaction", sign=ON_BEARING
     ),
     "base_torsion": Variable(ALL, "N m", "their moment about E3 through the centre of mass", "base_torsion"),
+    "overturning_moment": Variable(
+        ("time", "horizontal"), "N m", "moment that accelerates the building, at height 0", "overturning_moment"
+    ),
     "drift": Variable(STOREYS, "m or rad", "deformation of the columns", "drift", sign="above less below"),
     "storey_force": Variable(STOREYS, "N or N m", FORCE, "storey_force", sign="on the floors above"),
     "energy_kinetic": Variable(ALL, "J", "kinetic energy of the building", "kinetic"),
@@ -246,6 +249,7 @@ def labels_of(scene: BuildingScene) -> Labels:
     building, bearings = scene.building, scene.bearings
     return {
         "axis": LABELS["axis"],
+        "horizontal": LABELS["axis"][:2],
         "freedom": FREEDOM,
         "coordinate": range(len(building.mass)),
         "node": [node.name for node in building.nodes],

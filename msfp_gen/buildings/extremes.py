@@ -14,14 +14,15 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.scene import BuildingScene
 
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
+CORNERS = 4  # of the plan
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
 # The dimensions of the arrays of `BuildingExtremes`, and the sizes of those that are the same of all buildings.
 DIMENSIONS = {
     **dict.fromkeys(("node_acceleration", "node_displacement"), ("node", "peak")),
-    **dict.fromkeys(("drift", "storey_shear"), ("storey", "peak")),
+    **dict.fromkeys(("drift", "corner_drift", "storey_shear"), ("storey", "peak")),
     "storey_torsion": ("storey",),
     "base_twist": ("whole",),
-    **dict.fromkeys(("mean_displacement", "base_reaction"), ("peak",)),
+    **dict.fromkeys(("mean_displacement", "overturning_moment", "base_reaction"), ("peak",)),
     "base_torsion": ("whole",),
     "energy": ("kind",),
     **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
@@ -37,9 +38,10 @@ class BuildingExtremes:
     """Extremes of the run of a building.
 
     Of vectors, shape (..., 4), the largest magnitude along E1, E2, E3 and in the horizontal plane: node_acceleration
-    [m/s^2]; node_displacement, relative to the ground, drift of the storeys and mean_displacement of the bearings [m];
-    storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top [m]. Largest
-    magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad]; energy:
+    [m/s^2]; node_displacement, relative to the ground, drift of the storeys at their stiffness centre, corner_drift at
+    that corner of the plan where it is largest, and mean_displacement of the bearings [m]; overturning_moment, about E1
+    and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top [m].
+    Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad]; energy:
     kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2) [N];
     normal_force, shape (bearings, 2, surfaces) [N]. sliding [m], rim_force [N] and lift, the clearance
     between separated faces [m]: largest, shape (bearings, surfaces). A bearing with
@@ -49,10 +51,12 @@ class BuildingExtremes:
     node_acceleration: Array
     node_displacement: Array
     drift: Array
+    corner_drift: Array
     storey_shear: Array
     storey_torsion: Array
     base_twist: Array
     mean_displacement: Array
+    overturning_moment: Array
     base_reaction: Array
     base_torsion: Array
     energy: Array
@@ -76,6 +80,8 @@ class BuildingExtremes:
             "torsion": storeys,
             "twist": 1,
             "mean": 1,
+            "overturning": 1,
+            "corner": CORNERS * storeys,
             "base": 1,
         }
         shapes: Shapes = [(name, (count, VECTOR)) for name, count in vectors.items()]
@@ -92,7 +98,9 @@ class BuildingExtremes:
             **{name: values[name] for name in list(vectors)[:4]},
             storey_torsion=values["torsion"][:, 2],
             base_twist=values["twist"][:, 2],
+            corner_drift=values["corner"].reshape(storeys, CORNERS, VECTOR).max(axis=1),
             mean_displacement=values["mean"][0],
+            overturning_moment=values["overturning"][0],
             base_reaction=values["base"][0],
             base_torsion=values["base_torsion"],
             energy=values["energy"],
@@ -129,8 +137,34 @@ def vectors(scene: BuildingScene) -> tuple[list[int], Array, Array]:
     found += [(2, turned(each.inertia[5]), still) for each in building.columns]
     found.append((0, turned(building.node(scene.bearings[0].node).rows[5]), still))
     found.append((0, scene.attachments[:, :3].mean(axis=0), mean))
+    found.append((2, np.vstack([overturning(scene), about[:1]]), still))
+    found += [(0, rows, still) for rows in corners(scene).reshape(-1, 3, size)]
     orders, rows, shares = zip(*found, strict=True)
     return list(orders), np.stack(rows), np.stack(shares)
+
+
+def overturning(scene: BuildingScene) -> Array:
+    """Moment that accelerates the building, about E1 and E2 through its centre of mass in plan, at height 0.
+
+    Rows of the accelerations, shape (2, n). The bearings provide it, by horizontal forces at their height and by axial
+    forces beyond those at rest.
+    """
+    force = (scene.building.mass @ scene.building.rigid_motions).T
+    x, y = scene.mass_centre
+    return np.stack([force[3] - y * force[2], force[4] + x * force[2]])
+
+
+def corners(scene: BuildingScene) -> Array:
+    """Drift of each storey at the corners of the rectangle around the bearings: rows, shape (storeys, 4, 3, n)."""
+    nodes, size = scene.building.nodes, len(scene.building.mass)
+    (west, south), (east, north) = scene.places.min(axis=0), scene.places.max(axis=0)
+    rows = [
+        above.linked(point)[:3] - below.linked(point)[:3]
+        for below, above, _ in zip(nodes, nodes[1:], scene.building.columns, strict=False)
+        for x, y in ((west, south), (east, south), (east, north), (west, north))
+        for point in [np.array([x, y, (below.position[2] + above.position[2]) / 2])]
+    ]
+    return np.reshape(rows, (-1, CORNERS, 3, size))
 
 
 def lift_of(compression: Array) -> Array:

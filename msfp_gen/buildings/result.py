@@ -19,7 +19,7 @@ from msfp_gen.analysis.tables import surface_table
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
 from msfp_gen.buildings.characterise import BearingDemand, BuildingCharacterisation
-from msfp_gen.buildings.extremes import BuildingExtremes
+from msfp_gen.buildings.extremes import BuildingExtremes, corners, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -138,6 +138,24 @@ class BuildingResult(AnyResult):
         return force
 
     @property
+    def corner_drift(self) -> Array:
+        """Drift at the corners of the rectangle around the bearings, along E1, E2, E3, shape (k, storeys, 4, 3) [m].
+
+        Counterclockwise from that with the least coordinates.
+        """
+        drift: Array = np.einsum("scin,kn->ksci", corners(self.scene), self.displacement)
+        return drift
+
+    @property
+    def overturning_moment(self) -> Array:
+        """Moment that accelerates the building, about E1 and E2 through its centre of mass at height 0, (k, 2) [N m].
+
+        The bearings provide it, by horizontal forces at their height and by axial forces beyond those at rest.
+        """
+        moment: Array = self.acceleration @ overturning(self.scene).T
+        return moment
+
+    @property
     def base_reaction(self) -> Array:
         """Sum of the forces that the ground exerts on the bearings, shape (k, 3) [N]."""
         forces: Array = self.wrench[:, :, 0, :3].sum(axis=1)
@@ -179,10 +197,12 @@ class BuildingResult(AnyResult):
             node_acceleration=largest(nodes[:, :, 2, :3]),
             node_displacement=largest(nodes[:, :, 0, :3] - self.ground[:, 0]),
             drift=largest(np.moveaxis(self.drift[..., :3], 1, 0)),
+            corner_drift=largest(np.moveaxis(self.corner_drift, 0, -2)).max(axis=1, initial=0.0),
             storey_shear=largest(np.moveaxis(self.storey_force[..., :3], 1, 0)),
             storey_torsion=np.abs(self.storey_force[..., 5]).max(axis=0),
             base_twist=np.abs(self.node(base)[:, 0, 5]).max(keepdims=True),
             mean_displacement=largest(across.mean(axis=0)),
+            overturning_moment=largest(np.pad(self.overturning_moment, ((0, 0), (0, 1)))),
             base_reaction=largest(self.base_reaction),
             base_torsion=np.abs(self.base_torsion).max(keepdims=True),
             energy=np.array([self.kinetic.max(), self.strain.max()]),
@@ -216,11 +236,15 @@ class BuildingResult(AnyResult):
 
         - weight [N].
         - peak_base_torsion: about E3 through the centre of mass [N m]. peak_twist: of the base about E3 [rad].
+        - peak_overturning_moment: about E1 and E2 through the centre of mass, and radial [N m].
         - minimum_load_ratio, maximum_load_ratio: N of any bearing over that at rest [-].
-        - peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey [-].
+        - peak_floor_acceleration: of any node [m/s^2]. peak_drift_ratio: of any storey;
+          peak_corner_drift_ratio: at its corners [-].
         - floors: of each node, name, height [m], peak_acceleration [m/s^2], peak_displacement relative to the ground
           [m].
-        - storeys: of each, name, height [m], peak_drift [m], peak_drift_ratio [-], peak_shear [N], peak_torsion [N m].
+        - storeys: of each, name, height [m], peak_drift [m] and peak_drift_ratio [-] at the stiffness centre,
+          peak_corner_drift [m] and peak_corner_drift_ratio [-] at the corners of the rectangle around the bearings,
+          peak_shear [N], peak_torsion [N m].
         - bearings: see `BearingResult.summary`.
         - energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
           at the end [J]; closure_error of the balance of the building [-].
@@ -236,12 +260,16 @@ class BuildingResult(AnyResult):
             "peak_force": force,
             "peak_force_ratio": force["radial"] / weight,
             "peak_base_torsion": float(extremes.base_torsion[0]),
+            "peak_overturning_moment": {
+                key: value for key, value in by_axis(extremes.overturning_moment).items() if key != "E3"
+            },
             "peak_twist": float(extremes.base_twist[0]),
             "minimum_load_ratio": min(one["minimum_load_ratio"] for one in bearings),
             "maximum_load_ratio": max(one["maximum_load_ratio"] for one in bearings),
             "rims_met": [one["number"] for one in bearings if one["rims_met"]],
             "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
             "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
+            "peak_corner_drift_ratio": max((storey["peak_corner_drift_ratio"] for storey in storeys), default=None),
             "floors": floors,
             "storeys": storeys,
             "bearings": bearings,

@@ -33,13 +33,15 @@ def storey_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str
     nodes, rows = building.nodes, []
     for index, column in enumerate(building.columns):
         height = float(nodes[index + 1].position[2] - nodes[index].position[2])
-        drifts = by_axis(extremes.drift[index])
+        drifts, corner = by_axis(extremes.drift[index]), by_axis(extremes.corner_drift[index])
         rows.append(
             {
                 "name": column.name,
                 "height": height,
                 "peak_drift": drifts,
                 "peak_drift_ratio": drifts["radial"] / height,
+                "peak_corner_drift": corner,
+                "peak_corner_drift_ratio": corner["radial"] / height,
                 "peak_shear": by_axis(extremes.storey_shear[index]),
                 "peak_torsion": float(extremes.storey_torsion[index]),
             }
@@ -50,6 +52,9 @@ def storey_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str
 def tables(title: str, rows: Sequence[tuple[str, str]], summary: Mapping[str, Any]) -> list[Table]:
     """Tables of a summary, of which `rows` are the first: the run, its floors, storeys and bearings."""
     rows = [*rows, ("energy", _energy(summary["energy"])), ("twist", f"{summary['peak_twist']:.3g} rad")]
+    moment = summary["peak_overturning_moment"]
+    about = f"{1e-6 * moment['E1']:.4g} MN m about E1, {1e-6 * moment['E2']:.4g} about E2"
+    rows.append(("overturning", f"{about}, at the height of the bearings"))
     storeys = [_storeys(summary["storeys"])] if summary["storeys"] else []
     return [Table(title, (), rows), _floors(summary["floors"]), *storeys, _bearings(summary["bearings"])]
 
@@ -81,12 +86,22 @@ def _storeys(storeys: Sequence[Mapping[str, Any]]) -> Table:
             each["name"],
             *(f"{1e3 * each['peak_drift'][key]:.2f}" for key in ("E1", "E2")),
             f"{100 * each['peak_drift_ratio']:.3f}",
+            f"{100 * each['peak_corner_drift_ratio']:.3f}",
             *(f"{1e-6 * each['peak_shear'][key]:.3f}" for key in ("E1", "E2")),
             f"{1e-6 * each['peak_torsion']:.3f}",
         )
         for each in reversed(storeys)
     ]
-    columns = ("storey", "drift 1 [mm]", "drift 2", "[% height]", "shear 1 [MN]", "shear 2", "torsion [MN m]")
+    columns = (
+        "storey",
+        "drift 1 [mm]",
+        "drift 2",
+        "[% height]",
+        "at corners",
+        "shear 1 [MN]",
+        "shear 2",
+        "torsion [MN m]",
+    )
     return Table("peaks of storeys", columns, rows)
 
 

@@ -61,13 +61,16 @@ BEARING = RUN | {
 }
 BUILDING = RUN | {
     "peak_base_torsion": Quantity("N m", "peak_base_torsion"),
+    "peak_overturning_moment": Quantity("N m", "peak_overturning_moment.radial", "most"),
     "peak_floor_acceleration": Quantity("m/s^2", "peak_floor_acceleration.radial", "most"),
     "peak_vertical_acceleration": Quantity("m/s^2", "peak_floor_acceleration.E3"),
     "peak_drift_ratio": Quantity("", "peak_drift_ratio", "most"),
+    "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most"),
     "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least"),
     "maximum_load_ratio": Quantity("", "maximum_load_ratio", "most"),
     "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial"),
     "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio"),
+    "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio"),
     "storey_shear": Quantity("N", "storeys.*.peak_shear.radial"),
     "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial"),
     "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio"),

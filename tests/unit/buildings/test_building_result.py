@@ -136,6 +136,33 @@ def test_torsion_of_the_base_is_that_of_the_masses():
     assert np.abs(about).max() > 0
 
 
+def test_the_bearings_provide_the_overturning_moment():
+    """Axial forces beyond those at rest at their arms, and the moments of the upper ends: statics to the last digits."""
+    found, arms = result(), made().places - made().mass_centre
+    force, moment = -found.wrench[:, :, 1, :3], -found.wrench[:, :, 1, 3:]
+    axial = force[..., 2] - made().axial_loads
+    about = np.stack([axial @ arms[:, 1] + moment[..., 0].sum(1), moment[..., 1].sum(1) - axial @ arms[:, 0]], axis=1)
+    assert np.abs(found.overturning_moment - about).max() < 1e-8 * np.abs(about).max()
+    peaks, rows = found.summary["peak_overturning_moment"], np.abs(about).max(axis=0)
+    for row, peak in zip(rows, (peaks["E1"], peaks["E2"]), strict=True):
+        assert (1.0 - 1e-9) * row <= peak < 1.02 * row
+    assert set(peaks) == {"E1", "E2", "radial"} and peaks["radial"] >= max(peaks["E1"], peaks["E2"])
+
+
+def test_drift_at_a_corner_is_that_of_both_floors_there():
+    """A floor that twists drifts more at a corner than at its stiffness centre."""
+    found = result()
+    below, above = (found.node(name)[:, 0] for name in ("floor 1", "floor 2"))
+    (x, y), height = made().places.max(axis=0), np.diff([node.position[2] for node in made().building.nodes])[1]
+    turned = [node[:, :2] + node[:, 5:] * [-y, x] for node in (below, above)]
+    tilt = 0.5 * height * np.stack([above[:, 4] + below[:, 4], -above[:, 3] - below[:, 3]], axis=1)
+    assert found.corner_drift[:, 1, 2, :2] == pytest.approx(turned[1] - turned[0] - tilt, abs=1e-9)
+    for storey, most in zip(found.summary["storeys"], found.corner_drift, strict=False):
+        assert storey["peak_corner_drift_ratio"] >= storey["peak_drift_ratio"] > 0 and most.size
+    ratios = [storey["peak_corner_drift_ratio"] for storey in found.summary["storeys"]]
+    assert found.summary["peak_corner_drift_ratio"] == max(ratios)
+
+
 def test_dataset_states_units_and_signs():
     dataset = result().dataset
     for name, variable in dataset.data_vars.items():
