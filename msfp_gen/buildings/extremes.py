@@ -40,9 +40,10 @@ class BuildingExtremes:
     Of vectors, shape (..., 4), the largest magnitude along E1, E2, E3 and in the horizontal plane: node_acceleration
     [m/s^2]; node_displacement, relative to the ground, drift of the storeys at their stiffness centre, corner_drift at
     that corner of the plan where it is largest, and mean_displacement of the bearings [m]; overturning_moment, about E1
-    and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top [m].
-    Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,) [rad]; energy:
-    kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2) [N];
+    and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top
+    [m]. Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,)
+    [rad]; energy: kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2)
+    [N];
     normal_force, shape (bearings, 2, surfaces) [N]. sliding [m], rim_force [N] and lift, the clearance
     between separated faces [m]: largest, shape (bearings, surfaces). A bearing with
     fewer surfaces than another has zeros in the place of the others.

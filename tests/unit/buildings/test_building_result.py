@@ -137,7 +137,7 @@ def test_torsion_of_the_base_is_that_of_the_masses():
 
 
 def test_the_bearings_provide_the_overturning_moment():
-    """Axial forces beyond those at rest at their arms, and the moments of the upper ends: statics to the last digits."""
+    """Axial forces beyond those at rest at their arms, and the moments of the upper ends: statics, all digits."""
     found, arms = result(), made().places - made().mass_centre
     force, moment = -found.wrench[:, :, 1, :3], -found.wrench[:, :, 1, 3:]
     axial = force[..., 2] - made().axial_loads
