@@ -5,7 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from msfp_gen.buildings.scene import BuildingScene
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.load import AnyScene
 
 
 class Quantity(NamedTuple):
@@ -109,18 +114,35 @@ class Source(NamedTuple):
         return value[self.place] if self.place < len(value) else None
 
 
-@lru_cache(maxsize=16)
-def catalogue(surfaces: int, building: tuple[int, int, int] | None) -> dict[str, Source]:
-    """Column -> where it comes from, of a bearing or of a building.
+class Counts(NamedTuple):
+    """What quantities of a scene there is one of each: the most surfaces of any bearing, and parts of a building."""
 
-    surfaces: the most of any bearing. building: numbers of floors, storeys and bearings.
-    """
-    counts = dict(zip(("floors", "storeys", "bearings"), building or (), strict=False))
+    surfaces: int = 0
+    floors: int = 0
+    storeys: int = 0
+    bearings: int = 0
+
+    @classmethod
+    def of(cls, scene: AnyScene) -> Counts:
+        """Those of a scene; of one bearing there is no building."""
+        surfaces = max(len(bearing.surfaces) for bearing in scene.every_bearing)
+        if not isinstance(scene, BuildingScene):
+            return cls(surfaces)
+        return cls(surfaces, len(scene.building.nodes), len(scene.building.columns), len(scene.bearings))
+
+    def or_more(self, other: Counts) -> Counts:
+        """The larger of each."""
+        return Counts(*map(max, self, other))
+
+
+@lru_cache(maxsize=16)
+def catalogue(counts: Counts) -> dict[str, Source]:
+    """Column -> where it comes from, of a bearing or of a building."""
     sources: dict[str, Source] = {}
-    for name, quantity in (BEARING if building is None else BUILDING).items():
+    for name, quantity in (BUILDING if counts.bearings else BEARING).items():
         head, several, _ = quantity.path.partition(".*")
         if several:
-            numbers = range(counts.get(head, surfaces))
+            numbers = range(getattr(counts, head, counts.surfaces))
             sources |= {f"{name}_{index + 1}": Source(quantity, index) for index in numbers}
         else:
             sources[name] = Source(quantity)

@@ -16,7 +16,7 @@ from msfp_gen.specification.friction_laws import Law, law_of
 from msfp_gen.specification.layout import Auto
 from msfp_gen.studies.batch import ENDED, completed_runs
 from msfp_gen.studies.bounding.factors import PROPERTIES, FactorTable
-from msfp_gen.studies.columns import Source, catalogue
+from msfp_gen.studies.columns import Counts, Source, catalogue
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import Characterisation
@@ -38,10 +38,8 @@ Progress = Callable[[float, float], None]
 
 
 def compared_quantities(scene: AnyScene) -> dict[str, Source]:
-    """The quantities that are compared for a scene; loop properties of a bearing are cycle means."""
-    building = None if isinstance(scene, Scene) else (0, 0, 0)
-    sources = catalogue(len(_typical(scene).surfaces), building)
-    return {name: source for name, source in sources.items() if source.compared}
+    """The quantities that are compared for a scene; loop properties are cycle means."""
+    return {name: source for name, source in catalogue(Counts.of(scene)).items() if source.compared}
 
 
 @dataclass(frozen=True)

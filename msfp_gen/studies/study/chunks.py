@@ -70,7 +70,7 @@ class Chunks:
             "base": study.base,
             "factors": study.recipe.factors,
             "axes": [(axis.name, axis.change, axis.paths, axis.surfaces, axis.random) for axis in study.axes],
-            "keep": [study.keep.names, study.keep.formulas, study.keep.surfaces],
+            "keep": [study.keep.names, study.keep.formulas, study.keep.counts.surfaces],
             "intensity": study.table.get("records", {}).get("intensity"),
             "run_seconds": study.limits.run_seconds,
         }

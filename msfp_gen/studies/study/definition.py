@@ -21,12 +21,12 @@ from msfp_gen.errors import InputError
 from msfp_gen.results import dataset
 from msfp_gen.scene.file.changes import multiplied_table
 from msfp_gen.studies.batch import check_method
+from msfp_gen.studies.columns import Counts
 from msfp_gen.studies.study.axes import INTENSITY, Axis, Recipe, SceneFactory
 from msfp_gen.studies.study.quantities import Keep
 from msfp_gen.studies.study.sampling import Distribution, Sampling
 
 MOST_RUNS = 100_000_000
-_Counts = tuple[int, int, int]  # floors, storeys and bearings of a building
 
 TRIED = 1000  # numbers of one axis that are tried before the first run, at least; of texts and tables all
 PARTS = 64  # that a small study has at least, unless these would have fewer than LEAST runs
@@ -197,7 +197,7 @@ def _tried_study(study: Study) -> Study:
             _check_axis(axis, factory, bool(study.recipe.records))
         except InputError as error:
             raise InputError(f"axes.{axis.name}.{error}") from None
-    surfaces, building = 0, None
+    counts = Counts()
     columns: dict[str, None] = {}
     first, base, opened = {}, "", {}
     for place, scene, files in _tried(study, factory):  # one after the other: their motions are long
@@ -205,11 +205,10 @@ def _tried_study(study: Study) -> Study:
             first, base = files, fingerprint((scene, sorted(files.values())))
         elif own := sorted(digest for path, digest in files.items() if path not in first):
             opened[place] = fingerprint(own)
-        surfaces = max(surfaces, *(len(bearing.surfaces) for bearing in scene.every_bearing))
-        building = _larger(building, _counts(scene))
+        counts = counts.or_more(Counts.of(scene))
         if study.keep.formulas:
             columns |= dict.fromkeys(_columns(scene))
-    keep = replace(study.keep, surfaces=surfaces, building=building, history=tuple(columns))
+    keep = replace(study.keep, counts=counts, history=tuple(columns))
     return replace(study, keep=keep, base=base, opened=opened)
 
 
@@ -218,20 +217,6 @@ def _columns(scene: AnyScene) -> Iterable[str]:
     if isinstance(scene, BuildingScene):
         return building_dataset.columns(scene)
     return dataset.columns(scene)
-
-
-def _larger(one: _Counts | None, other: _Counts | None) -> _Counts | None:
-    """The larger count of each kind; None where there is none."""
-    if one is None or other is None:
-        return one or other
-    return max(one[0], other[0]), max(one[1], other[1]), max(one[2], other[2])
-
-
-def _counts(scene: AnyScene) -> _Counts | None:
-    """Those of a building; None for a scene of one bearing."""
-    if not isinstance(scene, BuildingScene):
-        return None
-    return len(scene.building.nodes), len(scene.building.columns), len(scene.bearings)
 
 
 def _check_axis(axis: Axis, factory: SceneFactory, has_records: bool) -> None:

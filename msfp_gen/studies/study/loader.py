@@ -196,7 +196,6 @@ def _checked(table: Table, folder: Path | None, progress: Progress | None) -> St
     keep = Keep(
         _texts(table, "keep", BUILDING_KEEP if "building" in scene else DEFAULT_KEEP),
         tuple((name, _formula(name, text)) for name, text in _table(table, "quantities").items()),
-        1,
         (*(axis.name for axis in axes if axis.numeric), *([INTENSITY] if records.intensities else [])),
     )
     tables = records.tables

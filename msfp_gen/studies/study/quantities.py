@@ -6,7 +6,7 @@ import ast
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from msfp_gen.results.files import Storage
 from msfp_gen.results.variables import Arrays, Places
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.specification import formula
-from msfp_gen.studies.columns import Quantity, Source, catalogue, plain_cell
+from msfp_gen.studies.columns import Counts, Quantity, Source, catalogue, plain_cell
 
 # Word in a formula -> what it takes of a column of the history.
 EXTREMES: dict[str, Callable[[Any], Any]] = {
@@ -63,26 +63,24 @@ class Keep:
         names: quantities, as in the study file.
         formulas: pairs of a name and a formula of quantities, axes, and `peak(...)`, `least(...)`, `most(...)`,
             `last(...)` of a column of the history: over all steps where the run records them, else of the rows.
-        surfaces: the most surfaces of any bearing of the study.
         axes: names of the axes that hold numbers.
-        building: floors, storeys and bearings where the base is a building.
+        counts: the most of any scene of the study.
         history: columns of the history, as in an exported file.
     """
 
     names: tuple[str, ...]
     formulas: tuple[tuple[str, str], ...]
-    surfaces: int
     axes: tuple[str, ...]
-    building: tuple[int, int, int] | None = None
+    counts: Counts = field(default_factory=Counts)
     history: tuple[str, ...] = ()
 
     @cached_property
     def known(self) -> dict[str, Source]:
         """Column -> where it comes from, of everything that can be kept."""
-        sources = catalogue(self.surfaces, self.building)
+        sources = catalogue(self.counts)
         sources = {name: source for name, source in sources.items() if name not in _LEFT_OUT}
-        if self.building is None:
-            sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.surfaces)}
+        if not self.counts.bearings:
+            sources |= {f"{CAPACITY_USED}_{k + 1}": Source(_CAPACITY_USED, k) for k in range(self.counts.surfaces)}
         return sources
 
     def columns(self) -> tuple[Column, ...]:
@@ -195,7 +193,7 @@ class _Reader:
         variable, index = self._columns[column]
         if variable.field not in self._arrays:
             return None
-        if not self._keep.building and (name := _OVER_STEPS.get((word, variable.field))):
+        if not self._keep.counts.bearings and (name := _OVER_STEPS.get((word, variable.field))):
             return _finite(getattr(self.result.extremes, name)[index[0]])
         return _finite(EXTREMES[word](variable.of(self._arrays)[:, *index]))
 

@@ -24,7 +24,7 @@ from msfp_gen.figures import plot_loops
 from msfp_gen.results.files import table_of
 from msfp_gen.results.note import Note
 from msfp_gen.results.resample import at_times
-from msfp_gen.studies.columns import catalogue
+from msfp_gen.studies.columns import Counts, catalogue
 
 
 @cache
@@ -338,9 +338,10 @@ def test_a_bearing_at_other_times():
 
 def test_every_quantity_of_the_catalogue_is_in_a_result():
     cycles = preset_run("fenz-test2").characterise().envelope
-    for run, counts in ((preset_run("fenz-test2"), None), (result(), (len(result().floors), len(result().storeys), 4))):
+    for run in (preset_run("fenz-test2"), result()):
         characterisation = replace(run.characterise(), envelope=cycles)  # the building moves for less than a cycle
-        values = {name: source.value(run.summary, characterisation) for name, source in catalogue(4, counts).items()}
+        sources = catalogue(Counts.of(run.scene))
+        values = {name: source.value(run.summary, characterisation) for name, source in sources.items()}
         missing = {name.rstrip("_1234") for name, value in values.items() if value is None}
         # no friction law, no uplift; and both runs end in motion
         optional = {"least_friction", "most_friction", "peak_temperature", "maximum_uplift", "residual_displacement"}
