@@ -20,6 +20,7 @@ from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables, schema
 from msfp_gen.scene.file.motion_tables import Components, Paths
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
@@ -61,6 +62,7 @@ MEANINGS = {
     "solver": "Settings of the integration: `[solver]`.",
     "initial_state": "State at the start: `[initial_state]`; without it centred and at rest.",
     "stop": "Conditions that end the run early: `[stop]`.",
+    "limits": "Limits of the device, with which the verdict of a run compares: `[limits]` ([limits.md](limits.md)).",
     "scene.duration": "Length of the run; without it that of the motion.",
     "output_step": "Distance of the rows of results; without it every step of the solver.",
     "layout": "Numbers of bodies and surfaces: `n`, `m`, `p`.",
@@ -238,6 +240,13 @@ MEANINGS = {
     "building.soil.rotational_stiffness": "Not modelled: giving it is an error.",
     "building.soil.mass": "Not modelled: giving it is an error.",
     "displacement": "Horizontal displacement across the bearing.",
+    "limits.rim_force": "Of a rim; without it a third of the normal force of its surface, the median over time.",
+    "limits.rim_compression": "Of a rim; without it none.",
+    "limits.uplift_height": "Clearance between the faces of a surface; without it the `rim_offset` of its slider.",
+    "limits.uplift_duration": "Longest time for which a surface is open.",
+    "limits.temperature": "At the centre of a surface.",
+    "limits.axial_load": "Largest vertical force on what is carried; without it none.",
+    "limits.displacement": "Largest horizontal displacement across a bearing; without it none.",
     "all_rims": "Whether contact at every rim ends the run.",
 }
 
@@ -257,6 +266,7 @@ SECTIONS: list[tuple[str, str, type]] = [
     ("`[solver]`", "solver", Solver),
     ("`[initial_state]`", "initial_state", InitialState),
     ("`[stop]`", "stop", Stop),
+    ("`[limits]`", "limits", Limits),
     ("A building on bearings", "", BuildingScene),
     ("`[building]`", "building", buildings.FrameTable),
     ("`[building.base]`", "building.base", BaseSlab),

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Body as Body
     from msfp_gen.scene.bearing import Surface as Surface
     from msfp_gen.scene.file import presets as presets
+    from msfp_gen.scene.limits import Limits as Limits
     from msfp_gen.scene.scene import Scene as Scene
     from msfp_gen.scene.scene_fields import InitialState as InitialState
     from msfp_gen.scene.scene_fields import Stop as Stop
@@ -63,6 +64,7 @@ _MODULES = {
     "InitialState": "scene.scene_fields",
     "InputError": "errors",
     "Layout": "specification.layout",
+    "Limits": "scene.limits",
     "Load": "motions.prescribed",
     "Measurement": "studies.calibration",
     "Motion": "motions.motion",

@@ -11,6 +11,7 @@ from msfp_gen.analysis.characterise import Characterisation, characterise
 from msfp_gen.analysis.gradient_summary import summarise_gradients
 from msfp_gen.analysis.summary import rows_of_bearing, summarise
 from msfp_gen.analysis.tables import summary_tables
+from msfp_gen.analysis.verdict import Judged
 from msfp_gen.common.tables import Table
 from msfp_gen.results import dataset
 from msfp_gen.results.history import Counters, Event, History
@@ -36,7 +37,11 @@ class Result(AnyResult, RunData):
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
-        return summarise(self)
+        return summarise(self) | {"verdict": self.verdict.as_dict}
+
+    def judged(self) -> list[Judged]:
+        """The bearing itself."""
+        return [Judged(0, "", self.scene.bearing, self.history, self.extremes, self.notes)]
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""
@@ -51,7 +56,8 @@ class Result(AnyResult, RunData):
 
     def tables(self) -> list[Table]:
         """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
-        return summary_tables(self.summary, self.scene.bearing.surfaces)
+        first, *others = summary_tables(self.summary, self.scene.bearing.surfaces)
+        return [first, self.verdict.table, *others]
 
     @cached_property
     def gradient(self) -> xr.Dataset:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from msfp_gen.analysis.verdict import Judged, Verdict, verdict_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
@@ -58,17 +59,26 @@ class AnyResult(ResultFiles):
     def curve(self) -> Curve:
         """The curve that says most about the run."""
 
+    @abstractmethod
+    def judged(self) -> list[Judged]:
+        """The bearings of which the verdict is."""
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What the device was asked to bear, against its limits (docs/limits.md)."""
+        return verdict_of(self.judged(), self.scene.limits, "" if self.succeeded else self.status_text)
+
     @property
     def status_text(self) -> str:
         """How the run ended, with the message of a run that failed."""
         return self.status + (f": {self.message}" if self.message else "")
 
     def printed_rows(self) -> Rows:
-        """Label and value of the main results after the status, with the first notes."""
+        """Label and value of the main results after the status and the verdict, with the first notes."""
         lines, others = self.first_notes
         more = f"; {others} more in .notes" if others else ""
         shown = [("notes", "; ".join(lines) + more)] if lines else []
-        return [("status", self.status_text), *self.main_results(), *shown]
+        return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results(), *shown]
 
     @property
     def first_notes(self) -> tuple[list[str], int]:

@@ -12,6 +12,7 @@ from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.extremes import Extremes, by_axis
 from msfp_gen.results.history import History
+from msfp_gen.results.sliding import intervals
 
 if TYPE_CHECKING:
     from msfp_gen.results.files import ResultFiles
@@ -33,6 +34,9 @@ def summarise(result: RunData) -> dict[str, Any]:
         minimum_normal_force, maximum_normal_force: [N].
         friction: coefficients at the surfaces. friction_at_pivot: the same as data sheets give them
             (`Bearing.friction_at_pivot`); None where there are none [-].
+        peak_rim_force: [N].
+        uplift: of all surfaces together, see `uplift_of`.
+        verdict: what the device was asked to bear, against its limits; see `Verdict.as_dict` and docs/limits.md.
         rims_met: surfaces (1..n-1) that reached their rim.
         energy: see `energy_balance`.
         counters: work of the solver.
@@ -51,6 +55,7 @@ def summarise(result: RunData) -> dict[str, Any]:
         **peaks_of_bearing(extremes, load),
         "friction": [surface.friction for surface in bearing.surfaces],
         "friction_at_pivot": None if sheet is None else list(sheet),
+        "uplift": uplift_of(result.history, extremes),
         "rims_met": rims_met(result),
         "energy": energy_balance(result.history),
     }
@@ -91,7 +96,23 @@ def peaks_of_bearing(extremes: Extremes, load: float | None) -> dict[str, Any]:
         "minimum_gap": extremes.gap.tolist(),
         "minimum_normal_force": extremes.least_normal.tolist(),
         "maximum_normal_force": extremes.most_normal.tolist(),
+        "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
     }
+
+
+def uplift_of(history: Any, extremes: Extremes) -> dict[str, Any]:
+    """Uplift of a bearing. history: with `time` and `lift`, shape (T, n-1) [m].
+
+    Keys:
+        height: largest clearance between the faces of any surface [m].
+        duration: longest time for which some surface is open [s], by the rows; 0 where it is shorter than their
+            distance.
+        count: how often one opened, by the rows.
+    """
+    height = 0.0 if extremes.lift is None else float(extremes.lift.max())
+    spells = intervals(history.time, (history.lift > 0).any(axis=1)) if height else []
+    duration = max((length for _, length in spells), default=0.0)
+    return {"height": height, "duration": duration, "count": max(len(spells), int(height > 0))}
 
 
 def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -34,6 +34,7 @@ def _run_table(summary: Mapping[str, Any]) -> Table:
     over = "" if ratio is None else f", radial over axial load {ratio:.4f}"
     rows = [
         ("status", " - ".join(filter(None, (summary["status"], summary["message"])))),
+        ("verdict", summary["verdict"]["text"]),
         ("time simulated", _speed(summary)),
         ("peak displacement", f"{_peaks(displacement, 1e3)} mm"),
         ("peak force on the top", f"{_peaks(force, 1e-3)} kN{over}"),
@@ -49,6 +50,7 @@ SURFACE_COLUMNS: dict[str, tuple[str, float, str]] = {
     "capacity [mm]": ("capacity", 1e3, ".2f"),
     "least gap [mm]": ("minimum_gap", 1e3, ".2f"),
     "rim met": ("rim_met", 1, ""),
+    "rim [kN]": ("peak_rim_force", 1e-3, ".2f"),
     "least N [kN]": ("minimum_normal_force", 1e-3, ".3f"),
     "peak N [kN]": ("maximum_normal_force", 1e-3, ".3f"),
     "least mu": ("least_friction", 1.0, ".4f"),
@@ -64,6 +66,8 @@ def surface_table(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> Ta
         "capacity": [surface.capacity for surface in surfaces],
         "rim_met": [yes(index + 1 in summary["rims_met"]) for index in range(len(surfaces))],
     }
+    if not any(summary["peak_rim_force"]):
+        del values["peak_rim_force"]
     columns = {name: column for name, column in SURFACE_COLUMNS.items() if column[0] in values}
     rows = [
         (str(index + 1), *(format(values[key][index] * scale, style) for key, scale, style in columns.values()))

@@ -36,6 +36,7 @@ from msfp_gen.scene.file.loader import bearing_table, plain_table, toml_table
 from msfp_gen.scene.file.stored_motion import GROUP as MOTION
 from msfp_gen.scene.file.stored_motion import PIECES, to_pieces
 from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def scene_text(scene: BuildingScene) -> str:
             "output_step": scene.output_step,
             "grounds": len(scene.grounds[0]),
             "solver": plain_table(scene.solver),
+            "limits": None if scene.limits is None else plain_table(scene.limits),
             "node": [{"name": n.name, "carries": n.carries} for n in building.nodes],
             "column": [{"name": column.name} for column in building.columns],
             "bearing": [
@@ -112,7 +114,8 @@ def scene_from(text: str, arrays: dict[str, Array], motions: Sequence[Motion]) -
     known = {field.name for field in fields(Solver)}
     solver = Solver(**{name: value for name, value in table.get("solver", {}).items() if name in known})
     name, duration, step = str(table.get("name", "")), table.get("duration"), table.get("output_step")
-    return BuildingScene(building, bearings, motions[0], solver, duration, name, step)
+    limits = Limits(**table["limits"]) if "limits" in table else None
+    return BuildingScene(building, bearings, motions[0], solver, duration, name, step, limits)
 
 
 EXTREMES = "extremes"  # group

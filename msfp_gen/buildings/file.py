@@ -21,6 +21,7 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
 from msfp_gen.scene.file.motion_tables import KINDS, Paths, paths_in, resolved
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
@@ -77,6 +78,7 @@ _SCENE = model_of(
     bearings=(dict[str, Any], {}),
     motion=(MOTION, ...),
     solver=(PARTS["solver"], None),
+    limits=(PARTS["limits"], None),
 )
 TABLES = {
     "": _SCENE,
@@ -92,6 +94,7 @@ TABLES = {
     "building.bearing.soil": _SOIL,
     "building.bearing.effects": PARTS["effects"],
     "solver": PARTS["solver"],
+    "limits": PARTS["limits"],
 }
 _buildings: Kept[Building] = Kept(256 << 20, lambda building: 3 * building.mass.nbytes)
 MATRICES = paths_in(FrameTable)
@@ -108,8 +111,7 @@ def building_from_table(
     frame, named = given.pop("building"), given.pop("bearings", {})
     made = given.pop("motion")
     parts: Table = {"building": _building(frame, folder), "motion": motion or _motion(made, folder)}
-    if "solver" in given:
-        parts["solver"] = Solver(**given.pop("solver"))
+    parts |= {name: kind(**given.pop(name)) for name, kind in (("solver", Solver), ("limits", Limits)) if name in given}
     common = {name: frame[name] for name in COMMON if name in frame}
     rows = enumerate(frame["bearing"])
     parts["bearings"] = [

@@ -14,8 +14,9 @@ from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.analysis.characterise.loops import Path, rests
 from msfp_gen.analysis.characterise.report import characterised, effective_period
 from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands
-from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run
+from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run, uplift_of
 from msfp_gen.analysis.tables import surface_table
+from msfp_gen.analysis.verdict import Judged
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
 from msfp_gen.buildings.characterise import BearingDemand, BuildingCharacterisation
@@ -230,7 +231,7 @@ class BuildingResult(AnyResult):
         Keys that `Result.summary` has too: name, status, message, notes, duration, counters, wall_time,
         real_time_factor; peak_displacement: across any bearing [m]; peak_force: of the ground on all bearings, the base
         shear [N]; peak_force_ratio: radial, over the weight [-]; rims_met: bearings (from 1) of which a slider reached
-        its rim.
+        its rim; verdict: what the bearings were asked to bear, against their limits (docs/limits.md).
 
         Others:
 
@@ -273,6 +274,7 @@ class BuildingResult(AnyResult):
             "floors": floors,
             "storeys": storeys,
             "bearings": bearings,
+            "verdict": self.verdict.as_dict,
             "energy": {
                 "peak_kinetic": float(extremes.energy[0]),
                 "peak_strain": float(extremes.energy[1]),
@@ -306,8 +308,12 @@ class BuildingResult(AnyResult):
                 f"peak acceleration {acceleration['radial']:.4g} m/s^2, vertical {acceleration['E3']:.4g}{drift}",
             ),
             ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
-            ("rims met", ", ".join(self.scene.label(number - 1) for number in s["rims_met"]) or "none"),
+            ("rims met", summaries.rims_text(s["bearings"])),
         ]
+
+    def judged(self) -> list[Judged]:
+        """All bearings."""
+        return [judged for bearing in self.bearings for judged in bearing.judged()]
 
     @property
     def curve(self) -> Curve:
@@ -318,7 +324,9 @@ class BuildingResult(AnyResult):
 
     def tables(self) -> list[Table]:
         """Tables of the run with its floors, storeys and bearings."""
-        return summaries.tables(self.title, [("status", self.status_text), *self.main_results()], self.summary)
+        rows = [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
+        first, *others = summaries.tables(self.title, rows, self.summary)
+        return [first, self.verdict.table, *others]
 
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
@@ -492,7 +500,8 @@ class BearingResult(AnyResult, HorizontalMotion):
 
         Keys that `Result.summary` has too: peak_displacement and peak_force along E1, E2, E3 and radial [m], [N];
         axial_load at rest [N], and peak_force_ratio over it [-]; peak_sliding and minimum_gap [m]; rims_met (surfaces);
-        minimum_normal_force and maximum_normal_force [N]. Others: number (from 1), name, layout, position;
+        minimum_normal_force and maximum_normal_force, peak_rim_force [N]; uplift: height [m], duration [s] and count;
+        verdict. Others: number (from 1), name, layout, position;
         minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
@@ -504,6 +513,8 @@ class BearingResult(AnyResult, HorizontalMotion):
             **peaks_of_bearing(self.extremes, self.axial_load),
             "minimum_load_ratio": float(least),
             "maximum_load_ratio": float(most),
+            "uplift": uplift_of(self, self.extremes),
+            "verdict": self.verdict.as_dict,
             "rims_met": (np.flatnonzero(self.extremes.gap <= 0) + 1).tolist(),
             "dissipated": float(self.dissipated[-1]),
         }
@@ -518,6 +529,10 @@ class BearingResult(AnyResult, HorizontalMotion):
             ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
         ]
 
+    def judged(self) -> list[Judged]:
+        """The bearing itself, with its number and its label."""
+        return [Judged(self.index + 1, self.label, self.bearing, self, self.extremes, self.notes)]
+
     @property
     def curve(self) -> Curve:
         """The hysteresis loop."""
@@ -525,8 +540,8 @@ class BearingResult(AnyResult, HorizontalMotion):
 
     def tables(self) -> list[Table]:
         """Tables of its main results and of its surfaces."""
-        rows = [("status", self.status_text), *self.main_results()]
-        return [Table(self.title, (), rows), surface_table(self.summary, self.bearing.surfaces)]
+        rows = [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
+        return [Table(self.title, (), rows), surface_table(self.summary, self.bearing.surfaces), self.verdict.table]
 
     @classmethod
     def storage(cls) -> Storage:

@@ -13,11 +13,13 @@ from msfp_gen.buildings.building import Building
 from msfp_gen.buildings.storey import Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields, errors_at, require_type
+from msfp_gen.common.identity import NO_NUMBERS
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_standing, needed_rotational_stiffness
@@ -93,8 +95,9 @@ class BuildingScene:
 
     building; bearings: at least one, of any layouts. motion: of the ground, from rest, in translation; displacements
     count from the start. solver: of steps that the building and all bearings take together. duration [s]; None: that of
-    the motion. output_step: between rows, at which steps end [s]; None: 10 ms. Raises InputError: inconsistent parts,
-    or weights that the bearings do not balance.
+    the motion. output_step: between rows, at which steps end [s]; None: 10 ms. limits: of its bearings, for the verdict
+    of the run; None: those of `Limits()`. Raises InputError: inconsistent parts, or weights that the bearings do not
+    balance.
     """
 
     building: Building
@@ -104,11 +107,13 @@ class BuildingScene:
     duration: Annotated[float | None, Quantity("s", above=0.0)] = None
     name: str = ""
     output_step: Annotated[float | None, Quantity("s", above=0.0)] = None
+    limits: Limits | None = field(default=None, metadata=NO_NUMBERS)
 
     def __post_init__(self) -> None:
         require_type(self.building, Building, "scene.building")
         require_type(self.motion, Motion, "scene.motion")
         require_type(self.solver, Solver, "scene.solver")
+        require_type(self.limits, (Limits, type(None)), "scene.limits")
         object.__setattr__(self, "bearings", tuple(self.bearings))
         for index, each in enumerate(self.bearings):
             require_type(each, BuildingBearing, f"scene.bearings[{index}]")

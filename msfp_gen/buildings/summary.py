@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.common.tables import Table, yes
+from msfp_gen.common.tables import Table
 from msfp_gen.results.extremes import by_axis
 
 if TYPE_CHECKING:
@@ -56,7 +56,26 @@ def tables(title: str, rows: Sequence[tuple[str, str]], summary: Mapping[str, An
     about = f"{1e-6 * moment['E1']:.4g} MN m about E1, {1e-6 * moment['E2']:.4g} about E2"
     rows.append(("overturning", f"{about}, at the height of the bearings"))
     storeys = [_storeys(summary["storeys"])] if summary["storeys"] else []
-    return [Table(title, (), rows), _floors(summary["floors"]), *storeys, _bearings(summary["bearings"])]
+    bearings = summary["bearings"]
+    lifted = [_uplift(bearings)] if any(each["uplift"]["count"] for each in bearings) else []
+    return [Table(title, (), rows), _floors(summary["floors"]), *storeys, _bearings(bearings), *lifted]
+
+
+def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:
+    """The surfaces that met their rims, and the bearings in which they did, by name or number."""
+    groups: dict[str, list[str]] = {}
+    for each in bearings:
+        if each["rims_met"]:
+            groups.setdefault(_numbers(each["rims_met"]), []).append(each["name"] or str(each["number"]))
+    texts = [
+        f"{surfaces} of {', '.join(names) if len(names) < len(bearings) else 'all bearings'}"
+        for surfaces, names in groups.items()
+    ]
+    return f"surfaces {'; '.join(texts)}" if texts else "none"
+
+
+def _numbers(surfaces: Sequence[int]) -> str:
+    return ", ".join(map(str, surfaces))
 
 
 def _energy(energy: Mapping[str, float]) -> str:
@@ -116,9 +135,25 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
             f"{1e-3 * each['axial_load']:.1f}",
             f"{each['minimum_load_ratio']:.2f} ... {each['maximum_load_ratio']:.2f}",
             f"{1e3 * min(each['minimum_gap']):.1f}",
-            yes(each["rims_met"]),
+            _numbers(each["rims_met"]) or "-",
         )
         for each in bearings
     ]
-    columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rim")
-    return Table("peaks of bearings; left: capacity less sliding", columns, rows)
+    columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rims")
+    return Table("peaks of bearings; left: capacity less sliding; rims: surfaces that met theirs", columns, rows)
+
+
+def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:
+    """Uplift of every bearing that lifted."""
+    rows = [
+        (
+            str(each["number"]),
+            each["name"] or "-",
+            f"{1e3 * each['uplift']['height']:.3g}",
+            f"{1e3 * each['uplift']['duration']:.3g}",
+            str(each["uplift"]["count"]),
+        )
+        for each in bearings
+        if each["uplift"]["count"]
+    ]
+    return Table("uplift of bearings", ("no.", "name", "height [mm]", "longest [ms]", "times"), rows)

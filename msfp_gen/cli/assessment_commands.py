@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msfp_gen.cli.console import AsJson, Progress, SceneName, answer, note, note_written, say, show
+from msfp_gen.cli.console import (
+    AsJson,
+    Progress,
+    SceneName,
+    answer,
+    note,
+    note_exceeded,
+    note_written,
+    say,
+    show,
+)
 from msfp_gen.cli.inputs import build, load_source, result_of
 from msfp_gen.errors import RunError
 
@@ -76,6 +86,7 @@ def bound(
         bounds = run_bounds(chosen, table, progress=progress)
     answer(bounds.as_dict(), bounding_tables(bounds), as_json)
     note_written(_save(bounds, output) if output is not None else [])
+    note_exceeded({case.name: case.result.verdict for case in bounds.cases if case.result is not None})
     if not bounds.succeeded:
         failed = "; ".join(f"{case.name}: {case.failure}" for case in bounds.cases if case.failure)
         raise RunError(f"not all cases could be run; {failed}", status="bound")

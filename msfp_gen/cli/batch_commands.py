@@ -100,6 +100,7 @@ def _run(chosen: Sequence[Variation], workers: int | None, folder: Path | None, 
 @contextmanager
 def _reported(rows: list[Row], count: int, table: Path | None, as_json: bool) -> Iterator[None]:
     """Print and write the rows at the end of the block, also where it is interrupted or fails."""
+    from msfp_gen.studies.columns import value_at
     from msfp_gen.studies.sweep import sweep_table, write_table
 
     try:
@@ -109,6 +110,8 @@ def _reported(rows: list[Row], count: int, table: Path | None, as_json: bool) ->
             say(json.dumps([row.as_dict() for row in sorted(rows)], indent=2, allow_nan=False))
         elif rows:
             show([sweep_table(rows)])
+            if exceeded := sum(bool(value_at(row.summary, "verdict.limits")) for row in rows):
+                note(f"{exceeded} of {len(rows)} runs exceeded limits of the device; --table FILE names them")
         if rows and table is not None:
             note(f"wrote {write_table(rows, table, '--table')}")
         if 0 < len(rows) < count:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
@@ -21,6 +21,7 @@ from msfp_gen.results.sign import SIGNS
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
+    from msfp_gen.analysis.verdict import Verdict
     from msfp_gen.common.tables import Table
 
 
@@ -121,6 +122,13 @@ def say(text: str) -> None:
 def note(text: str) -> None:
     """Print a line that is not part of the results on standard error."""
     typer.echo(printable(text), err=True)
+
+
+def note_exceeded(verdicts: Mapping[str, Verdict]) -> None:
+    """A line for every run that exceeded limits of the device. verdicts: by names of runs, "" for the only one."""
+    for name, verdict in verdicts.items():
+        if verdict.exceeded:
+            note(f"{name}{': ' if name else ''}limits of the device {verdict.text}")
 
 
 def fail(message: str, code: int) -> int:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import Progress, note, whole_number
+from msfp_gen.cli.console import Progress, note, note_exceeded, whole_number
 from msfp_gen.cli.inputs import load_source, result_of
 from msfp_gen.errors import InputError, RunError
 
@@ -56,6 +56,7 @@ def report(
     with Progress("report") as progress:
         write_report(result, path, count, progress, TitleBlock(project, device, date, revision, code))
     note(f"wrote {path}")
+    note_exceeded({"": result.verdict})
     if failure is not None:
         raise RunError(f"{failure}; the report of what was computed until then is in {path}", status=failure.status)
 

@@ -17,6 +17,7 @@ from msfp_gen.cli.console import (
     SceneName,
     choices_of,
     note,
+    note_exceeded,
     note_written,
     number,
     parser_of,
@@ -301,6 +302,7 @@ def _report(result: AnyResult, as_json: bool, more: dict[str, Any] | None = None
         note(line)
     if others:
         note(f"{others} more note{'s' * (others > 1)}: --json prints all of them, and `msfp-gen report` shows them")
+    note_exceeded({"": result.verdict})
 
 
 def _save(result: AnyResult, output: Path | None, plot: Path | None, written: bool = False) -> list[Path]:

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 
 _NONE: Mapping[str, str] = {}
+NO_NUMBERS = {"no_numbers": True}
+"""Metadata of a field of a dataclass on which no number of a run depends."""
 
 
 def fingerprint(value: object, files: Mapping[str, str] = _NONE) -> str:
     """The sha256 of all values in dataclasses, mappings, lists and arrays; equal for equal values.
 
-    Of a resolved scene these are its numbers and texts, the polynomials of motions and the matrices of a building.
+    Of a resolved scene these are its numbers and texts, the polynomials of motions and the matrices of a building;
+    fields with `NO_NUMBERS` are left out.
     files: path -> sha256, as `inputs.recording` notes them: a text that is such a path counts as the name of the file
     and its bytes, wherever its folder lies.
     """
@@ -34,7 +37,7 @@ def _leaves(value: Any, files: Mapping[str, str]) -> Iterator[bytes]:
     elif is_dataclass(value) and not isinstance(value, type):
         yield type(value).__name__.encode()
         for field in fields(value):
-            if field.compare:
+            if field.compare and not field.metadata.get("no_numbers"):
                 yield field.name.encode()
                 yield from _leaves(getattr(value, field.name), files)
     elif isinstance(value, Mapping):

@@ -92,7 +92,7 @@ class SummaryNumber(str):
 
 def summary_page(result: Result) -> list[Table]:
     """Tables of peaks, surfaces, transitions and events, as in `msfp-gen run`, without times of the machine."""
-    tables = [_run_table(result), _surface_table(result)]
+    tables = [_run_table(result), result.verdict.table, _surface_table(result)]
     if "transitions" in result.summary:
         tables.append(transition_table(result.summary["transitions"]))
     if result.events:
@@ -123,10 +123,15 @@ def provenance_table(result: AnyResult) -> Table:
     return Table("versions, model and counters of the solver", (), rows)
 
 
-def outcome(status: str, message: str) -> str:
-    """How a run ended, in one sentence."""
-    ends = {"ok": "The run reached its end.", "stopped": "The run ended at its stop condition."}
-    return ends.get(status, f"The run failed ({status}): {message}")
+def outcome(result: AnyResult) -> str:
+    """How a run ended, and its verdict, in one or two sentences."""
+    ends, verdict = {"ok": "The run reached its end", "stopped": "The run ended at its stop condition"}, result.verdict
+    if result.status not in ends:
+        lines = verdict.exceeded_text
+        return f"The run failed ({result.status}): {result.message}" + (
+            f". Until then exceeded: {lines}" if lines else ""
+        )
+    return ends[result.status] + (f", {verdict.text}." if verdict.ok else f". Limits of the device {verdict.text}.")
 
 
 def _run_table(result: Result) -> Table:
@@ -161,6 +166,7 @@ def _surface_table(result: Result) -> Table:
         "least gap [mm]": ("minimum_gap", MILLI),
         "least normal force [kN]": ("minimum_normal_force", KILO),
         "peak normal force [kN]": ("maximum_normal_force", KILO),
+        "peak rim force [kN]": ("peak_rim_force", KILO),
         "least friction coefficient [-]": ("least_friction", 1.0),
         "peak friction coefficient [-]": ("most_friction", 1.0),
         "peak temperature [degC]": ("peak_temperature", 1.0),

@@ -13,6 +13,7 @@ from msfp_gen.motions.time_grid import TIME_TOLERANCE
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import EffectSelection, select_effects
 from msfp_gen.scene.friction_parameters import check_bearing
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.planarity import scene_plane
 from msfp_gen.scene.scene_fields import InitialState, SceneFields, Stop
 from msfp_gen.scene.seats import check_seats
@@ -32,7 +33,8 @@ class Scene(SceneFields):
     initial_state; None: centred and at rest. output_step: distance of rows [s]; None: the steps of the solver.
     stop: condition that ends the run early. load: load history on the top plate, in addition to that of the top.
     top_rotation: rotation history of the support to which the rotational springs of the top are fixed. effects: the
-    effects that are modelled, or `Auto`: selected from the scene. motion_table: the `[motion]` table of a scene file,
+    effects that are modelled, or `Auto`: selected from the scene. limits: of the device, for the verdict of the run;
+    None: those of `Limits()`. motion_table: the `[motion]` table of a scene file,
     from which the scene can be written back. Raises InputError: a part of the wrong type, or inconsistent parts.
     """
 
@@ -62,7 +64,11 @@ class Scene(SceneFields):
         layout, motion, effects = self.bearing.layout, self.motion, self.effects
         names = [f"{name} = {value}" for name, value in vars(effects).items() if value is not None]
         selected = isinstance(effects, Auto)
-        extras = [name for name in ("load", "top_rotation", "initial_state", "stop") if getattr(self, name) is not None]
+        extras = [
+            name
+            for name in ("load", "top_rotation", "initial_state", "stop", "limits")
+            if getattr(self, name) is not None
+        ]
         radii, friction = ([getattr(s, name) for s in self.bearing.surfaces] for name in ("radius", "friction"))
         rows = {
             "bearing": f"(n, m, p) = {layout.name}, R = {radii} m, mu = {friction}",
@@ -178,4 +184,5 @@ _PART_TYPES: dict[str, type | tuple[type, ...]] = {
     "stop": (Stop, type(None)),
     "load": (Load, type(None)),
     "top_rotation": (Rotation, type(None)),
+    "limits": (Limits, type(None)),
 }

@@ -8,11 +8,13 @@ from functools import cached_property
 from typing import Annotated, Any
 
 from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.common.identity import NO_NUMBERS
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.motions.prescribed import Load, Rotation
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.friction_parameters import select_friction
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import Top
 from msfp_gen.specification import contract
@@ -78,6 +80,7 @@ class SceneFields:
     load: Load | None = None
     top_rotation: Rotation | None = None
     name: str = ""
+    limits: Limits | None = field(default=None, metadata=NO_NUMBERS)
     motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

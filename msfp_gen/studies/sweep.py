@@ -175,6 +175,7 @@ def sweep_table(rows: Sequence[Row]) -> Table:
         "u [mm]": [_number(row, "peak_displacement.radial", 1e3, 2) for row in rows],
         "F [kN]": [_number(row, "peak_force.radial", 1e-3, 2) for row in rows],
         "rims": [str(len(row.summary.get("rims_met", ()))) for row in rows],
+        "verdict": [str(value_at(row.summary, "verdict.word") or "failed") for row in rows],
         "[ms]": [_number(row, "wall_time", 1e3, 0) for row in rows],
     }
     shown = list(paths)

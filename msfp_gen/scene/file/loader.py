@@ -19,6 +19,7 @@ from msfp_gen.scene.file import catalogue, schema
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces, resolved
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
 from msfp_gen.scene.file.toml_text import dumps, plain_values
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
@@ -31,7 +32,7 @@ _TOO_DEEP = "no valid TOML: tables or lists are nested too deeply; a scene needs
 _TOPS = {kind.kind: kind for kind in (RigTop, PrescribedTop, MassTop)}
 _ANY_MOTION: Table = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
 _complete: Kept[Table] = Kept(16, lambda _: 1)
-_PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop}
+_PARTS = {"solver": Solver, "initial_state": InitialState, "stop": Stop, "limits": Limits}
 
 
 def scene_table(source: str | Path) -> tuple[Table, Path | None]:

@@ -32,6 +32,7 @@ from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
 from msfp_gen.scene.solver import Solver
@@ -129,7 +130,13 @@ MOTION, _MOTIONS = _union(motion_tables.KINDS.values())
 _TOP, _TOPS = _union((RigTop, PrescribedTop, MassTop))
 PARTS: dict[str, Model] = {
     name: model_of(kind)
-    for name, kind in (("effects", Auto), ("solver", Solver), ("initial_state", InitialState), ("stop", Stop))
+    for name, kind in {
+        "effects": Auto,
+        "solver": Solver,
+        "initial_state": InitialState,
+        "stop": Stop,
+        "limits": Limits,
+    }.items()
 }
 EFFECTS = _auto(PARTS["effects"])
 _SCENE = model_of(

@@ -43,26 +43,27 @@ LINE_STYLES: dict[str, dict[str, Any]] = {
 
 
 def bounding_tables(bounds: Bounds) -> list[Table]:
-    """Tables of the factors, of the factors by surface, of quantities by case, and of runs that failed."""
+    """Tables of the factors, of the factors by surface, of quantities and verdicts by case, and of runs that failed."""
     failed = [(case.name, case.failure) for case in bounds.cases if case.failure]
     unknown = [(name.replace("_", " "), why) for name, why in bounds.undefined().items()]
     extra = [Table("runs that failed", (), failed)] if failed else []
     extra += [Table("what is not defined, and why", (), unknown)] if unknown else []
-    return [_factor_table(bounds.table), _lambda_table(bounds), _quantity_table(bounds), *extra]
+    verdicts = Table("verdicts: limits of the device (docs/limits.md)", (), list(bounds.verdicts().items()))
+    return [_factor_table(bounds.table), _lambda_table(bounds), _quantity_table(bounds), verdicts, *extra]
 
 
 def write_quantities(bounds: Bounds, path: str | Path) -> Path:
-    """Write the quantities by case as CSV in SI units; the file appears only when complete.
+    """Write the quantities by case, and the verdicts, as CSV in SI units; the file appears only when complete.
 
     Raises InputError for a path that does not end in .csv or cannot be written.
     """
     sources, quantities, governing = bounds.compared, bounds.quantities(), bounds.governing()
-    undefined = bounds.undefined()
+    undefined, verdicts = bounds.undefined(), bounds.verdicts()
     columns: dict[tuple[str, str], list[Any]] = {
-        ("quantity", ""): [f"{name} [{sources[name].quantity.unit or 1}]" for name in quantities],
-        **{(case, ""): [values[case] for values in quantities.values()] for case in CASES},
-        ("governs", ""): [governing.get(name, "") for name in quantities],
-        ("not defined", ""): [undefined.get(name, "") for name in quantities],
+        ("quantity", ""): [*(f"{name} [{sources[name].quantity.unit or 1}]" for name in quantities), "verdict"],
+        **{(case, ""): [*(values[case] for values in quantities.values()), verdicts[case]] for case in CASES},
+        ("governs", ""): [*(governing.get(name, "") for name in quantities), ""],
+        ("not defined", ""): [*(undefined.get(name, "") for name in quantities), ""],
     }
     return write_columns(check_output(path, (".csv",)), columns)
 

@@ -115,6 +115,10 @@ class Bounds:
         }
         return {name: f"{', '.join(why)}: {next(iter(why.values()))}" for name, why in reasons.items() if why}
 
+    def verdicts(self) -> dict[str, str]:
+        """Case -> the verdict of its run."""
+        return {case.name: "the run failed" if case.result is None else case.result.verdict.text for case in self.cases}
+
     def governing(self) -> dict[str, str]:
         """Quantity -> the case that governs; left out if a case has no value, or all have the same."""
         worst = {}
@@ -144,6 +148,7 @@ class Bounds:
             "cases": {
                 case.name: {
                     "failure": case.failure,
+                    "verdict": None if case.result is None else case.result.verdict.as_dict,
                     "characterisation": case.characterisation and case.characterisation.as_dict(),
                 }
                 for case in self.cases

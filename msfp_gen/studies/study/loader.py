@@ -41,9 +41,10 @@ KEYS = {
     "chunk": "a number of runs",
     "about": "written by msfp-gen",
 }
-DEFAULT_KEEP = ("peak_displacement", "peak_force", "peak_sliding", "rims_met")
+DEFAULT_KEEP = ("peak_displacement", "peak_force", "peak_sliding", "rims_met", "limits_exceeded")
 BUILDING_KEEP = (
     "peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "minimum_load_ratio",
+    "limits_exceeded",
 )  # fmt: skip
 _CHUNK = Quantity("", least=1, whole=True)
 

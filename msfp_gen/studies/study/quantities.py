@@ -41,7 +41,7 @@ _OVER_STEPS = {
 }
 _EXTREME = re.compile(rf"\b({'|'.join(EXTREMES)})\(\s*([^()]*?)\s*\)")
 CAPACITY_USED = "capacity_used"  # 1 - least gap / capacity: 1 where a slider meets its rim
-TEXTS = ("rims_met",)
+TEXTS = ("rims_met", "verdict", "limits_exceeded")
 _CAPACITY_USED = Quantity("", CAPACITY_USED)
 _LEFT_OUT = ("status", "message")  # every row has them
 _OPERATIONS = {**formula.FLOAT_OPERATIONS, "power": math.pow}

@@ -49,12 +49,13 @@ def result() -> BuildingResult:
 def test_few_lines():
     lines = repr(result()).splitlines()
     assert len(lines) <= 10 and lines[0] == "Result of frame" and "status" in lines[1]
+    assert lines[2] == "  verdict           within the limits of the device"
     steps = result().counters["steps"]
-    assert steps != len(result().time) - 1 and f"s in {steps} steps" in lines[2]
+    assert steps != len(result().time) - 1 and f"s in {steps} steps" in lines[3]
     html = result()._repr_html_()
     assert "<polyline" in html and "orbit of bearing" in html and "base shear" in html
     lines = repr(result().bearings[1]).splitlines()
-    assert len(lines) <= 10 and lines[0] == "Result of bearing 2 (B) of frame" and "5_2_2 at (-3, 2) m" in lines[2]
+    assert len(lines) <= 10 and lines[0] == "Result of bearing 2 (B) of frame" and "5_2_2 at (-3, 2) m" in lines[3]
     assert "<polyline" in result().bearings[1]._repr_html_()
     assert all(table.text for run in (result(), result().bearings[1]) for table in run.tables())
 

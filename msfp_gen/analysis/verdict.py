@@ -1,0 +1,301 @@
+"""The verdict of a run: what the device was asked to bear, against its limits (docs/limits.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from msfp_gen.common.tables import Table
+from msfp_gen.results.sliding import intervals
+from msfp_gen.scene.limits import Limits
+
+if TYPE_CHECKING:
+    from msfp_gen.common.arrays import Array
+    from msfp_gen.results.extremes import Extremes
+    from msfp_gen.results.note import Note
+    from msfp_gen.scene.bearing import Bearing
+
+RIM_SHARE = 1 / 3  # rim force over the normal force of its surface, up to which the spring of a rim was compared
+START_TEMPERATURE = 20.0  # of a surface without thermal parameters [degC]
+SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
+
+
+class Judged(NamedTuple):
+    """A bearing alone, or one of a building: number from 1 and label; 0 and "" for a bearing alone.
+
+    history: its rows by the names of `History`. notes: of its monitors.
+    """
+
+    number: int
+    label: str
+    bearing: Bearing
+    history: Any
+    extremes: Extremes
+    notes: Sequence[Note]
+
+
+class Value(NamedTuple):
+    """What was reached: surface from 1, 0: none; time [s]; the value and what is allowed, in the unit of the limit."""
+
+    surface: int
+    time: float
+    reached: float
+    allowed: float
+
+
+Reader = Callable[[Judged, Limits], Iterable[Value]]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One limit: key, name and unit of its quantity, and what reads it in a result."""
+
+    key: str
+    name: str
+    unit: str
+    read: Reader
+
+    def shown(self, value: float) -> str:
+        """A value with its unit."""
+        factor, unit = SCALES.get(self.unit, (1.0, self.unit))
+        return f"{value * factor:.4g} {unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A limit, the bearing, and the value that it reached."""
+
+    limit: Limit
+    bearing: int
+    label: str
+    value: Value
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether the value is beyond the limit."""
+        return self.value.reached > self.value.allowed
+
+    @property
+    def share(self) -> float:
+        """The value over its limit."""
+        reached, allowed = self.value.reached, self.value.allowed
+        return reached / allowed if allowed > 0 else math.inf if reached > 0 else 0.0
+
+    @property
+    def place(self) -> str:
+        """Bearing and surface."""
+        return ", ".join(filter(None, [self.label, f"surface {self.value.surface}" if self.value.surface else ""]))
+
+    @property
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data: limit, unit, bearing, surface, time [s], value and allowed in that unit."""
+        surface, time, value, allowed = self.value
+        about = {"limit": self.limit.key, "unit": self.limit.unit, "bearing": self.bearing, "surface": surface}
+        return {**about, "time": time, "value": value, "allowed": allowed}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Values against limits, of one bearing or of all of a building.
+
+    readings: of every limit that applies, bearing and surface. failure: how a run failed, else "".
+    """
+
+    readings: tuple[Reading, ...]
+    failure: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end and no limit was exceeded."""
+        return not self.failure and not self.exceeded
+
+    @cached_property
+    def exceeded(self) -> tuple[Reading, ...]:
+        """The readings beyond their limits."""
+        return tuple(reading for reading in self.readings if reading.exceeded)
+
+    @cached_property
+    def worst(self) -> dict[str, Reading]:
+        """Key of a limit -> the reading that is largest over what is allowed."""
+        most: dict[str, Reading] = {}
+        for reading in self.readings:
+            key = reading.limit.key
+            most[key] = max(most.get(key, reading), reading, key=lambda one: one.share)
+        return most
+
+    @property
+    def word(self) -> str:
+        """One of within, exceeded, failed."""
+        return "failed" if self.failure else "exceeded" if self.exceeded else "within"
+
+    @property
+    def text(self) -> str:
+        """One line: the limits that were exceeded, each with its worst value, place and time."""
+        lines = self.exceeded_text
+        if self.failure:
+            return "the run failed" + (f"; until then exceeded: {lines}" if lines else "")
+        return f"exceeded: {lines}" if lines else "within the limits of the device"
+
+    @property
+    def exceeded_text(self) -> str:
+        """The limits that were exceeded, "" where there is none."""
+        return "; ".join(self._line(reading) for reading in self.worst.values() if reading.exceeded)
+
+    def _line(self, reading: Reading) -> str:
+        limit, (_, time, reached, allowed) = reading.limit, reading.value
+        others = self._bearings(limit.key) - 1
+        more = f", and {others} other bearing{'s' * (others > 1)}" if others > 0 else ""
+        where = ", ".join(filter(None, [reading.place, f"{time:.4g} s"]))
+        return f"{limit.name} {limit.shown(reached)}, limit {limit.shown(allowed)} ({where}{more})"
+
+    def _bearings(self, key: str) -> int:
+        """Number of bearings beyond a limit."""
+        return len({reading.bearing for reading in self.exceeded if reading.limit.key == key})
+
+    @property
+    def table(self) -> Table:
+        """The worst value of every limit that applies."""
+        rows = []
+        for reading in self.worst.values():
+            limit, (_, time, reached, allowed) = reading.limit, reading.value
+            when = f"{time:.4g}" if reached else "-"
+            beyond = "EXCEEDED" if reading.exceeded else "within"
+            place = (reading.place or "-") if reached else "-"
+            rows.append((limit.name, limit.shown(reached), limit.shown(allowed), place, when, beyond))
+        title = f"limits of the device, largest values: {self.word if self.failure else self._summary}"
+        return Table(title, ("limit", "value", "allowed", "where", "time [s]", ""), rows)
+
+    @property
+    def _summary(self) -> str:
+        if not self.exceeded:
+            return "within all"
+        bearings = {reading.bearing for reading in self.exceeded} - {0}
+        return f"exceeded{f' by {len(bearings)} bearing' + 's' * (len(bearings) > 1) if bearings else ''}"
+
+    @property
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data: word, text, limits (keys of those exceeded, in one text), exceeded and largest readings."""
+        return {
+            "word": self.word,
+            "text": self.text,
+            "limits": " ".join(dict.fromkeys(reading.limit.key for reading in self.exceeded)),
+            "exceeded": [reading.as_dict for reading in self.exceeded],
+            "largest": [reading.as_dict for reading in self.worst.values()],
+        }
+
+
+def verdict_of(bearings: Iterable[Judged], limits: Limits | None, failure: str) -> Verdict:
+    """The verdict of a run. limits: of the scene; None: the defaults."""
+    given = limits or Limits()
+    readings = [
+        Reading(limit, one.number, one.label, value)
+        for one in bearings
+        for limit in LIMITS
+        for value in limit.read(one, given)
+    ]
+    return Verdict(tuple(readings), failure)
+
+
+def _by_surface(one: Judged, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
+    """Values of every surface. rows: shape (T, n-1), of which the largest has the time."""
+    times = one.history.time[rows.argmax(axis=0)]
+    allowed = np.broadcast_to(allowed, reached.shape)
+    for surface, (time, value, most) in enumerate(zip(times, reached, allowed, strict=True), start=1):
+        yield Value(surface, float(time), float(value), float(most))
+
+
+def _rim_force(one: Judged, limits: Limits) -> Iterator[Value]:
+    """By the rows, and by the spring of the rim at its largest compression over all steps."""
+    bearing = one.bearing.arrays()
+    rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
+    if not any(note.kind == "rims" and not note.action for note in one.notes):
+        reached = np.maximum(reached, bearing["rim_stiffness"] * np.maximum(0.0, -one.extremes.gap))
+    allowed = limits.rim_force or RIM_SHARE * np.median(one.history.normal_force, axis=0)
+    return _by_surface(one, rows, reached, allowed)
+
+
+def _rim_compression(one: Judged, limits: Limits) -> Iterable[Value]:
+    if limits.rim_compression is None:
+        return ()
+    return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), limits.rim_compression)
+
+
+def _travel(one: Judged, limits: Limits) -> Iterator[Value]:
+    """Rims in contact at one time; one surface must be left to slide."""
+    met = ((one.history.gap <= 0) | (one.history.rim_force > 0)).sum(axis=1)
+    row = int(met.argmax())
+    yield Value(0, float(one.history.time[row]), float(met[row]), float(len(one.extremes.gap) - 1))
+
+
+def _uplift_height(one: Judged, limits: Limits) -> Iterator[Value]:
+    bearing = one.bearing
+    offsets = bearing.arrays()["rim_offset"][[bearing.slider(j) for j in range(len(bearing.surfaces))]]
+    allowed = np.full(len(offsets), limits.uplift_height) if limits.uplift_height else offsets
+    for value in _by_surface(one, one.history.lift, np.asarray(one.extremes.lift), allowed):
+        if value.allowed > 0:  # without a rim_offset no height is known
+            yield value
+
+
+def _uplift_duration(one: Judged, limits: Limits) -> Iterator[Value]:
+    for surface, lift in enumerate(one.history.lift.T, start=1):
+        start, length = max(intervals(one.history.time, lift > 0), key=lambda spell: spell[1], default=(0.0, 0.0))
+        yield Value(surface, start, length, limits.uplift_duration)
+
+
+def _temperature(one: Judged, limits: Limits) -> Iterator[Value]:
+    """Of the friction law, or of the monitor of heat where the law has none."""
+    reached, rows = one.extremes.temperature, getattr(one.history, "temperature", None)
+    if reached is not None and rows is not None:
+        yield from _by_surface(one, rows, reached, limits.temperature)
+    for note in one.notes:
+        if note.kind == "heat" and not note.action:
+            start = getattr(one.bearing.surfaces[note.surface - 1], "start_temperature", None)
+            start = START_TEMPERATURE if start is None else start
+            yield Value(note.surface, note.time, start + note.value, limits.temperature)
+
+
+def _axial_load(one: Judged, limits: Limits) -> Iterator[Value]:
+    if limits.axial_load is not None:
+        row = int(np.abs(one.history.top_force[:, 2]).argmax())
+        yield Value(0, float(one.history.time[row]), float(one.extremes.top_force[2]), limits.axial_load)
+
+
+def _displacement(one: Judged, limits: Limits) -> Iterator[Value]:
+    if limits.displacement is not None:
+        row = int(one.history.horizontal.argmax())
+        yield Value(0, float(one.history.time[row]), float(one.extremes.displacement[3]), limits.displacement)
+
+
+def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:
+    """A limit of the model whose monitor leaves a note; without one nothing is read."""
+
+    def read(one: Judged, limits: Limits) -> Iterator[Value]:
+        for note in one.notes:
+            if note.kind == kind and not note.action:
+                yield Value(note.surface, note.time, note.value, allowed(one.bearing, note.surface))
+
+    return read
+
+
+def _face(bearing: Bearing, surface: int) -> float:
+    return float(bearing.arrays()["rim_radius"][bearing.slider(surface - 1)])
+
+
+LIMITS = (
+    Limit("rim_force", "rim force", "N", _rim_force),
+    Limit("rim_compression", "rim compression", "m", _rim_compression),
+    Limit("travel", "rims met at one time", "", _travel),
+    Limit("beyond_rim", "sliding beyond a rim that the model leaves out", "m", _noted("rims", lambda *_: 0.0)),
+    Limit("uplift_height", "opening of a surface", "m", _uplift_height),
+    Limit("uplift_duration", "time for which a surface is open", "s", _uplift_duration),
+    Limit("face", "contact off the axis of the slider", "m", _noted("footprint", _face)),
+    Limit("temperature", "temperature", "degC", _temperature),
+    Limit("axial_load", "axial load", "N", _axial_load),
+    Limit("displacement", "displacement", "m", _displacement),
+)
+"""All limits in the order of tables; those that `Limits` has as fields can be given."""

@@ -1,0 +1,306 @@
+"""The verdict of a run: every limit exceeded and not, of a bearing and of a building; what it says, and where."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import ROOT, preset_run
+from support.buildings import BEARING, frame, rocking, scene
+from support.synthetic import LOAD, loops
+
+from msfp_gen import (
+    BuildingScene,
+    Effects,
+    InputError,
+    Limits,
+    Result,
+    RunError,
+    Scene,
+    changed_scene,
+    load_scene,
+    presets,
+    simulate,
+)
+from msfp_gen.analysis.verdict import LIMITS, RIM_SHARE
+from msfp_gen.buildings.result import BuildingResult
+from msfp_gen.cli import main
+from msfp_gen.common.identity import fingerprint
+from msfp_gen.results.note import Note
+from msfp_gen.simulation.run_any import simulate as run_any
+
+OPENING = 3e-3  # [m]
+GIVEN = [limit.key for limit in LIMITS if limit.key in {field.name for field in fields(Limits)}]
+
+
+@cache
+def opened() -> Result:
+    """Two cycles, in which surface 2 opens twice by up to 3 mm: for 0.3 s from 4 s on, and for 0.1 s from 12 s on."""
+    result = loops()
+    lift, time = np.zeros_like(result.history.lift), result.history.time
+    lift[(time > 4.0) & (time < 4.305), 1] = OPENING
+    lift[(time > 12.0) & (time < 12.105), 1] = 0.5 * OPENING
+    return replace_history(result, lift=lift)
+
+
+def replace_history(result: Result, **rows: Any) -> Result:
+    return Result(
+        result.scene, replace(result.history, **rows), result.events, result.counters, provenance=result.provenance
+    )
+
+
+@cache
+def at_the_rims() -> BuildingResult:
+    """A frame whose lower dishes are met at every bearing."""
+    return simulate(scene(frame(), bearing=BEARING.replace(capacity=[0.03, 0.0215, 0.0215, 0.03])))
+
+
+@cache
+def lifted() -> BuildingResult:
+    return simulate(rocking(Effects(uplift=True)))
+
+
+@cache
+def heated() -> Result:
+    return simulate(load_scene(ROOT / "examples" / "heating.toml"))
+
+
+def judged(result: Any, **limits: float) -> Any:
+    """The verdict of a run under these limits."""
+    return replace(result, scene=replace(result.scene, limits=Limits(**limits))).verdict
+
+
+REACHED: list[tuple[str, Any, float, int, int]] = [  # limit, run, value, bearing, surface
+    ("rim_force", lambda: preset_run("fenz-test5"), 15.12e3, 0, 1),
+    ("rim_force", at_the_rims, 9211.1, 2, 1),
+    ("rim_compression", lambda: preset_run("fenz-test5"), 1.512e-3, 0, 1),
+    ("rim_compression", at_the_rims, 9.2111e-4, 2, 1),
+    ("uplift_height", opened, OPENING, 0, 2),
+    ("uplift_height", lifted, 2.98e-5, 3, 4),
+    ("uplift_duration", opened, 0.3, 0, 2),
+    ("uplift_duration", lifted, 0.04, 2, 4),
+    ("temperature", heated, 239.07, 0, 1),
+    ("axial_load", lambda: preset_run("fenz-test5"), LOAD, 0, 0),
+    ("axial_load", at_the_rims, 151.84e3, 1, 0),
+    ("displacement", lambda: preset_run("fenz-test5"), 0.13988, 0, 0),
+    ("displacement", at_the_rims, 0.06905, 2, 0),
+]
+
+
+@pytest.mark.parametrize(("key", "run", "value", "bearing", "surface"), REACHED)
+def test_a_limit_below_the_value_is_exceeded_and_one_above_is_not(
+    key: str, run: Any, value: float, bearing: int, surface: int
+) -> None:
+    result = run()
+    reading = judged(result, **{key: 1e-9 if key != "temperature" else 21.0}).worst[key]
+    assert reading.value.reached == pytest.approx(value, rel=0.02) and reading.exceeded
+    assert (reading.bearing, reading.value.surface) == (bearing, surface)
+    just = reading.value.reached
+    below, above = judged(result, **{key: just * (1 - 1e-9)}), judged(result, **{key: just * (1 + 1e-9)})
+    assert key in {one.limit.key for one in below.exceeded} and below.word == "exceeded" and not below.ok
+    assert key not in {one.limit.key for one in above.exceeded}
+    assert f"limit {reading.limit.shown(just)}" in below.text
+    if bearing:
+        assert result.scene.label(bearing - 1) in below.text
+    if surface:
+        assert f"surface {surface}" in below.text
+
+
+def test_every_limit_that_can_be_given_is_read() -> None:
+    assert {key for key, *_ in REACHED} == set(GIVEN) == {field.name for field in fields(Limits)}
+
+
+def test_the_defaults_are_those_of_the_page() -> None:
+    result = preset_run("fenz-test5")
+    worst, normal = result.verdict.worst, np.median(result.history.normal_force, axis=0)
+    assert worst["rim_force"].value.allowed == pytest.approx(RIM_SHARE * normal[0]) and result.verdict.ok
+    assert worst["travel"].value[2:] == (2.0, 3.0)
+    assert lifted().verdict.worst["uplift_height"].value.allowed == BEARING.arrays()["rim_offset"][3]
+    assert not {"rim_compression", "axial_load", "displacement"} & worst.keys()
+    assert Limits() == Limits(uplift_duration=0.1, temperature=250.0)
+
+
+def test_times_are_those_of_the_values() -> None:
+    spell = judged(opened(), uplift_duration=0.2).exceeded
+    assert [round(one.value.time, 2) for one in spell] == [4.0] and spell[0].value.reached == pytest.approx(
+        0.3, abs=0.01
+    )
+    reading = preset_run("fenz-test5").verdict.worst["rim_force"]
+    history = preset_run("fenz-test5").history
+    row = int(np.flatnonzero(history.time == reading.value.time)[0])
+    assert history.rim_force[row, 0] == history.rim_force[:, 0].max()
+
+
+def test_all_rims_at_one_time_leave_nothing_to_slide() -> None:
+    result = loops()
+    gap = result.history.gap.copy()
+    gap[100:110] = -1e-5
+    verdict = replace_history(result, gap=gap).verdict
+    assert [one.limit.key for one in verdict.exceeded] == ["travel"]
+    assert verdict.text == "exceeded: rims met at one time 4, limit 3 (1 s)"
+    gap[100:110, 3] = 1e-3
+    assert replace_history(result, gap=gap).verdict.ok
+
+
+@pytest.mark.parametrize(
+    ("note", "key", "text"),
+    [
+        (
+            Note(2.0, "rims", 4, 0.02, ""),
+            "beyond_rim",
+            "sliding beyond a rim that the model leaves out 20 mm, limit 0 mm",
+        ),
+        (Note(3.0, "footprint", 1, 0.06, ""), "face", "contact off the axis of the slider 60 mm, limit 51 mm"),
+        (Note(3.0, "heat", 1, 240.0, ""), "temperature", "temperature 260 degC, limit 250 degC (surface 1, 3 s)"),
+        (Note(3.0, "heat", 1, 200.0, ""), "", "within the limits"),
+        (Note(3.0, "rims", 1, 0.02, "", "rims = True"), "", "within the limits"),
+        (Note(3.0, "heat", 1, 300.0, "", "friction = pvt"), "", "within the limits"),
+    ],
+)
+def test_monitors_of_what_the_model_leaves_out_count(note: Note, key: str, text: str) -> None:
+    """Not where the run went on with a model that has the effect."""
+    result = preset_run("fenz-test2")
+    verdict = replace(result, notes=(note,)).verdict
+    assert [one.limit.key for one in verdict.exceeded] == [key] * bool(key) and text in verdict.text
+
+
+def test_without_a_model_of_rims_no_force_is_made_up() -> None:
+    """The sliding beyond the capacity is named in its place."""
+    beyond = changed_scene("fenz-test5", {"effects.rims": False})
+    verdict = simulate(beyond).verdict
+    assert {one.limit.key for one in verdict.exceeded} == {"beyond_rim"}
+    assert verdict.worst["rim_force"].value.reached == 0
+
+
+def test_a_failed_run_is_not_within() -> None:
+    failed = replace(preset_run("fenz-test5"), status="newton", message="stopped at t = 3 s")
+    assert failed.verdict.word == "failed" and not failed.verdict.ok and failed.verdict.text == "the run failed"
+    judgement = judged(failed, rim_force=1e3)
+    assert judgement.text.startswith("the run failed; until then exceeded: rim force 15.12 kN, limit 1 kN (surface 1, ")
+    pulled = changed_scene("fenz-test2", {"top": {"kind": "prescribed", "force": [0.0, 0.0, 1e4]}})
+    with pytest.raises(RunError, match="the interface would have to pull") as caught:
+        run_any(pulled)
+    assert caught.value.result is None or caught.value.result.verdict.word == "failed"
+
+
+def test_uplift_in_the_summary_and_in_tables() -> None:
+    assert opened().summary["uplift"] == {"height": OPENING, "duration": pytest.approx(0.3, abs=0.011), "count": 2}
+    assert loops().summary["uplift"] == {"height": 0.0, "duration": 0.0, "count": 0}
+    summary = lifted().summary["bearings"]
+    assert [bool(one["uplift"]["count"]) for one in summary] == [False, True, True, False]
+    assert summary[2]["uplift"]["height"] == lifted().extremes.lift[2].max() > 0
+    assert summary[2]["uplift"]["duration"] > 0.01
+    titles = [table.title for table in lifted().tables()]
+    assert "uplift of bearings" in titles and "uplift of bearings" not in [t.title for t in at_the_rims().tables()]
+    text = "\n".join(table.text for table in lifted().tables())
+    assert "height [mm]  longest [ms]  times" in text
+
+
+def test_tables_of_rims_name_the_surface() -> None:
+    summary, printed = at_the_rims().summary, repr(at_the_rims())
+    assert [one["rims_met"] for one in summary["bearings"]] == [[1, 4], [1], [1], [1, 4]]
+    assert summary["bearings"][1]["peak_rim_force"][0] == pytest.approx(9211.1, rel=1e-3)
+    assert "rims met          surfaces 1, 4 of 1, 4; 1 of 2, 3" in printed
+    assert "rim [kN]" in "\n".join(table.text for table in at_the_rims().bearings[0].tables())
+
+
+def test_a_bearing_of_a_building_has_its_own_verdict() -> None:
+    limits = Limits(rim_force=8e3)
+    result = replace(at_the_rims(), scene=replace(at_the_rims().scene, limits=limits))
+    assert [one.verdict.word for one in result.bearings] == ["within", "exceeded", "exceeded", "within"]
+    assert {reading.bearing for reading in result.verdict.exceeded} == {2, 3}
+    assert "bearing 2, surface 1" in result.verdict.text and "and 1 other bearing)" in result.verdict.text
+    assert result.summary["verdict"]["limits"] == "rim_force" and result.summary["verdict"]["word"] == "exceeded"
+    assert "verdict           exceeded: rim force 9.211 kN, limit 8 kN (bearing 2, surface 1," in repr(result)
+    row = next(row for row in result.verdict.table.rows if row[0] == "rim force")
+    assert row[1:4] == ("9.211 kN", "8 kN", "bearing 2, surface 1") and row[5] == "EXCEEDED"
+    assert result.verdict.table.title.endswith("exceeded by 2 bearings")
+
+
+@pytest.mark.parametrize("make", [lambda: preset_run("fenz-test5"), at_the_rims])
+def test_plain_data_of_a_verdict(make: Any) -> None:
+    verdict = judged(make(), rim_force=1.0).as_dict
+    assert json.loads(json.dumps(verdict, allow_nan=False)) == verdict
+    worst = max(verdict["exceeded"], key=lambda one: one["value"])
+    assert worst in verdict["largest"] and worst["limit"] == "rim_force" and worst["unit"] == "N"
+
+
+@pytest.mark.parametrize("name", [*presets.names("scene"), *sorted((ROOT / "examples").glob("*.toml"))], ids=str)
+def test_no_published_design_is_blamed(name: str | Path) -> None:
+    """Every preset scene and example, as it is, is within the limits that are not given."""
+    result = simulate(load_scene(name))
+    assert result.scene.limits is None and result.verdict.ok, result.verdict.text
+
+
+@pytest.mark.parametrize("name", presets.names("building"))
+def test_no_preset_building_is_blamed(name: str) -> None:
+    result = simulate(load_scene(name))
+    assert result.verdict.ok and result.verdict.text == "within the limits of the device"
+
+
+LIMITED = Limits(rim_force=12e3, uplift_height=1e-3, temperature=180.0, displacement=0.3)
+
+
+@pytest.mark.parametrize("kind", ["bearing", "building"])
+def test_limits_are_kept_in_files(kind: str, tmp_path: Path) -> None:
+    whole: Any = preset_run("fenz-test5") if kind == "bearing" else at_the_rims()
+    result = replace(whole, scene=replace(whole.scene, limits=LIMITED))
+    read = type(result).from_netcdf(result.to_netcdf(tmp_path / "run.nc"))
+    assert read.scene.limits == LIMITED and read.verdict.as_dict == result.verdict.as_dict
+    assert type(whole).from_netcdf(whole.to_netcdf(tmp_path / "other.nc")).scene.limits is None
+
+
+def test_limits_are_no_part_of_the_identity(tmp_path: Path) -> None:
+    """Neither of results nor of checkpoints: no number of a run depends on them."""
+    given: list[Scene | BuildingScene] = [load_scene("fenz-test1"), replace(scene(frame()), duration=0.05)]
+    for index, one in enumerate(given):
+        limited, file = replace(one, limits=LIMITED), tmp_path / f"{index}.ckpt"
+        assert fingerprint(limited) == fingerprint(one) and limited != one
+        before = simulate(one, checkpoint=file)
+        assert simulate(limited, checkpoint=file, resume=True).verdict.readings != before.verdict.readings
+
+
+BAD = [
+    ("rim_force = -1", "limits.rim_force = -1: give a finite number above 0 [N]"),
+    ("rim_force = '5 mm'", "limits.rim_force = '5 mm': the unit 'mm' is not a unit of [N]"),
+    ("uplift_height = 0", "limits.uplift_height = 0: give a finite number above 0 [m]"),
+    ("uplift_duration = nan", "limits.uplift_duration = nan: give a finite number above 0 [s]"),
+    ("temperature = -300", "limits.temperature = -300: give a finite number above -273.15 [degC]"),
+    ("axial_load = true", "limits.axial_load = True: give a finite number above 0 [N]"),
+    ("displacement = [1, 2]", "limits.displacement = [1, 2]: give a finite number above 0 [m]"),
+    ("rimforce = 1", "limits.rimforce: unknown key; did you mean 'rim_force'?"),
+    ("gap = 1", "limits.gap: unknown key; the keys here are rim_force, "),
+]
+BUILDING = (
+    'building = { base = { mass = "45 t", inertia = [1e5, 1e5, 1e5] }, interface = { stiffness = 1e8, '
+    "vertical_stiffness = 5e8, rotational_stiffness = 1e7 }, "
+    'bearing = [{ bearing = "fenz-tfp", position = [0.0, 0.0] }] }\n'
+    'motion = { kind = "harmonic", amplitude = 0.05, frequency = 0.6 }\n'
+)
+
+
+@pytest.mark.parametrize(("line", "message"), BAD)
+@pytest.mark.parametrize("kind", ["bearing", "building"])
+def test_bad_limits_are_one_line(kind: str, line: str, message: str, tmp_path: Path, capsys: Any) -> None:
+    text = (ROOT / "examples" / "triple.toml").read_text(encoding="utf-8") if kind == "bearing" else BUILDING
+    (tmp_path / "scene.toml").write_text(f"{text}\n[limits]\n{line}\n", encoding="utf-8")
+    assert main(["run", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "out.nc")]) == 2
+    error = capsys.readouterr().err
+    assert message in error and len(error.splitlines()) == 1 and not (tmp_path / "out.nc").exists()
+
+
+def test_limits_of_a_file_and_of_python() -> None:
+    with pytest.raises(InputError, match=r"limits\.rim_force = -1\.0: give a finite number above 0 \[N\]"):
+        Limits(rim_force=-1.0)
+    with pytest.raises(InputError, match=r"scene\.limits = .*: give a Limits"):
+        replace(load_scene("fenz-test1"), limits={"rim_force": 1.0})
+    with pytest.raises(InputError, match=r"scene\.limits = 3: give a Limits"):
+        replace(scene(frame()), limits=3)  # type: ignore[arg-type]
+    changed = changed_scene("fenz-test1", {"limits.rim_force": "12 kN"})
+    assert changed.limits == Limits(rim_force=12e3)
+    assert changed_scene("hospital-ccc", {"limits.axial_load": 3e6}).limits == Limits(axial_load=3e6)
