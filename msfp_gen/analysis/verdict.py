@@ -167,7 +167,7 @@ class Verdict:
             beyond = "EXCEEDED" if reading.exceeded else "within"
             place = (reading.place or "-") if reached else "-"
             rows.append((limit.name, limit.shown(reached), limit.shown(allowed), place, when, beyond))
-        title = f"limits of the device, largest values: {self.word if self.failure else self._summary}"
+        title = f"limits of the device: {self.word if self.failure else self._summary}"
         return Table(title, ("limit", "value", "allowed", "where", "time [s]", ""), rows)
 
     @property

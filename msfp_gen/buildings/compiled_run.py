@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, vectors
+from msfp_gen.buildings.extremes import BuildingExtremes, lift_of, padded, temperature_of, vectors
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array, parts
@@ -71,7 +71,7 @@ def earlier_work(changes: Sequence[Change], bearing: int, shape: tuple[int, ...]
     return found
 
 
-OF_SURFACES = ("normal", "sliding", "rim", "compression")  # of the row of a bearing; the last only with uplift
+OF_SURFACES = ("normal", "sliding", "rim", "compression", "temperature")  # of a row; not every model has the last two
 KEPT = (*OF_SURFACES, "kinetic", "potential", "rim_stored", "seat_stored", "work")
 
 
@@ -347,6 +347,9 @@ def result_of(run: BuildingRun) -> BuildingResult:
         sliding=padded([rows[f"sliding {i}"] for i in range(count)], np.nan),
         rim_force=padded([rows[f"rim {i}"] for i in range(count)], np.nan),
         lift=padded([lift_of(rows[f"compression {i}"]) for i in range(count)], np.nan),
+        temperature=padded(
+            [temperature_of(run.scene.bearings[i].bearing, rows[f"temperature {i}"]) for i in range(count)], np.nan
+        ),
         dissipated=np.stack([sum((work[name] for name in DISSIPATED), np.zeros(1)) for work in works], axis=1),
         stored=np.stack([_stored(run, rows, i) + works[i]["friction_stored"] for i in range(count)], axis=1),
         damped=rows["damped"],

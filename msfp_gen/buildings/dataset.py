@@ -173,7 +173,7 @@ STORED = {
     **_wrenches(0, "lower"),
     **_wrenches(1, "upper"),
     "normal_force": _of_bearings("normal_force", "normal_force", "compression"),
-    **{name: _of_bearings(name, name) for name in ("sliding", "rim_force", "lift")},
+    **{name: _of_bearings(name, name) for name in ("sliding", "rim_force", "lift", "temperature")},
     **_motions("support", VECTORS, "{} of the ground below the bearing"),
     "dissipated": Variable(OF_BEARING, "J", "energy dissipated in the bearing", "dissipated"),
     "stored": Variable(OF_BEARING, "J", "energy stored in the bearing and its interface", "stored"),
@@ -206,8 +206,8 @@ DERIVED = {
 }
 VARIABLES = STORED | DERIVED
 # Of one bearing of a building: variables of a bearing alone, and others that its result has.
-ALONE = ("normal_force", "sliding", "gap", "rim_force", "lift", "base_displacement", "displacement", "top_force")
-OF_ONE = {name: ONE_BEARING[name] for name in ("time", *ALONE, "top_moment")}
+ALONE = ("normal_force", "sliding", "gap", "rim_force", "lift", "temperature", "base_displacement", "displacement")
+OF_ONE = {name: ONE_BEARING[name] for name in ("time", *ALONE, "top_force", "top_moment")}
 OF_ONE |= {name: VARIABLES[name]._replace(dims=ALL) for name in ("axial_force", "dissipated", "stored")}
 
 

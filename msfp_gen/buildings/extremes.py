@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.common.arrays import Array, parts
+from msfp_gen.specification.friction_laws import HEAT
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.scene import BuildingScene
+    from msfp_gen.scene.bearing import Bearing
 
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
 CORNERS = 4  # of the plan
@@ -27,7 +29,7 @@ DIMENSIONS = {
     "energy": ("kind",),
     **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
     "axial_force": ("bearing", "end"),
-    **dict.fromkeys(("sliding", "rim_force", "lift"), ("bearing", "surface")),
+    **dict.fromkeys(("sliding", "rim_force", "lift", "temperature"), ("bearing", "surface")),
     "normal_force": ("bearing", "end", "surface"),
 }
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
@@ -43,10 +45,9 @@ class BuildingExtremes:
     and E2 [N m]; storey_shear, base_reaction and top_force of the bearings [N]; bearing_displacement, base less top
     [m]. Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,)
     [rad]; energy: kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2)
-    [N];
-    normal_force, shape (bearings, 2, surfaces) [N]. sliding [m], rim_force [N] and lift, the clearance
-    between separated faces [m]: largest, shape (bearings, surfaces). A bearing with
-    fewer surfaces than another has zeros in the place of the others.
+    [N]; normal_force, shape (bearings, 2, surfaces) [N]. Largest, shape (bearings, surfaces): sliding [m], rim_force
+    [N], lift, the clearance between separated faces [m], and temperature [degC]. A bearing with fewer surfaces than
+    another has zeros in the place of the others.
     """
 
     node_acceleration: Array
@@ -67,6 +68,7 @@ class BuildingExtremes:
     sliding: Array
     rim_force: Array
     lift: Array
+    temperature: Array
     normal_force: Array
 
     @classmethod
@@ -111,6 +113,12 @@ class BuildingExtremes:
             sliding=padded(of_bearings("most sliding")),
             rim_force=padded(of_bearings("most rim")),
             lift=padded([lift_of(values) for values in of_bearings("least compression")]),
+            temperature=padded(
+                [
+                    temperature_of(one.bearing, hottest)
+                    for one, hottest in zip(scene.bearings, of_bearings("most temperature"), strict=True)
+                ]
+            ),
             normal_force=np.stack([padded(of_bearings(f"{word} normal")) for word in ("least", "most")], axis=1),
         )
 
@@ -172,6 +180,17 @@ def lift_of(compression: Array) -> Array:
     """Clearance between separated faces, of the compression of unilateral contacts, shape (..., surfaces) [m]."""
     opening: Array = np.maximum(0.0, -compression) + 0.0  # no -0.0
     return opening
+
+
+def temperature_of(bearing: Bearing, recorded: Array) -> Array:
+    """Temperatures at the centres of surfaces, shape (..., surfaces) [degC].
+
+    recorded: 0 where the model has none; the surface is then as at the start.
+    """
+    start = [
+        HEAT["start_temperature"] if x.start_temperature is None else x.start_temperature for x in bearing.surfaces
+    ]
+    return np.where(recorded == 0.0, np.array(start, dtype=float), recorded)
 
 
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:

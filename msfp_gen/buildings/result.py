@@ -51,16 +51,17 @@ class BuildingResult(AnyResult):
 
     time: ndarray, shape (k,) [s]. displacement, velocity, acceleration: of the coordinates, shape (k, n), relative to
     the place at rest, in axes that do not move with the ground: accelerations are absolute. ground: displacement,
-    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape
-    (k, bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape
-    (k, bearings, 2, 6) [N], [N m]. normal_force, sliding, rim_force, and
-    lift, the clearance between separated faces: of the surfaces of each bearing, shape (k, bearings, most surfaces)
-    [N], [m], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]: dissipated:
-    in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of the building;
-    received: work of the bearings on the building, by their forces beyond those at rest; input: work of the ground.
-    counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the number of its
-    bearing. recorded_extremes: over all steps; None: not recorded. status: "ok" or the name of a failure; message: one
-    line of text, "" for a run that succeeded. provenance: versions with which the result was computed. wall_time [s].
+    velocity and acceleration of the ground, shape (k, 3, 3) [m]. support: of the ground below each bearing, shape (k,
+    bearings, 3, 3). wrench: force and moment that the lower and the upper end of each bearing exert on it, shape (k,
+    bearings, 2, 6) [N], [N m]. normal_force, sliding, rim_force, lift, the clearance between separated faces, and
+    temperature, at the start where a model has none: of the surfaces of each bearing, shape (k, bearings, most
+    surfaces) [N], [m], [degC], NaN where a bearing has no such surface. Energies, shape (k,) or (k, bearings) [J]:
+    dissipated: in each bearing; stored: in each bearing, with the springs of its interface; damped: by the damping of
+    the building; received: work of the bearings on the building, by their forces beyond those at rest; input: work of
+    the ground. counters: of the work of the solver. monitored: notes of the monitors of the bearings, each with the
+    number of its bearing. recorded_extremes: over all steps; None: not recorded. status: "ok" or the name of a failure;
+    message: one line of text, "" for a run that succeeded. provenance: versions with which the result was computed.
+    wall_time [s].
     """
 
     source: ClassVar[str] = "msfp-gen building"
@@ -75,6 +76,7 @@ class BuildingResult(AnyResult):
     sliding: Array
     rim_force: Array
     lift: Array
+    temperature: Array
     dissipated: Array
     stored: Array
     damped: Array
@@ -191,7 +193,10 @@ class BuildingResult(AnyResult):
         nodes = np.reshape([self.node(name) for name in names], (len(names), len(self.time), 3, 6))
         across = -np.moveaxis(self.bearing_displacement, 1, 0)
         normal = np.nan_to_num(self.normal_force)
-        most = {name: np.nan_to_num(getattr(self, name)).max(axis=0) for name in ("sliding", "rim_force", "lift")}
+        most = {
+            name: np.nan_to_num(getattr(self, name)).max(axis=0)
+            for name in ("sliding", "rim_force", "lift", "temperature")
+        }
         force, axial = np.moveaxis(self.wrench[:, :, 1, :3], 1, 0), self.axial_force
         base = scene.bearings[0].node
         return BuildingExtremes(
@@ -374,9 +379,9 @@ class BearingResult(AnyResult, HorizontalMotion):
     values. time: shape (k,) [s]. base_displacement: of the ground below the bearing; displacement: across the bearing
     and its interface, base less top, shape (k, 3) [m]. top_force, top_moment: on the building, the moment about the
     upper end of the bearing, shape (k, 3) [N], [N m]. axial_force: compression between bearing and building, shape (k,)
-    [N]. sliding (3.20), gap to the rims (3.21), rim_force, normal_force, lift, the clearance between separated faces:
-    of the surfaces, shape (k, n-1) [m], [N]. dissipated: energy in the bearing since the start; stored: in the bearing
-    and its interface, shape (k,) [J].
+    [N]. sliding (3.20), gap to the rims (3.21), rim_force, normal_force, lift, the clearance between separated faces,
+    temperature: of the surfaces, shape (k, n-1) [m], [N], [degC]. dissipated: energy in the bearing since the start;
+    stored: in the bearing and its interface, shape (k,) [J].
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
@@ -397,6 +402,7 @@ class BearingResult(AnyResult, HorizontalMotion):
     gap: Array
     rim_force: Array
     lift: Array
+    temperature: Array
     normal_force: Array
     dissipated: Array
     stored: Array
@@ -426,6 +432,7 @@ class BearingResult(AnyResult, HorizontalMotion):
             gap=bearing.arrays()["capacity"] - building.sliding[own],
             rim_force=building.rim_force[own],
             lift=building.lift[own],
+            temperature=building.temperature[own],
             normal_force=building.normal_force[own],
             dissipated=building.dissipated[:, index],
             stored=building.stored[:, index],
@@ -492,6 +499,7 @@ class BearingResult(AnyResult, HorizontalMotion):
             most_normal=most,
             rim_force=peaks.rim_force[own],
             lift=peaks.lift[own],
+            temperature=peaks.temperature[own],
         )
 
     @cached_property
@@ -500,11 +508,13 @@ class BearingResult(AnyResult, HorizontalMotion):
 
         Keys that `Result.summary` has too: peak_displacement and peak_force along E1, E2, E3 and radial [m], [N];
         axial_load at rest [N], and peak_force_ratio over it [-]; peak_sliding and minimum_gap [m]; rims_met (surfaces);
-        minimum_normal_force and maximum_normal_force, peak_rim_force [N]; uplift: height [m], duration [s] and count;
-        verdict. Others: number (from 1), name, layout, position;
+        minimum_normal_force and maximum_normal_force, peak_rim_force [N], peak_temperature [degC] where the friction
+        heats; uplift: height [m], duration [s] and count; verdict. Others: number (from 1), name, layout, position;
         minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
+        hottest = self.building.extremes.temperature[self.index, : self.surfaces]
+        heated = {"peak_temperature": hottest.tolist()} if (hottest > self.temperature[0]).any() else {}
         return {
             "number": self.index + 1,
             "name": self.scene.bearings[self.index].name,
@@ -513,6 +523,7 @@ class BearingResult(AnyResult, HorizontalMotion):
             **peaks_of_bearing(self.extremes, self.axial_load),
             "minimum_load_ratio": float(least),
             "maximum_load_ratio": float(most),
+            **heated,
             "uplift": uplift_of(self, self.extremes),
             "verdict": self.verdict.as_dict,
             "rims_met": (np.flatnonzero(self.extremes.gap <= 0) + 1).tolist(),

@@ -140,7 +140,7 @@ def _bearings(bearings: Sequence[Mapping[str, Any]]) -> Table:
         for each in bearings
     ]
     columns = ("no.", "name", "u [mm]", "F [kN]", "N at rest [kN]", "N / N at rest", "least left [mm]", "rims")
-    return Table("peaks of bearings; left: capacity less sliding; rims: surfaces that met theirs", columns, rows)
+    return Table("peaks of bearings; left: capacity less sliding; rims: surfaces", columns, rows)
 
 
 def _uplift(bearings: Sequence[Mapping[str, Any]]) -> Table:

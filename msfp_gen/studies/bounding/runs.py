@@ -7,6 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError, RunError
@@ -211,26 +213,22 @@ def _case(name: str, scene: AnyScene, result: Any) -> Case:
 def bounded_scenes(scene: AnyScene, table: FactorTable) -> dict[str, AnyScene]:
     """Case -> the scene with its properties multiplied; "nominal" is `scene` itself.
 
-    The bearings of a building have the same effects in all cases, nominal too: with uplift where any case needs it.
-    Raises InputError as `bound`.
+    The bearings of a building begin with the same effects in all cases, nominal too: with uplift where any case needs
+    it. Raises InputError as `bound`.
     """
     scenes = {case: bounded_scene(scene, table, case) for case in CASES}
-    buildings = [each for each in scenes.values() if isinstance(each, BuildingScene)]
-    if not buildings:
-        return scenes
-    common = [
-        max(effects_of_cases, key=lambda effects: effects.uplift)
-        for effects_of_cases in zip(*(b.modelled for b in buildings), strict=True)
+    buildings = {case: each for case, each in scenes.items() if isinstance(each, BuildingScene)}
+    lifting = np.any([[effects.uplift for effects in each.modelled] for each in buildings.values()], axis=0)
+    return scenes | {case: _lifting(each, lifting) for case, each in buildings.items()}
+
+
+def _lifting(scene: BuildingScene, lifting: Sequence[bool]) -> BuildingScene:
+    """The scene with uplift from the start in some of its bearings; the others may take it in on the way."""
+    bearings = [
+        replace(one, effects=replace(one.effects or Auto(), uplift=True)) if lifts and not effects.uplift else one
+        for one, lifts, effects in zip(scene.bearings, lifting, scene.modelled, strict=True)
     ]
-    return {
-        case: replace(
-            each,
-            bearings=[replace(one, effects=chosen) for one, chosen in zip(each.bearings, common, strict=True)],
-        )
-        if isinstance(each, BuildingScene) and each.modelled != tuple(common)
-        else each
-        for case, each in scenes.items()
-    }
+    return scene if bearings == list(scene.bearings) else replace(scene, bearings=bearings)
 
 
 def bounded_scene(scene: AnyScene, table: FactorTable, case: str) -> AnyScene:

@@ -15,6 +15,7 @@ from support.buildings import BEARING, frame, rocking, scene
 from support.synthetic import LOAD, loops
 
 from msfp_gen import (
+    Auto,
     BuildingScene,
     Effects,
     InputError,
@@ -66,6 +67,15 @@ def lifted() -> BuildingResult:
 
 
 @cache
+def heated_building() -> BuildingResult:
+    """The frame with friction that depends on temperature, after a second of its motion."""
+    bearing = BEARING.replace(reference_pressure=1.37e7)
+    made = scene(frame(), bearing=bearing, duration=1.0)
+    hot = [replace(one, effects=Auto(friction="pvt")) for one in made.bearings]
+    return simulate(replace(made, bearings=hot))
+
+
+@cache
 def heated() -> Result:
     return simulate(load_scene(ROOT / "examples" / "heating.toml"))
 
@@ -85,6 +95,7 @@ REACHED: list[tuple[str, Any, float, int, int]] = [  # limit, run, value, bearin
     ("uplift_duration", opened, 0.3, 0, 2),
     ("uplift_duration", lifted, 0.04, 2, 4),
     ("temperature", heated, 239.07, 0, 1),
+    ("temperature", heated_building, 27.66, 1, 1),
     ("axial_load", lambda: preset_run("fenz-test5"), LOAD, 0, 0),
     ("axial_load", at_the_rims, 151.84e3, 1, 0),
     ("displacement", lambda: preset_run("fenz-test5"), 0.13988, 0, 0),
@@ -199,6 +210,16 @@ def test_uplift_in_the_summary_and_in_tables() -> None:
     assert "uplift of bearings" in titles and "uplift of bearings" not in [t.title for t in at_the_rims().tables()]
     text = "\n".join(table.text for table in lifted().tables())
     assert "height [mm]  longest [ms]  times" in text
+
+
+def test_temperatures_of_a_building_begin_at_the_start() -> None:
+    hot, cold = heated_building(), at_the_rims()
+    assert np.all(hot.temperature[0] == 20.0) and np.all(np.diff(hot.temperature, axis=0).max(axis=0) > 0)
+    assert np.all(cold.temperature == 20.0) and np.all(cold.extremes.temperature == 20.0)
+    assert hot.summary["bearings"][0]["peak_temperature"] == hot.extremes.temperature[0].tolist()
+    assert hot.extremes.temperature == pytest.approx(hot.temperature.max(axis=0), rel=1e-2)
+    assert "peak_temperature" not in cold.summary["bearings"][0]
+    assert "peak T [degC]" in "\n".join(table.text for table in hot.bearings[0].tables())
 
 
 def test_tables_of_rims_name_the_surface() -> None:

@@ -95,7 +95,7 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     """Variables, units and meanings of its dataset, keys of its summary, quantities of its characterisation, files."""
     one, alone = result().bearings[1], loops_of_one()
     for name, variable in one.dataset.data_vars.items():
-        assert name in alone.dataset or name in ("axial_force", "dissipated", "stored")
+        assert name in alone.dataset or name in ("axial_force", "dissipated", "stored", "temperature")
         if name in alone.dataset:
             assert variable.dims == alone.dataset[name].dims and variable.attrs == alone.dataset[name].attrs
     assert np.array_equal(one.dataset["top_force"], one.top_force) and one.dataset.sizes["surface"] == 4

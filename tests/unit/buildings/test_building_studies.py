@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from msfp_gen import BuildingScene, InputError, bound, changed_scene, simulate, simulate_batch, study
+from msfp_gen import Auto, BuildingScene, Effects, InputError, bound, changed_scene, simulate, simulate_batch, study
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
-from msfp_gen.studies.bounding import load_factors
+from msfp_gen.studies.bounding import bounded_scenes, load_factors
 from msfp_gen.studies.bounding.output import bounding_tables, plot_bounds, write_quantities
+from msfp_gen.studies.bounding.runs import bounded_scene
 from msfp_gen.studies.study.loader import load_study
 
 TEXT = """
@@ -86,6 +88,21 @@ def test_bounds_multiply_the_properties_of_every_bearing(path: Path, tmp_path: P
     rows = list(csv.reader(write_quantities(found, tmp_path / "bounds.csv").read_text(encoding="utf-8").splitlines()))
     assert [row[0] for row in rows if "floor" in row[0]] == ["peak_floor_acceleration [m/s^2]"]
     assert found.bearing == scene.bearings[0].bearing
+
+
+def test_bearings_of_bounds_may_take_uplift_in_on_the_way():
+    """All cases begin with it where any case needs it; the others keep their monitors, as in a run of its own."""
+    scene = changed_scene("hospital-ccc", {"motion.scale": 1.5})
+    cases = bounded_scenes(scene, load_factors("asce7"))
+    alone = [[e.uplift for e in bounded_scene(scene, load_factors("asce7"), case).modelled] for case in cases]
+    wanted = [any(lifts) for lifts in zip(*alone, strict=True)]
+    assert any(wanted) and not all(wanted)
+    for case in cases.values():
+        assert [effects.uplift for effects in case.modelled] == wanted
+        asked = [isinstance(one.effects, Auto) and one.effects.uplift is not False for one in case.bearings]
+        assert all(asked) and {effects.friction for effects in case.modelled} == {"pvt"}
+    given = replace(scene, bearings=[replace(one, effects=Effects()) for one in scene.bearings])
+    assert all(case.modelled == given.modelled for case in bounded_scenes(given, load_factors("asce7")).values())
 
 
 def test_a_batch_gives_the_results_of_simulate(path: Path):
