@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
-from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets
+from msfp_gen import Auto, BaseSlab, Bearing, Building, Effects, Motion, Solver, Storey, Top, presets, simulate
+from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 
 BEARING = presets.bearing("fenz-tfp").replace(contact_damping=1e-4)
@@ -56,3 +58,18 @@ def scene(building: Building, rtol: float = 1e-4, bearing: Bearing = BEARING, **
     bearings = [BuildingBearing(bearing, interface, place) for place in PLACES]  # type: ignore[arg-type]
     made = BuildingScene(building, bearings, MOTION, Solver(rtol=rtol), 2.0)
     return replace(made, **changes)  # type: ignore[arg-type]
+
+
+@cache
+def pushed_scene() -> BuildingScene:
+    """The frame on four bearings, of which two have names, under a short push along E1 and E2."""
+    push = Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1)
+    given = scene(frame(), motion=push, duration=0.8, output_step=0.02, name="frame")
+    named = zip(given.bearings, ("A", "B", "", ""), strict=True)
+    return replace(given, bearings=[replace(each, name=name) for each, name in named])
+
+
+@cache
+def pushed() -> BuildingResult:
+    """The run of that scene."""
+    return simulate(pushed_scene())

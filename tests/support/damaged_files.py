@@ -91,7 +91,7 @@ def main(whole: Path, first: int, count: int) -> None:
     path = whole.with_name(f"damaged-{whole.name}")
     holes = list(emptied_heaps(content)) if first < 0 else []
     for seed in range(first, first + count):
-        path.write_bytes(holes[seed] if seed < 0 else damaged(content, seed))
+        path.write_bytes(holes[-1 - seed] if seed < 0 else damaged(content, seed))
         print(f"seed {seed}", flush=True)
         signal.alarm(SECONDS)  # ends the process, whatever it does
         try:

@@ -6,12 +6,13 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.buildings import BEARING, INTERFACE, frame, scene
+from support.buildings import BEARING, INTERFACE, frame, pushed, pushed_scene, scene
 
 from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects, Motion, RunError, Storey, simulate
 from msfp_gen.buildings.result import BuildingResult
@@ -25,8 +26,7 @@ FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftsh
 
 @cache
 def result() -> BuildingResult:
-    motion = Motion.harmonic(0.05, 0.6, direction=0.4, cycles=1)
-    return simulate(scene(frame(), motion=motion, duration=0.8, output_step=0.02, name="frame <b>"))
+    return replace(pushed(), scene=replace(pushed_scene(), name="frame <b>"))
 
 
 @cache
