@@ -282,8 +282,20 @@ def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:
     return read
 
 
-def _face(bearing: Bearing, surface: int) -> float:
+def _radius(bearing: Bearing, surface: int) -> float:
+    """Radius of the face of a slider [m]; surface from 1."""
     return float(bearing.arrays()["rim_radius"][bearing.slider(surface - 1)])
+
+
+def _face(one: Judged, limits: Limits) -> Iterator[Value]:
+    """As recorded of a bearing of a building, or as the note of a bearing alone states it."""
+    offsets, times = one.extremes.contact_offset, one.extremes.contact_time
+    if offsets is None or times is None:
+        yield from _noted("footprint", _radius)(one, limits)
+        return
+    for surface, (offset, time) in enumerate(zip(offsets.tolist(), times.tolist(), strict=True), start=1):
+        if (radius := _radius(one.bearing, surface)) > 0:  # else no face is known
+            yield Value(surface, time, offset, radius)
 
 
 LIMITS = (
@@ -293,7 +305,7 @@ LIMITS = (
     Limit("beyond_rim", "sliding beyond a rim that the model leaves out", "m", _noted("rims", lambda *_: 0.0)),
     Limit("uplift_height", "opening of a surface", "m", _uplift_height),
     Limit("uplift_duration", "time for which a surface is open", "s", _uplift_duration),
-    Limit("face", "contact off the axis of the slider", "m", _noted("footprint", _face)),
+    Limit("face", "contact off the axis of the slider", "m", _face),
     Limit("temperature", "temperature", "degC", _temperature),
     Limit("axial_load", "axial load", "N", _axial_load),
     Limit("displacement", "displacement", "m", _displacement),

@@ -128,6 +128,15 @@ class Member:
         return np.concatenate([values.ravel() for values in kept])
 
     @property
+    def faces(self) -> list[int]:
+        """Where the contacts are in the row of its model, as MSFP_FACES of msfp_building.h; not checked with uplift."""
+        layout, row = self.rest.bearing.layout, [(name, tuple(shape)) for name, shape in self.model.extension.ROW]
+        sizes = [int(np.prod(shape, dtype=int)) for _, shape in row]
+        starts = dict(zip((name for name, _ in row), np.cumsum([0, *sizes]).tolist(), strict=False))
+        places = [starts[name] for name in ("normal", "angles", "q")]
+        return [not self.effects.uplift, layout.surfaces, layout.m, *places, dict(row)["q"][1]]
+
+    @property
     def work(self) -> Array:
         """Integrals of its powers since its model began, at the committed state [J]."""
         found: Array = self.model.unpack(self.port.row)["work"]
@@ -166,7 +175,7 @@ class Run(AnyRun, Protocol):
     def ends(self, bearing: int) -> Array:
         """Motion of the ends of a bearing, from 0, at the present state, shape (2, 3, 6)."""
 
-    def replace(self, bearing: int, port: Port, entries: Array) -> None:
+    def replace(self, bearing: int, port: Port, entries: Array, faces: Sequence[int]) -> None:
         """Continue with another two-port of a bearing in that state."""
 
     def advance(self, steps: int) -> bool:
@@ -218,7 +227,7 @@ class BuildingRun:
         """Put a member in place of the one of an earlier model."""
         self.members[change.bearing] = member
         self.changes.append(change)
-        self.run.replace(change.bearing, member.port, member.entries)
+        self.run.replace(change.bearing, member.port, member.entries, member.faces)
 
     def switch(self) -> bool:
         """Continue with other models of bearings, where the run has ended and their effects permit it.
@@ -289,6 +298,7 @@ def start_run(scene: BuildingScene, threads: int | None = None) -> BuildingRun:
         pieces,
         ground_of,
         [member.entries for member in members],
+        [member.faces for member in members],
         vectors(scene),
         scene.places - scene.mass_centre,
         weight=float(scene.axial_loads.sum()),

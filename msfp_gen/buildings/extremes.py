@@ -29,7 +29,9 @@ DIMENSIONS = {
     "energy": ("kind",),
     **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
     "axial_force": ("bearing", "end"),
-    **dict.fromkeys(("sliding", "rim_force", "lift", "temperature"), ("bearing", "surface")),
+    **dict.fromkeys(
+        ("sliding", "rim_force", "lift", "temperature", "contact_offset", "contact_time"), ("bearing", "surface")
+    ),
     "normal_force": ("bearing", "end", "surface"),
 }
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
@@ -46,7 +48,8 @@ class BuildingExtremes:
     [m]. Largest magnitudes: storey_torsion, shape (storeys,), base_torsion, shape (1,) [N m]; base_twist, shape (1,)
     [rad]; energy: kinetic and strain energy, shape (2,) [J]. Least and largest value: axial_force, shape (bearings, 2)
     [N]; normal_force, shape (bearings, 2, surfaces) [N]. Largest, shape (bearings, surfaces): sliding [m], rim_force
-    [N], lift, the clearance between separated faces [m], and temperature [degC]. A bearing with fewer surfaces than
+    [N], lift, the clearance between separated faces [m], temperature [degC], and contact_offset, of a loaded contact
+    from the axis of its slider [m], at contact_time [s], in models without uplift. A bearing with fewer surfaces than
     another has zeros in the place of the others.
     """
 
@@ -69,6 +72,8 @@ class BuildingExtremes:
     rim_force: Array
     lift: Array
     temperature: Array
+    contact_offset: Array
+    contact_time: Array
     normal_force: Array
 
     @classmethod
@@ -92,6 +97,7 @@ class BuildingExtremes:
         for i, numbers in enumerate(kept):
             shapes += [(f"displacement {i}", (VECTOR,)), (f"force {i}", (VECTOR,)), (f"axial {i}", (2,))]
             shapes += [(f"{word} {name} {i}", shape) for word in ("least", "most") for name, shape in numbers]
+            shapes.append((f"contact {i}", (scene.bearings[i].bearing.layout.surfaces, 2)))
         values = parts(recorded, shapes)
 
         def of_bearings(name: str) -> list[Array]:
@@ -113,6 +119,13 @@ class BuildingExtremes:
             sliding=padded(of_bearings("most sliding")),
             rim_force=padded(of_bearings("most rim")),
             lift=padded([lift_of(values) for values in of_bearings("least compression")]),
+            contact_offset=padded(
+                [
+                    one.bearing.arrays()["radius"] * contacts[:, 0]
+                    for one, contacts in zip(scene.bearings, of_bearings("contact"), strict=True)
+                ]
+            ),
+            contact_time=padded([contacts[:, 1] for contacts in of_bearings("contact")]),
             temperature=padded(
                 [
                     temperature_of(one.bearing, hottest)

@@ -216,6 +216,7 @@ class BuildingResult(AnyResult):
             top_force=largest(force),
             axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
             **most,
+            **dict.fromkeys(("contact_offset", "contact_time"), np.zeros_like(most["lift"])),
             normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
         )
 
@@ -500,6 +501,8 @@ class BearingResult(AnyResult, HorizontalMotion):
             rim_force=peaks.rim_force[own],
             lift=peaks.lift[own],
             temperature=peaks.temperature[own],
+            contact_offset=peaks.contact_offset[own],
+            contact_time=peaks.contact_time[own],
         )
 
     @cached_property

@@ -23,7 +23,8 @@ class Extremes:
     Per surface, shape (n-1,): sliding, the largest, and gap, the least [m]; least_normal, most_normal [N]; slip_speed,
     the largest, while the surface is closed [m/s], None of a bearing of a building; least_friction, most_friction,
     where a friction law acts; temperature, the highest, where it heats [degC]; rim_force [N] and lift [m], the largest,
-    which a bearing that is not below a building records in rows alone.
+    which a bearing that is not below a building records in rows alone; contact_offset, the distance of a loaded contact
+    from the axis of its slider [m], and contact_time [s], of a bearing of a building alone.
     """
 
     displacement: Array
@@ -38,6 +39,8 @@ class Extremes:
     temperature: Array | None = None
     rim_force: Array | None = None
     lift: Array | None = None
+    contact_offset: Array | None = None
+    contact_time: Array | None = None
 
     @classmethod
     def of_rows(cls, history: History) -> Extremes:

@@ -75,7 +75,7 @@ struct msfp_building {
     int status, bearing, surface;
     double value;
     uint64_t identity; /* of all that the run computes from but its two-ports */
-    int *entries;  /* as in the scene, of the present models */
+    int *entries, *faces; /* as in the scene, of the present models */
     double *peaks; /* see peaks.c */
     double *rows;
     size_t row_count, row_capacity;

@@ -27,6 +27,20 @@ typedef struct {
                   int *info);
 } msfp_lapack;
 
+/* Where the contacts of a bearing are in the row of its model: number of surfaces, and of those concave up; indices of the
+ * first normal force, contact angle and tilt, and how many coordinates each body has. Not checked: contacts on edges are
+ * modelled. */
+enum {
+    MSFP_FACES_CHECKED,
+    MSFP_FACES_SURFACES,
+    MSFP_FACES_UPWARD,
+    MSFP_FACES_NORMAL,
+    MSFP_FACES_ANGLES,
+    MSFP_FACES_TILTS,
+    MSFP_FACES_STRIDE,
+    MSFP_FACES
+};
+
 enum { MSFP_WRENCH = 6, MSFP_GROUND = 9 }; /* displacement, velocity and acceleration along E1, E2, E3 */
 
 /* What a run is given; arrays must outlive it. */
@@ -40,6 +54,7 @@ typedef struct {
     const msfp_piecewise *ground;             /* [grounds] motions, of which channels 0 to 2 are used */
     const int *entry_count;                   /* [bearings] numbers kept of the rows of each bearing, */
     const int *entries;                       /* one bearing after the other: their indices; -1: 0 */
+    const int *faces;                         /* [bearings][MSFP_FACES] where contacts are in these rows, see below */
     double weight;                            /* scale of forces [N] */
     int vectors;                              /* of the building, whose peaks are kept: */
     const int *vector_orders;                 /* [vectors] 0: of the coordinates, 1, 2: of their derivatives; */
@@ -88,14 +103,15 @@ const double *msfp_building_rows(const msfp_building *b);
  * the plane of E1 and E2. Of the building: of each vector; of the sum of the forces of the ground; its largest torsion;
  * kinetic and strain energy. Of each bearing: of the displacement of its lower end less that of the upper one; of the
  * force on the upper end; the least and the largest compression there; the least value of each kept number of its rows;
- * their largest values. */
+ * their largest values; of each surface the largest sine of the angle at its sphere centre between the contact and the
+ * axis of the slider while it is loaded, and when [s]. */
 size_t msfp_building_peak_count(const msfp_building *b);
 const double *msfp_building_peaks(const msfp_building *b);
 /* Motion of the ends [2][3][6] of a bearing, counted from 0, at the present state. */
 void msfp_building_ends(msfp_building *b, int bearing, double *ends);
 /* The two-port of a bearing, counted from 0, was replaced in the scene by one of another model in the present state;
- * entries: the indices into its rows. The run goes on, also after a failure. Returns MSFP_OK or a status. */
-int msfp_building_replaced(msfp_building *b, int bearing, const int *entries);
+ * entries, faces: of its rows. The run goes on, also after a failure. Returns MSFP_OK or a status. */
+int msfp_building_replaced(msfp_building *b, int bearing, const int *entries, const int *faces);
 /* The state between two steps, with all rows, as bytes; in a run of the same scene and build the steps that follow are
  * those that followed there, bit by bit. */
 size_t msfp_building_snapshot_size(const msfp_building *b);

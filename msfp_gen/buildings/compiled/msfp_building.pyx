@@ -39,6 +39,7 @@ cdef extern from "msfp_building.h":
         const msfp_piecewise *ground
         const int *entry_count
         const int *entries
+        const int *faces
         double weight
         int vectors
         const int *vector_orders
@@ -68,7 +69,7 @@ cdef extern from "msfp_building.h":
     size_t msfp_building_peak_count(const msfp_building *) noexcept nogil
     const double *msfp_building_peaks(const msfp_building *) noexcept nogil
     void msfp_building_ends(msfp_building *, int, double *) noexcept nogil
-    int msfp_building_replaced(msfp_building *, int, const int *) noexcept nogil
+    int msfp_building_replaced(msfp_building *, int, const int *, const int *) noexcept nogil
     size_t msfp_building_row_size(const msfp_building *) noexcept nogil
     const double *msfp_building_rows(const msfp_building *) noexcept nogil
     size_t msfp_building_snapshot_size(const msfp_building *) noexcept nogil
@@ -96,7 +97,7 @@ cdef class Run:
 
     matrices (3, n, n): mass, damping, stiffness. attached (r,): coordinates at the bearings. ports: the two-ports of all
     bearings, which take no other steps. rows (bearings, 6, r). grounds: knots and coefficients of each motion. ground_of (bearings,). entries:
-    of each bearing, indices into its row. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
+    of each bearing, indices into its row. faces (bearings, 7): where the contacts are in it. vectors: those of msfp_building.h: orders (k,), rows (k, 3, n), shares of the motions of the
     ground (k, grounds). arms (bearings, 2) [m].
     """
     cdef msfp_building *run
@@ -104,7 +105,7 @@ cdef class Run:
     cdef msfp_piecewise *grounds
     cdef list held
 
-    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, vectors, arms, *, double weight, stops, jumps,
+    def __cinit__(self, matrices, attached, ports, rows, grounds, ground_of, entries, faces, vectors, arms, *, double weight, stops, jumps,
                   span_ends, span_steps, int method, double rtol, double max_step, double first_step, double max_steps,
                   double end, double output_step, int threads):
         cdef msfp_building_scene s
@@ -114,7 +115,7 @@ cdef class Run:
         s.mass, s.damping, s.stiffness = _doubles(held, matrices[0]), _doubles(held, matrices[1]), _doubles(held, matrices[2])
         s.attached, s.rows, s.ground_of = _ints(held, attached), _doubles(held, rows), _ints(held, ground_of)
         s.entry_count = _ints(held, [len(each) for each in entries])
-        s.entries = _ints(held, np.concatenate(entries))
+        s.entries, s.faces = _ints(held, np.concatenate(entries)), _ints(held, np.ravel(faces))
         s.vectors, s.vector_orders = len(vectors[0]), _ints(held, vectors[0])
         s.vector_rows, s.vector_grounds, s.arms = _doubles(held, vectors[1]), _doubles(held, vectors[2]), _doubles(held, arms)
         s.weight, s.rtol, s.max_step, s.first_step, s.max_steps = weight, rtol, max_step, first_step, max_steps
@@ -162,13 +163,14 @@ cdef class Run:
         msfp_building_ends(self.run, bearing, &view[0, 0, 0])
         return found
 
-    def replace(self, int bearing, port, entries):
-        """Continue with another two-port of a bearing, from 0, in its present state; entries: indices into its row."""
+    def replace(self, int bearing, port, entries, faces):
+        """Continue with another two-port of a bearing, from 0, in its present state; entries, faces: of its row."""
         cdef list held = []
         cdef const int *given = _ints(held, entries)
+        cdef const int *contacts = _ints(held, faces)
         self.place(bearing, port)
         self.held.append(port)
-        msfp_building_replaced(self.run, bearing, given)
+        msfp_building_replaced(self.run, bearing, given, contacts)
 
     cdef msfp_building_progress progress(self):
         cdef msfp_building_progress found

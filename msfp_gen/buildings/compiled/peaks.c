@@ -6,9 +6,12 @@ enum { VECTOR = 4, BASE = VECTOR + 1, ENERGY = 2, BEARING = 2 * VECTOR + 2 };
 
 static size_t of_building(const msfp_building *b) { return (size_t)b->scene.vectors * VECTOR + BASE + ENERGY; }
 
+static const double loaded = 0.05; /* N over the load at rest above which the place of a contact counts */
+
 static size_t of_bearing(const msfp_building *b, int bearing)
 {
-    return BEARING + 2 * (size_t)b->scene.entry_count[bearing];
+    const int surfaces = b->scene.faces[bearing * MSFP_FACES + MSFP_FACES_SURFACES];
+    return BEARING + 2 * ((size_t)b->scene.entry_count[bearing] + surfaces);
 }
 
 size_t peak_count(const msfp_building *b)
@@ -44,6 +47,8 @@ void begin_peaks(msfp_building *b)
         *at++ = -INFINITY;
         for (int k = 0; k < 2 * count; ++k)
             *at++ = k < count ? INFINITY : -INFINITY;
+        for (double *end = peaks_of(b, i) + of_bearing(b, i); at < end; ++at)
+            *at = 0.0;
     }
 }
 
@@ -90,6 +95,38 @@ void note_peaks(msfp_building *b)
         at[i] = fmax(at[i], energies[i]);
 }
 
+/* The third axis t3 of (2.6) for two angles. */
+static void axis_of(const double angles[2], double t[3])
+{
+    const double s = msfp_sin(angles[0]), c = msfp_cos(angles[0]), across = msfp_cos(angles[1]);
+    t[0] = msfp_sin(angles[1]);
+    t[1] = -s * across;
+    t[2] = c * across;
+}
+
+/* Where the contacts of a bearing are on the faces of its sliders. */
+static void note_faces(const msfp_building *b, int bearing, double *at)
+{
+    static const double upright[2] = { 0.0, 0.0 };
+    const member *m = &b->members[bearing];
+    const int *f = b->faces + bearing * MSFP_FACES;
+    if (!f[MSFP_FACES_CHECKED])
+        return;
+    for (int j = 0; j < f[MSFP_FACES_SURFACES]; ++j, at += 2) {
+        double n[3], t[3];
+        if (m->row[f[MSFP_FACES_NORMAL] + j] <= -loaded * m->rest[2])
+            continue;
+        axis_of(m->row + f[MSFP_FACES_ANGLES] + 2 * j, n);
+        axis_of(j < f[MSFP_FACES_UPWARD] ? m->row + f[MSFP_FACES_TILTS] + f[MSFP_FACES_STRIDE] * j : upright, t);
+        const double x = n[1] * t[2] - n[2] * t[1], y = n[2] * t[0] - n[0] * t[2], z = n[0] * t[1] - n[1] * t[0];
+        const double sine = sqrt(x * x + y * y + z * z);
+        if (sine > at[0]) {
+            at[0] = sine;
+            at[1] = b->t;
+        }
+    }
+}
+
 void note_bearing(msfp_building *b, int bearing)
 {
     const member *m = &b->members[bearing];
@@ -109,4 +146,5 @@ void note_bearing(msfp_building *b, int bearing)
         at[k] = fmin(at[k], kept(m, entries[k]));
         at[count + k] = fmax(at[count + k], kept(m, entries[k]));
     }
+    note_faces(b, bearing, at + 2 * count);
 }

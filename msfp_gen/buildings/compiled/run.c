@@ -33,7 +33,8 @@ static int allocate(msfp_building *b)
     b->piece = calloc((size_t)b->scene.grounds, sizeof *b->piece);
     b->pivots = calloc(r, sizeof *b->pivots);
     b->entries = calloc(entry_count(b), sizeof *b->entries);
-    return complete && b->members && b->piece && b->pivots && b->entries ? MSFP_OK : MSFP_E_MEMORY;
+    b->faces = calloc((size_t)b->scene.bearings * MSFP_FACES, sizeof *b->faces);
+    return complete && b->members && b->piece && b->pivots && b->entries && b->faces ? MSFP_OK : MSFP_E_MEMORY;
 }
 
 /* Scale of the forces at the attachments: the weight, with its arms where they are moments. */
@@ -122,6 +123,7 @@ msfp_building *msfp_building_new(const msfp_building_scene *scene)
     set_scale(b);
     b->identity = identity_of(b);
     memcpy(b->entries, scene->entries, entry_count(b) * sizeof *b->entries);
+    memcpy(b->faces, scene->faces, (size_t)scene->bearings * MSFP_FACES * sizeof *b->faces);
     b->status = scene->parts[0].api->port_method(scene->method, &b->method);
     begin(b);
     return b;
@@ -138,7 +140,7 @@ void msfp_building_free(msfp_building *b)
     void *all[] = { b->u,       b->v,      b->a,       b->slope,  b->tangent, b->force,   b->Q,       b->V,
                     b->free,    b->x,      b->residual, b->change, b->balance, b->scale,   b->matrix,  b->next_u,
                     b->scratch, b->ground, b->stage_v, b->stage_a, b->members, b->piece,   b->pivots,  b->rows,
-                    b->entries, b->peaks };
+                    b->entries, b->faces,  b->peaks };
     for (size_t i = 0; i < sizeof all / sizeof *all; ++i)
         free(all[i]);
     free(b);
@@ -297,7 +299,7 @@ void msfp_building_ends(msfp_building *b, int bearing, double *ends)
     memcpy(ends, b->members[bearing].ends, sizeof b->members[bearing].ends);
 }
 
-int msfp_building_replaced(msfp_building *b, int bearing, const int *entries)
+int msfp_building_replaced(msfp_building *b, int bearing, const int *entries, const int *faces)
 {
     const msfp_part *part = &b->scene.parts[bearing];
     member *m = &b->members[bearing];
@@ -305,6 +307,7 @@ int msfp_building_replaced(msfp_building *b, int bearing, const int *entries)
     for (int i = 0; i < bearing; ++i)
         to += b->scene.entry_count[i];
     memcpy(to, entries, (size_t)b->scene.entry_count[bearing] * sizeof *to);
+    memcpy(b->faces + bearing * MSFP_FACES, faces, MSFP_FACES * sizeof *faces);
     free(m->row);
     m->row = NULL;
     b->tangent_beta = 0.0;

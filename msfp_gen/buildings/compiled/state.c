@@ -103,6 +103,7 @@ uint64_t identity_of(const msfp_building *b)
         { s->ground_of, k * sizeof(int) },
         { s->entry_count, k * sizeof(int) },
         { s->entries, entry_count(b) * sizeof(int) },
+        { s->faces, k * MSFP_FACES * sizeof(int) },
         { &s->weight, size },
         { &s->vectors, sizeof(int) },
         { s->vector_orders, (size_t)s->vectors * sizeof(int) },

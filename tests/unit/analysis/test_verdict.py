@@ -180,6 +180,20 @@ def test_monitors_of_what_the_model_leaves_out_count(note: Note, key: str, text:
     assert [one.limit.key for one in verdict.exceeded] == [key] * bool(key) and text in verdict.text
 
 
+def test_a_contact_off_its_face_in_a_building() -> None:
+    """With sliders of 10 mm below and above; with uplift they stand on their edges."""
+    bearing = BEARING.replace(rim_radius=[0.01, 0.0255, 0.01, 0.0])
+    given = scene(frame(), bearing=bearing, duration=0.8)
+    verdict = simulate(given).verdict
+    beyond = [one for one in verdict.exceeded if one.limit.key == "face"]
+    assert {one.value.surface for one in beyond} <= {1, 4} and all(one.value.allowed == 0.01 for one in beyond)
+    assert "contact off the axis of the slider" in verdict.text and 0 < beyond[0].value.time <= 0.8
+    standing = [replace(one, effects=Effects(uplift=True)) for one in given.bearings]
+    lifting = simulate(replace(given, bearings=standing, duration=0.3)).verdict
+    assert lifting.worst["face"].value.reached == 0
+    assert simulate(scene(frame(), duration=0.8)).verdict.ok
+
+
 def test_without_a_model_of_rims_no_force_is_made_up() -> None:
     """The sliding beyond the capacity is named in its place."""
     beyond = changed_scene("fenz-test5", {"effects.rims": False})
