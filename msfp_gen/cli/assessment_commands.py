@@ -57,6 +57,7 @@ def characterise(
 
 @app.command(
     epilog="Examples:\n\n\b\n  msfp-gen bound fenz-test5\n  msfp-gen bound scene.toml --factors mine.toml -o bounds\n"
+    "  msfp-gen bound scene.toml --suite suite.toml -o bounds   # means and envelopes over the records of a suite\n"
     "  msfp-gen factors asce7 > mine.toml   # a table to edit"
 )
 def bound(
@@ -68,9 +69,16 @@ def bound(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Write runs, numbers and the figure to this folder."),
     ] = None,
+    suite: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Under every motion of a suite (TOML): means, worst values, envelopes."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene at lower bound, nominal and upper bound properties, by lambda factors of a code."""
+    if suite is not None:
+        _bound_suite(scene, factors, output, suite, as_json)
+        return
     from msfp_gen.buildings.load import load_scene
     from msfp_gen.common.output import make_folder
     from msfp_gen.studies.bounding import bound as run_bounds
@@ -104,6 +112,41 @@ def factors(
         show([Table("tables of property-modification factors", (), list(factor_tables().items()))])
     else:
         say(factor_text(name).rstrip("\n"))
+
+
+def _bound_suite(scene: str, factors: str, output: Path | None, suite: Path, as_json: bool) -> None:
+    """`bound` under every motion of a suite: numbers and the figure, without the rows of the runs."""
+    from msfp_gen.common.output import make_folder
+    from msfp_gen.scene.file.suite import load_suite
+    from msfp_gen.studies.batch import build_models
+    from msfp_gen.studies.bounding import bound_suite, bounded_scenes, load_factors
+    from msfp_gen.studies.bounding.suite import (
+        plot_suite_bounds,
+        suite_bound_tables,
+        write_records,
+        write_statistics,
+    )
+    from msfp_gen.studies.sweep import variations
+
+    table = load_factors(factors)
+    with Progress("suite") as progress:
+        records = load_suite(suite, progress).records
+    scenes = {str(each.varied["record"]): each.scene for each in variations(scene, (), records)}
+    for chosen in scenes.values():
+        bounded_scenes(chosen, table)
+    if output is not None:
+        make_folder(output, "--output")
+    build_models(scenes.values())
+    with Progress(f"{len(scenes)} records") as progress:
+        bounds = bound_suite(scenes, table, name=Path(scene).stem, progress=progress)
+    answer(bounds.as_dict(), suite_bound_tables(bounds), as_json)
+    if output is not None:
+        plot_suite_bounds(bounds, output / "suite.png")
+        written = [write_statistics(bounds, output / "suite.csv"), write_records(bounds, output / "records.csv")]
+        note_written([*written, output / "suite.png"])
+    if bounds.failures:
+        (record, case), message = next(iter(bounds.failures.items()))
+        raise RunError(f"{len(bounds.failures)} runs did not reach their end; the first: {record}, {case}: {message}")
 
 
 def _save(bounds: Bounds, folder: Path) -> list[Path]:

@@ -21,6 +21,7 @@ from msfp_gen.figures.style import (
     SMALL,
     THIN,
     Scale,
+    distinct,
     engineering,
     headline,
     page,
@@ -105,8 +106,8 @@ def plot_response_spectrum(
     with page(7.6, 4.8, path) as figure:
         headline(figure, title)
         axes = figure.subplots()
-        for index, (label, values) in enumerate(curves.items()):
-            axes.plot(x, values, color=COLOURS[index % len(COLOURS)], label=label)
+        for colour, (label, values) in zip(distinct(len(curves)), curves.items(), strict=True):
+            axes.plot(x, values, color=colour, label=label)
         if mean is not None:
             axes.plot(x, np.asarray(mean, dtype=float), color=INK, linewidth=2.5, label="mean")
         if target is not None:

@@ -91,6 +91,16 @@ def page(width: float, height: float, path: str | Path | None = None, name: str 
                 figure.savefig(temporary, metadata={"Date": None} if target.suffix.lower() == ".svg" else None)
 
 
+def distinct(count: int) -> list[str]:
+    """So many different colours: those of the palette, and of more a rainbow of even lightness."""
+    if count <= len(COLOURS):
+        return list(COLOURS[:count])
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colormaps["turbo"](0.03 + 0.94 * index / (count - 1))) for index in range(count)]
+
+
 def plain(text: str) -> str:
     """A name from a file as text for matplotlib: $ is escaped, letters that the font does not have become ?."""
     from matplotlib.font_manager import findfont, get_font

@@ -78,14 +78,15 @@ BUILDING = RUN | {
     "peak_corner_drift_ratio": Quantity("", "peak_corner_drift_ratio", "most"),
     "minimum_load_ratio": Quantity("", "minimum_load_ratio", "least"),
     "maximum_load_ratio": Quantity("", "maximum_load_ratio", "most"),
-    "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial"),
-    "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio"),
-    "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio"),
-    "storey_shear": Quantity("N", "storeys.*.peak_shear.radial"),
-    "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial"),
-    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio"),
-    "bearing_uplift_height": Quantity("m", "bearings.*.uplift.height"),
-    "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration"),
+    "floor_acceleration": Quantity("m/s^2", "floors.*.peak_acceleration.radial", "most"),
+    "storey_drift_ratio": Quantity("", "storeys.*.peak_drift_ratio", "most"),
+    "storey_corner_drift_ratio": Quantity("", "storeys.*.peak_corner_drift_ratio", "most"),
+    "storey_shear": Quantity("N", "storeys.*.peak_shear.radial", "most"),
+    "bearing_displacement": Quantity("m", "bearings.*.peak_displacement.radial", "most"),
+    "bearing_load_ratio": Quantity("", "bearings.*.minimum_load_ratio", "least"),
+    "bearing_maximum_load_ratio": Quantity("", "bearings.*.maximum_load_ratio", "most"),
+    "bearing_uplift_height": Quantity("m", "bearings.*.uplift.height", "most"),
+    "bearing_uplift_duration": Quantity("s", "bearings.*.uplift.duration", "most"),
     "secant_period": Quantity("s", "secant_period", characterised=True),
     "capacity_left": Quantity("m", "capacity_left", "least", characterised=True),
 }
@@ -107,8 +108,9 @@ class Source(NamedTuple):
 
     @property
     def compared(self) -> bool:
-        """Whether `bound` compares it."""
-        return self.quantity.characterised or bool(self.quantity.governs)
+        """Whether `bound` compares it; quantities of parts of a building are only in its suites."""
+        of_part = self.quantity.path.partition(".*")[0] in ("floors", "storeys", "bearings")
+        return not of_part and (self.quantity.characterised or bool(self.quantity.governs))
 
     def value(self, summary: Mapping[str, Any], characterisation: Any) -> Any:
         """Its value; None where the run has none. characterisation: None where it is not needed, or not possible."""

@@ -2,6 +2,7 @@
 
 from msfp_gen.studies.bounding.factors import Factor, FactorTable, factor_tables, factor_text, load_factors
 from msfp_gen.studies.bounding.runs import CASES, Bounds, Case, bound, bounded_scene, bounded_scenes
+from msfp_gen.studies.bounding.suite import SuiteBounds, bound_suite
 
 __all__ = [
     "CASES",
@@ -9,7 +10,9 @@ __all__ = [
     "Case",
     "Factor",
     "FactorTable",
+    "SuiteBounds",
     "bound",
+    "bound_suite",
     "bounded_scene",
     "bounded_scenes",
     "factor_tables",

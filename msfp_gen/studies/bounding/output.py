@@ -30,6 +30,7 @@ SHOWN = {
     "m": ("mm", 1e3),
     "N": ("kN", 1e-3),
     "N/m": ("kN/m", 1e-3),
+    "N m": ("MN m", 1e-6),
     "m/s": ("mm/s", 1e3),
     "W/m^2": ("kW/m2", 1e-3),
     "": ("%", 100.0),
@@ -40,6 +41,11 @@ LINE_STYLES: dict[str, dict[str, Any]] = {
     "upper": {"color": COLOURS[1]},
     "nominal": {"color": INK},
 }
+
+
+def shown_as(unit: str) -> tuple[str, float]:
+    """The unit in which a value in SI is shown, and the factor to it."""
+    return SHOWN.get(unit, (unit, 1.0))
 
 
 def bounding_tables(bounds: Bounds) -> list[Table]:
@@ -109,8 +115,7 @@ def _quantity_table(bounds: Bounds) -> Table:
     rows = []
     for name, values in bounds.quantities().items():
         if any(value is not None for value in values.values()):
-            unit = sources[name].quantity.unit
-            unit, scale = SHOWN.get(unit, (unit, 1.0))
+            unit, scale = shown_as(sources[name].quantity.unit)
             cells = ["-" if (value := values[case]) is None else f"{value * scale:.4g}" for case in CASES]
             rows.append((f"{name.replace('_', ' ')} [{unit}]", *cells, governing.get(name, "")))
     return Table("results; properties of cycles are their means", ("", *CASES, "governs"), rows)

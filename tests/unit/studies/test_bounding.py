@@ -32,9 +32,11 @@ from msfp_gen import (
     load_scene,
 )
 from msfp_gen.cli import main
-from msfp_gen.studies.bounding import Bounds, bound, bounded_scenes, factor_tables, load_factors
+from msfp_gen.figures.style import COLOURS, distinct
+from msfp_gen.studies.bounding import CASES, Bounds, bound, bounded_scenes, factor_tables, load_factors
 from msfp_gen.studies.bounding.output import plot_bounds
 from msfp_gen.studies.bounding.runs import _scaled
+from msfp_gen.studies.bounding.suite import _quantities
 
 ASCE = ((1 + 0.75 * 0) * 0.7 * 0.85, (1 + 0.75 * (1.3 * 1.2 - 1)) * 1.3 * 1.15)
 
@@ -349,3 +351,72 @@ def test_all_cases_have_the_same_effects() -> None:
     models = {case.result.provenance["model"].split(", then ")[-1] for case in found.cases if case.result}
     assert len(models) == 1 and "inertial" in models.pop()
     assert found.lambdas["friction"]["upper"][0] > 1 > found.lambdas["friction"]["lower"][0]
+
+
+SUITE = """
+[[records]]
+bundled = "ridgecrest-2019-ci-clc"
+duration = 6.0
+
+[[records]]
+bundled = "ridgecrest-2019-ci-ccc"
+duration = 6.0
+"""
+
+
+def suite_file(folder: Path) -> Path:
+    (folder / "suite.toml").write_text(SUITE)
+    return folder / "suite.toml"
+
+
+def test_a_suite_at_bounds_is_that_of_its_records(tmp_path: Path, capsys: Any) -> None:
+    """Means, worst values and envelopes by hand from the bounds of each record; one row for each surface."""
+    out = tmp_path / "out"
+    arguments = ["bound", "ridgecrest-clc", "--suite", str(suite_file(tmp_path)), "--factors", "asce7-quality"]
+    assert main([*arguments, "-o", str(out)]) == 0
+    printed, said = capsys.readouterr()
+    assert "2 records at bounds by asce7-quality" in printed and "what has no mean, and why" in printed
+    assert all(str(out / name) in said for name in ("suite.csv", "records.csv", "suite.png"))
+    with (out / "suite.csv").open() as file:
+        rows = {row["quantity"]: row for row in csv.DictReader(file)}
+    with (out / "records.csv").open() as file:
+        runs = list(csv.DictReader(file))
+    assert [(run["record"], run["case"]) for run in runs[:4]] == [
+        *(("ridgecrest-2019-ci-clc", case) for case in CASES),
+        ("ridgecrest-2019-ci-ccc", "lower"),
+    ]
+    for name, pick in (("peak displacement", max), ("capacity left of surface 2", min)):
+        row, by_case = rows[name], {c: [float(r[f"{name} [m]"]) for r in runs if r["case"] == c] for c in CASES}
+        means = {case: sum(values) / 2 for case, values in by_case.items()}
+        assert all(float(row[f"mean {case}"]) == pytest.approx(mean, rel=1e-14) for case, mean in means.items())
+        assert all(float(row[f"worst {case}"]) == pick(values) for case, values in by_case.items())
+        assert float(row["envelope of means"]) == pytest.approx(pick(means.values()), rel=1e-14)
+        assert float(row["envelope of worst"]) == pick(map(pick, by_case.values()))
+        assert row["governs"] == pick(means, key=means.__getitem__)
+    assert rows["capacity left of surface 2"]["of"] == "surface 2" and rows["peak displacement"]["of"] == ""
+
+
+def test_a_suite_of_a_building_has_the_names_of_its_bearings() -> None:
+    made = load_scene("hospital-clc")
+    sources, parts = _quantities(made)
+    assert [parts[f"bearing_displacement_{number}"] for number in range(1, 13)] == [
+        f"{column}{row}" for row in (1, 2, 3) for column in "ABCD"
+    ]
+    assert parts["storey_shear_1"] == "storey 1" and parts["floor_acceleration_1"] == "base"
+    assert parts["peak_force"] == "" and all(source.quantity.governs for source in sources.values())
+
+
+def test_a_suite_with_a_failed_run_has_no_mean(upper_fails: None, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "out"
+    suite = suite_file(tmp_path)
+    assert main(["bound", "ridgecrest-clc", "--suite", str(suite), "--factors", "asce7-quality", "-o", str(out)]) == 1
+    printed, error = capsys.readouterr()
+    assert "2 of 6 runs failed, so that a mean would be biased" in printed
+    assert "error: 2 runs did not reach their end; the first: ridgecrest-2019-ci-clc, upper: " in error
+    assert len((out / "suite.csv").read_text().splitlines()) == 1 and (out / "suite.png").is_file()
+    assert (out / "records.csv").read_text().count("jammed") == 2
+
+
+def test_records_of_a_suite_have_different_colours() -> None:
+    assert distinct(4) == list(COLOURS[:4])
+    assert all(len(set(distinct(count))) == count for count in (7, 11, 22, 44))

@@ -1,0 +1,285 @@
+"""Bounds under a suite of ground motions: means, worst values and envelopes, as tables and as a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.output import check_output
+from msfp_gen.common.tables import Table, write_columns
+from msfp_gen.errors import RunError
+from msfp_gen.figures.style import INK, distinct, headline, page, plain
+from msfp_gen.scene.scene import Scene
+from msfp_gen.studies.bounding.factors import FactorTable
+from msfp_gen.studies.bounding.output import shown_as
+from msfp_gen.studies.bounding.runs import CASES, Progress, bound
+from msfp_gen.studies.columns import Counts, Source, catalogue
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from msfp_gen.buildings.load import AnyScene
+
+# Quantities of the figure; those that a run does not have are left out.
+DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")
+WORST: dict[str, Callable[..., Any]] = {"most": np.max, "least": np.min}
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A quantity over the records of a suite.
+
+    name: column of `catalogue`. part: name of the bearing, storey, floor or surface that it is of; "" for the whole.
+    extreme: whether the largest value is the worst, or the least. means, worst: by case, in SI. governs: the case with
+    the worst mean. record: that with the worst value of all.
+    """
+
+    name: str
+    part: str
+    unit: str
+    extreme: Literal["most", "least", ""]
+    means: tuple[float, ...]
+    worst: tuple[float, ...]
+    governs: str
+    record: str
+
+    @property
+    def envelope(self) -> tuple[float, float]:
+        """Mean and worst value of the case that governs each."""
+        pick = WORST[self.extreme]
+        return float(pick(self.means)), float(pick(self.worst))
+
+
+@dataclass(frozen=True)
+class SuiteBounds:
+    """Result of `bound_suite`.
+
+    Attributes:
+        table: the table of factors.
+        records: names of the motions.
+        sources: column -> quantity. parts: column -> name of its bearing, storey, floor or surface; "" for the whole.
+        values: column -> value in SI, shape (records, cases); NaN where a run has none.
+        failures: record and case -> message of a run that failed.
+        undefined: column -> why runs that reached their end have no value.
+        exceeded: record and case -> the verdict of a run that exceeded limits of the device.
+    """
+
+    name: str
+    table: FactorTable
+    records: tuple[str, ...]
+    sources: Mapping[str, Source]
+    parts: Mapping[str, str]
+    values: Mapping[str, Array]
+    failures: Mapping[tuple[str, str], str]
+    undefined: Mapping[str, str]
+    exceeded: Mapping[tuple[str, str], str]
+
+    @cached_property
+    def statistics(self) -> tuple[Statistic, ...]:
+        """Of each quantity that every run has, and of which the largest or the least value governs."""
+        return tuple(
+            self._statistic(name, values)
+            for name, values in self.values.items()
+            if self.sources[name].quantity.governs and not np.isnan(values).any()
+        )
+
+    def _statistic(self, name: str, values: Array) -> Statistic:
+        quantity = self.sources[name].quantity
+        pick = WORST[quantity.governs]
+        means, worst = values.mean(axis=0), pick(values, axis=0)
+        case = int(np.flatnonzero(means == pick(means))[0])
+        record = int(np.argwhere(values == pick(values))[0][0])
+        return Statistic(
+            name,
+            self.parts[name],
+            quantity.unit,
+            quantity.governs,
+            tuple(means.tolist()),
+            tuple(worst.tolist()),
+            CASES[case],
+            self.records[record],
+        )
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Column -> why it has no statistic, of quantities that would have one."""
+        failed = f"{len(self.failures)} of {len(self.records) * len(CASES)} runs failed, so that a mean would be biased"
+        reasons = dict(self.undefined)
+        if self.failures:
+            reasons |= {name: failed for name, source in self.sources.items() if source.quantity.governs}
+        return reasons
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        return {
+            "factors": self.table.name,
+            "records": list(self.records),
+            "statistics": [vars(each) | {"envelope": each.envelope} for each in self.statistics],
+            "left_out": self.left_out,
+            "exceeded": [{"record": r, "case": c, "verdict": text} for (r, c), text in self.exceeded.items()],
+            "failures": [{"record": r, "case": c, "message": text} for (r, c), text in self.failures.items()],
+        }
+
+
+def bound_suite(
+    scenes: Mapping[str, AnyScene], table: FactorTable, *, name: str = "", progress: Progress | None = None
+) -> SuiteBounds:
+    """The bounds of a scene under each motion of a suite; only their quantities are kept.
+
+    A run that fails is part of the result. Raises InputError as `bound`; RunError: no run reached its end.
+
+    scenes: name of the record -> the scene with its motion. name: of the whole, in the figure. progress: as of `bound`.
+    """
+    first = next(iter(scenes.values()))
+    sources, parts = _quantities(first)
+    values = {key: np.full((len(scenes), len(CASES)), np.nan) for key in sources}
+    failures: dict[tuple[str, str], str] = {}
+    undefined: dict[str, str] = {}
+    exceeded: dict[tuple[str, str], str] = {}
+    for row, (record, scene) in enumerate(scenes.items()):
+        part = None if progress is None else _share(progress, row, len(scenes))
+        try:
+            cases = bound(scene, table, progress=part).cases
+        except RunError as error:
+            failures |= {(record, case): str(error) for case in CASES}
+            continue
+        for column, case in enumerate(cases):
+            if case.result is not None and case.result.verdict.exceeded:
+                exceeded[record, case.name] = case.result.verdict.text
+            if case.result is None or case.characterisation is None:
+                failures[record, case.name] = case.failure
+                continue
+            for key, source in sources.items():
+                value = source.value(case.result.summary, case.characterisation)
+                if value is not None:
+                    values[key][row, column] = value
+                elif why := source.reason(case.characterisation):
+                    undefined[key] = why
+    if len(failures) == len(scenes) * len(CASES):
+        raise RunError(
+            f"no run of the suite reached its end; the first: {next(iter(failures.values()))}", status="bound"
+        )
+    return SuiteBounds(name, table, tuple(scenes), sources, parts, values, failures, undefined, exceeded)
+
+
+def _share(progress: Progress, row: int, count: int) -> Progress:
+    """Progress of one record of a suite."""
+    return lambda done, whole: progress(row + done / whole, count)
+
+
+def _quantities(scene: AnyScene) -> tuple[dict[str, Source], dict[str, str]]:
+    """The quantities of which one value governs, and the names of the parts that they are of."""
+    names: dict[str, list[str]] = {}
+    if not isinstance(scene, Scene):
+        names = {
+            "floors": [node.name for node in scene.building.nodes],
+            "storeys": [column.name for column in scene.building.columns],
+            "bearings": [each.name or f"bearing {number}" for number, each in enumerate(scene.bearings, 1)],
+        }
+    sources = {name: each for name, each in catalogue(Counts.of(scene)).items() if each.quantity.governs}
+    parts = {}
+    for name, source in sources.items():
+        labels = names.get(source.quantity.path.partition(".*")[0])
+        place = source.place
+        parts[name] = "" if place is None else labels[place] if labels else f"surface {place + 1}"
+    return sources, parts
+
+
+def suite_bound_tables(bounds: SuiteBounds) -> list[Table]:
+    """Tables of the statistics of the whole, of what has none, and of runs that failed; parts: `write_statistics`."""
+    rows = [_cells(each) for each in bounds.statistics if not each.part]
+    columns = ("", *(f"mean {case}" for case in CASES), *(f"worst {case}" for case in CASES), "governs", "worst record")
+    reasons = [(_label(name, bounds.parts[name]), why) for name, why in bounds.left_out.items()]
+    exceeded = [(f"{record}, {case}", verdict) for (record, case), verdict in bounds.exceeded.items()]
+    failed = [(f"{record}, {case}", message) for (record, case), message in bounds.failures.items()]
+    tables = [
+        Table(f"{len(bounds.records)} records at bounds by {bounds.table.name}: means and worst values", columns, rows),
+        Table("what has no mean, and why", (), reasons),
+        Table("limits of the device that runs exceeded (docs/limits.md)", (), exceeded),
+        Table("runs that failed", (), failed),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def _label(name: str, part: str) -> str:
+    stem = name.rpartition("_")[0] if part else name
+    return stem.replace("_", " ") + (f" of {part}" if part else "")
+
+
+def _cells(each: Statistic) -> tuple[str, ...]:
+    unit, scale = shown_as(each.unit)
+    numbers = (f"{value * scale:.4g}" for value in (*each.means, *each.worst))
+    return (f"{_label(each.name, each.part)} [{unit}]", *numbers, each.governs, each.record)
+
+
+def write_statistics(bounds: SuiteBounds, path: str | Path) -> Path:
+    """Write the statistics as CSV in SI units: one row for each quantity, of the whole and of parts by their names.
+
+    Raises InputError for a path that does not end in .csv or cannot be written.
+    """
+    rows = bounds.statistics
+    columns: dict[tuple[str, str], list[Any]] = {
+        ("quantity", ""): [_label(each.name, each.part) for each in rows],
+        ("of", ""): [each.part for each in rows],
+        ("unit", ""): [each.unit or "1" for each in rows],
+        **{(f"mean {case}", ""): [each.means[i] for each in rows] for i, case in enumerate(CASES)},
+        **{(f"worst {case}", ""): [each.worst[i] for each in rows] for i, case in enumerate(CASES)},
+        ("envelope of means", ""): [each.envelope[0] for each in rows],
+        ("envelope of worst", ""): [each.envelope[1] for each in rows],
+        ("governs", ""): [each.governs for each in rows],
+        ("worst record", ""): [each.record for each in rows],
+    }
+    return write_columns(check_output(path, (".csv",)), columns)
+
+
+def write_records(bounds: SuiteBounds, path: str | Path) -> Path:
+    """Write the quantities of every run as CSV in SI units: one row for each record and case; else as above."""
+    count = len(CASES)
+    runs = [(record, case) for record in bounds.records for case in CASES]
+    columns: dict[tuple[str, str], list[Any]] = {
+        ("record", ""): [record for record, _ in runs],
+        ("case", ""): [case for _, case in runs],
+        ("failure", ""): [bounds.failures.get(run, "") for run in runs],
+        ("limits exceeded", ""): [bounds.exceeded.get(run, "") for run in runs],
+    }
+    for name, values in bounds.values.items():
+        cells = [None if np.isnan(value) else value for value in values.reshape(len(bounds.records) * count).tolist()]
+        columns[_label(name, bounds.parts[name]), bounds.sources[name].quantity.unit or "1"] = cells
+    return write_columns(check_output(path, (".csv",)), columns)
+
+
+def plot_suite_bounds(bounds: SuiteBounds, path: str | Path | None = None) -> Figure:
+    """The main quantities of every record over the cases, each record in a colour of its own, with their means.
+
+    Runs without a value are left out. Raises InputError for a path that cannot be written.
+    """
+    drawn = [name for name in DRAWN if name in bounds.values and not np.isnan(bounds.values[name]).all()]
+    colours = distinct(len(bounds.records))
+    with page(3.4 * len(drawn) + 2.2, 4.4, path, "suite") as figure:
+        headline(
+            figure, f"{bounds.name or 'unnamed scene'}: {len(bounds.records)} records at bounds by {bounds.table.name}"
+        )
+        row = figure.subplots(1, len(drawn), squeeze=False)[0]
+        for axes, name in zip(row, drawn, strict=True):
+            _draw(axes, bounds, name, colours)
+        handles, labels = row[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside right center")
+    return figure
+
+
+def _draw(axes: Axes, bounds: SuiteBounds, name: str, colours: Sequence[str]) -> None:
+    unit, scale = shown_as(bounds.sources[name].quantity.unit)
+    values = bounds.values[name] * scale
+    for record, of_record, colour in zip(bounds.records, values, colours, strict=True):
+        axes.plot(CASES, of_record, color=colour, marker="o", markersize=4, label=plain(record))
+    if not np.isnan(values).any():
+        axes.plot(CASES, values.mean(axis=0), color=INK, linewidth=2.5, label="mean")
+    axes.set(title=name.replace("_", " "), ylabel=f"[{unit}]")
+    axes.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
