@@ -73,12 +73,17 @@ class AnyResult(ResultFiles):
         """How the run ended, with the message of a run that failed."""
         return self.status + (f": {self.message}" if self.message else "")
 
+    @property
+    def stated_rows(self) -> Rows:
+        """Label and value of the main results after the status and the verdict."""
+        return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
+
     def printed_rows(self) -> Rows:
-        """Label and value of the main results after the status and the verdict, with the first notes."""
+        """These rows with the first notes."""
         lines, others = self.first_notes
         more = f"; {others} more in .notes" if others else ""
         shown = [("notes", "; ".join(lines) + more)] if lines else []
-        return [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results(), *shown]
+        return [*self.stated_rows, *shown]
 
     @property
     def first_notes(self) -> tuple[list[str], int]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msfp_gen.buildings.building import Building
-from msfp_gen.buildings.extremes import DIMENSIONS, SIZES, BuildingExtremes
+from msfp_gen.buildings.extremes import DIMENSIONS, OF_SURFACES, SIZES, BuildingExtremes
 from msfp_gen.buildings.file import stored_bearing
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
@@ -173,7 +173,7 @@ STORED = {
     **_wrenches(0, "lower"),
     **_wrenches(1, "upper"),
     "normal_force": _of_bearings("normal_force", "normal_force", "compression"),
-    **{name: _of_bearings(name, name) for name in ("sliding", "rim_force", "lift", "temperature")},
+    **{name: _of_bearings(name, name) for name in OF_SURFACES},
     **_motions("support", VECTORS, "{} of the ground below the bearing"),
     "dissipated": Variable(OF_BEARING, "J", "energy dissipated in the bearing", "dissipated"),
     "stored": Variable(OF_BEARING, "J", "energy stored in the bearing and its interface", "stored"),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array, parts
+from msfp_gen.results.extremes import largest
 from msfp_gen.specification.friction_laws import HEAT
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 Shapes = list[tuple[str, tuple[int, ...]]]  # names and shapes of numbers that lie one after the other
 CORNERS = 4  # of the plan
+OF_SURFACES = ("sliding", "rim_force", "lift", "temperature")  # of which the largest value counts
+CONTACT = ("contact_offset", "contact_time")  # of which rows know nothing
 VECTOR = 4  # numbers of a vector: largest magnitudes along E1, E2, E3 and in the horizontal plane
 # The dimensions of the arrays of `BuildingExtremes`, and the sizes of those that are the same of all buildings.
 DIMENSIONS = {
@@ -29,9 +32,7 @@ DIMENSIONS = {
     "energy": ("kind",),
     **dict.fromkeys(("bearing_displacement", "top_force"), ("bearing", "peak")),
     "axial_force": ("bearing", "end"),
-    **dict.fromkeys(
-        ("sliding", "rim_force", "lift", "temperature", "contact_offset", "contact_time"), ("bearing", "surface")
-    ),
+    **dict.fromkeys((*OF_SURFACES, *CONTACT), ("bearing", "surface")),
     "normal_force": ("bearing", "end", "surface"),
 }
 SIZES = {"peak": VECTOR, "whole": 1, "kind": 2, "end": 2, "order": 3}
@@ -75,6 +76,38 @@ class BuildingExtremes:
     contact_offset: Array
     contact_time: Array
     normal_force: Array
+
+    @classmethod
+    def of_rows(cls, result: Any) -> BuildingExtremes:
+        """Extremes of the rows of a `BuildingResult` alone."""
+        scene = result.scene
+        names = [node.name for node in scene.building.nodes]
+        nodes = np.reshape([result.node(name) for name in names], (len(names), len(result.time), 3, 6))
+        across = -np.moveaxis(result.bearing_displacement, 1, 0)
+        normal = np.nan_to_num(result.normal_force)
+        most = {name: np.nan_to_num(getattr(result, name)).max(axis=0) for name in OF_SURFACES}
+        force, axial = np.moveaxis(result.wrench[:, :, 1, :3], 1, 0), result.axial_force
+        base = scene.bearings[0].node
+        return cls(
+            node_acceleration=largest(nodes[:, :, 2, :3]),
+            node_displacement=largest(nodes[:, :, 0, :3] - result.ground[:, 0]),
+            drift=largest(np.moveaxis(result.drift[..., :3], 1, 0)),
+            corner_drift=largest(np.moveaxis(result.corner_drift, 0, -2)).max(axis=1, initial=0.0),
+            storey_shear=largest(np.moveaxis(result.storey_force[..., :3], 1, 0)),
+            storey_torsion=np.abs(result.storey_force[..., 5]).max(axis=0),
+            base_twist=np.abs(result.node(base)[:, 0, 5]).max(keepdims=True),
+            mean_displacement=largest(across.mean(axis=0)),
+            overturning_moment=largest(np.pad(result.overturning_moment, ((0, 0), (0, 1)))),
+            base_reaction=largest(result.base_reaction),
+            base_torsion=np.abs(result.base_torsion).max(keepdims=True),
+            energy=np.array([result.kinetic.max(), result.strain.max()]),
+            bearing_displacement=largest(across),
+            top_force=largest(force),
+            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
+            **most,
+            **dict.fromkeys(CONTACT, np.zeros_like(most["lift"])),
+            normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
+        )
 
     @classmethod
     def of_run(cls, scene: BuildingScene, recorded: Array, kept: Sequence[Shapes]) -> BuildingExtremes:

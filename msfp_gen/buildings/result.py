@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,22 +10,19 @@ import numpy as np
 
 from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.analysis.characterise.loops import Path, rests
-from msfp_gen.analysis.characterise.report import characterised, effective_period
-from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands
-from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, summary_of_run, uplift_of
+from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, uplift_of
 from msfp_gen.analysis.tables import surface_table
 from msfp_gen.analysis.verdict import Judged
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
-from msfp_gen.buildings.characterise import BearingDemand, BuildingCharacterisation
-from msfp_gen.buildings.extremes import BuildingExtremes, corners, overturning
+from msfp_gen.buildings.characterise import BuildingCharacterisation, characterise_bearing
+from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
-from msfp_gen.results.extremes import Extremes, by_axis, largest
+from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import KINDS, Storage
 from msfp_gen.results.history import Event, HorizontalMotion
 from msfp_gen.results.note import Note
@@ -35,12 +31,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.scene.bearing import Bearing
-
-
-NOT_RECORDED = (
-    "the rows of a building have no slip velocities: no sliding regimes, velocities and heat of surfaces; periods are "
-    "with N at rest"
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,7 +95,7 @@ class BuildingResult(AnyResult):
     @cached_property
     def extremes(self) -> BuildingExtremes:
         """Extremes over all steps, or of the rows where the run did not record them."""
-        return self.recorded_extremes or self._extremes_of_rows()
+        return self.recorded_extremes or BuildingExtremes.of_rows(self)
 
     def node(self, name: str) -> Array:
         """Displacement, velocity and acceleration of a node: ndarray, shape (k, 3, 6), [m], [rad] and per s, s^2."""
@@ -187,39 +177,6 @@ class BuildingResult(AnyResult):
     def _size(self) -> int:
         return len(self.scene.building.mass)
 
-    def _extremes_of_rows(self) -> BuildingExtremes:
-        scene = self.scene
-        names = [node.name for node in scene.building.nodes]
-        nodes = np.reshape([self.node(name) for name in names], (len(names), len(self.time), 3, 6))
-        across = -np.moveaxis(self.bearing_displacement, 1, 0)
-        normal = np.nan_to_num(self.normal_force)
-        most = {
-            name: np.nan_to_num(getattr(self, name)).max(axis=0)
-            for name in ("sliding", "rim_force", "lift", "temperature")
-        }
-        force, axial = np.moveaxis(self.wrench[:, :, 1, :3], 1, 0), self.axial_force
-        base = scene.bearings[0].node
-        return BuildingExtremes(
-            node_acceleration=largest(nodes[:, :, 2, :3]),
-            node_displacement=largest(nodes[:, :, 0, :3] - self.ground[:, 0]),
-            drift=largest(np.moveaxis(self.drift[..., :3], 1, 0)),
-            corner_drift=largest(np.moveaxis(self.corner_drift, 0, -2)).max(axis=1, initial=0.0),
-            storey_shear=largest(np.moveaxis(self.storey_force[..., :3], 1, 0)),
-            storey_torsion=np.abs(self.storey_force[..., 5]).max(axis=0),
-            base_twist=np.abs(self.node(base)[:, 0, 5]).max(keepdims=True),
-            mean_displacement=largest(across.mean(axis=0)),
-            overturning_moment=largest(np.pad(self.overturning_moment, ((0, 0), (0, 1)))),
-            base_reaction=largest(self.base_reaction),
-            base_torsion=np.abs(self.base_torsion).max(keepdims=True),
-            energy=np.array([self.kinetic.max(), self.strain.max()]),
-            bearing_displacement=largest(across),
-            top_force=largest(force),
-            axial_force=np.stack([axial.min(axis=0), axial.max(axis=0)], axis=1),
-            **most,
-            **dict.fromkeys(("contact_offset", "contact_time"), np.zeros_like(most["lift"])),
-            normal_force=np.stack([normal.min(axis=0), normal.max(axis=0)], axis=1),
-        )
-
     @cached_property
     def energy_error(self) -> tuple[float, int]:
         """Largest difference of the work on the building from its energies, over the largest of them, and its row."""
@@ -256,39 +213,7 @@ class BuildingResult(AnyResult):
         - energy: largest kinetic and strain energy of the building, damped (in it) and dissipated (in the bearings)
           at the end [J]; closure_error of the balance of the building [-].
         """
-        extremes, weight = self.extremes, self.scene.weight
-        bearings = [one.summary for one in self.bearings]
-        floors, storeys = self.floors, self.storeys
-        force = by_axis(extremes.base_reaction)
-        return {
-            **summary_of_run(self, self.time, self.counters, self.wall_time),
-            "peak_displacement": _largest([one["peak_displacement"] for one in bearings]),
-            "weight": weight,
-            "peak_force": force,
-            "peak_force_ratio": force["radial"] / weight,
-            "peak_base_torsion": float(extremes.base_torsion[0]),
-            "peak_overturning_moment": {
-                key: value for key, value in by_axis(extremes.overturning_moment).items() if key != "E3"
-            },
-            "peak_twist": float(extremes.base_twist[0]),
-            "minimum_load_ratio": min(one["minimum_load_ratio"] for one in bearings),
-            "maximum_load_ratio": max(one["maximum_load_ratio"] for one in bearings),
-            "rims_met": [one["number"] for one in bearings if one["rims_met"]],
-            "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
-            "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
-            "peak_corner_drift_ratio": max((storey["peak_corner_drift_ratio"] for storey in storeys), default=None),
-            "floors": floors,
-            "storeys": storeys,
-            "bearings": bearings,
-            "verdict": self.verdict.as_dict,
-            "energy": {
-                "peak_kinetic": float(extremes.energy[0]),
-                "peak_strain": float(extremes.energy[1]),
-                "damped": float(self.damped[-1]),
-                "dissipated": float(self.dissipated[-1].sum()),
-                "closure_error": self.energy_error[0],
-            },
-        }
+        return summaries.summarise(self)
 
     @property
     def floors(self) -> list[dict[str, Any]]:
@@ -330,8 +255,7 @@ class BuildingResult(AnyResult):
 
     def tables(self) -> list[Table]:
         """Tables of the run with its floors, storeys and bearings."""
-        rows = [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
-        first, *others = summaries.tables(self.title, rows, self.summary)
+        first, *others = summaries.tables(self.title, self.stated_rows, self.summary)
         return [first, self.verdict.table, *others]
 
     def characterise(self) -> BuildingCharacterisation:
@@ -339,31 +263,12 @@ class BuildingResult(AnyResult):
 
         Raises InputError where the bearings did not move.
         """
-        mean, summary = np.mean([one.displacement for one in self.bearings], axis=0), self.summary
-        path = Path.of(self.time, mean, self.base_reaction, "the building")
-        peaks = (float(self.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
-        load, gravity = self.scene.weight, self.scene.gravity
-        system = characterised(self.scene.name, self.status, path, peaks, load, gravity, self.dissipated.sum(axis=1))
-        return BuildingCharacterisation(
-            **vars(system),
-            secant_period=effective_period(system.secant_stiffness, load, gravity),
-            peak_floor_acceleration=summary["peak_floor_acceleration"]["radial"],
-            peak_drift_ratio=summary["peak_drift_ratio"],
-            bearings=tuple(
-                BearingDemand.of(one.summary, float(np.hypot(*u[-1])) if rests(self.time, u) else None)
-                for one in self.bearings
-                for u in [one.displacement[:, :2]]
-            ),
-        )
+        return BuildingCharacterisation.of(self)
 
     @classmethod
     def storage(cls) -> Storage:
         """The functions of `buildings/dataset.py`."""
         return building_dataset
-
-
-def _largest(peaks: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    return {key: max(one[key] for one in peaks) for key in peaks[0]}
 
 
 def _squares(rows: Array, matrix: Array) -> Array:
@@ -429,12 +334,8 @@ class BearingResult(AnyResult, HorizontalMotion):
             top_force=-wrench[:, :3],
             top_moment=-wrench[:, 3:],
             axial_force=building.axial_force[:, index],
-            sliding=building.sliding[own],
             gap=bearing.arrays()["capacity"] - building.sliding[own],
-            rim_force=building.rim_force[own],
-            lift=building.lift[own],
-            temperature=building.temperature[own],
-            normal_force=building.normal_force[own],
+            **{name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")},
             dissipated=building.dissipated[:, index],
             stored=building.stored[:, index],
         )
@@ -494,15 +395,10 @@ class BearingResult(AnyResult, HorizontalMotion):
         return Extremes(
             displacement=peaks.bearing_displacement[index],
             top_force=peaks.top_force[index],
-            sliding=peaks.sliding[own],
             gap=self.capacity - peaks.sliding[own],
             least_normal=least,
             most_normal=most,
-            rim_force=peaks.rim_force[own],
-            lift=peaks.lift[own],
-            temperature=peaks.temperature[own],
-            contact_offset=peaks.contact_offset[own],
-            contact_time=peaks.contact_time[own],
+            **{name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)},
         )
 
     @cached_property
@@ -554,8 +450,11 @@ class BearingResult(AnyResult, HorizontalMotion):
 
     def tables(self) -> list[Table]:
         """Tables of its main results and of its surfaces."""
-        rows = [("status", self.status_text), ("verdict", self.verdict.text), *self.main_results()]
-        return [Table(self.title, (), rows), surface_table(self.summary, self.bearing.surfaces), self.verdict.table]
+        return [
+            Table(self.title, (), self.stated_rows),
+            surface_table(self.summary, self.bearing.surfaces),
+            self.verdict.table,
+        ]
 
     @classmethod
     def storage(cls) -> Storage:
@@ -577,23 +476,4 @@ class BearingResult(AnyResult, HorizontalMotion):
         What the rows of a building do not have (slip velocities) is None, and the notes say so. Raises InputError where
         the bearing did not move.
         """
-        path, peaks = Path.of(self.time, self.displacement, self.top_force), self.extremes
-        largest_of_run = (peaks.displacement[3], peaks.top_force[3])
-
-        lifts = self.scene.modelled[self.index].uplift or bool(self.lift.any())
-
-        def demands(rows: slice | None) -> tuple[SurfaceDemand, ...]:
-            gap, lift = (peaks.gap, peaks.lift) if rows is None else (self.gap[rows].min(0), self.lift[rows].max(0))
-            return capacity_demands(self.bearing, gap, lift if lifts else None)
-
-        found = characterised(
-            self.title,
-            self.status,
-            path,
-            largest_of_run,
-            self.axial_load,
-            self.bearing.gravity,
-            self.dissipated,
-            demands,
-        )
-        return replace(found, notes=(*found.notes, NOT_RECORDED))
+        return characterise_bearing(self)

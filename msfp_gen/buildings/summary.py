@@ -5,12 +5,54 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from msfp_gen.analysis.summary import summary_of_run
 from msfp_gen.common.tables import Table
 from msfp_gen.results.extremes import by_axis
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.building import Building
     from msfp_gen.buildings.extremes import BuildingExtremes
+
+
+def summarise(result: Any) -> dict[str, Any]:
+    """Summary of a `BuildingResult`, which lists its keys."""
+    extremes, weight = result.extremes, result.scene.weight
+    bearings = [one.summary for one in result.bearings]
+    floors, storeys = result.floors, result.storeys
+    force = by_axis(extremes.base_reaction)
+    return {
+        **summary_of_run(result, result.time, result.counters, result.wall_time),
+        "peak_displacement": _largest([one["peak_displacement"] for one in bearings]),
+        "weight": weight,
+        "peak_force": force,
+        "peak_force_ratio": force["radial"] / weight,
+        "peak_base_torsion": float(extremes.base_torsion[0]),
+        "peak_overturning_moment": {
+            key: value for key, value in by_axis(extremes.overturning_moment).items() if key != "E3"
+        },
+        "peak_twist": float(extremes.base_twist[0]),
+        "minimum_load_ratio": min(one["minimum_load_ratio"] for one in bearings),
+        "maximum_load_ratio": max(one["maximum_load_ratio"] for one in bearings),
+        "rims_met": [one["number"] for one in bearings if one["rims_met"]],
+        "peak_floor_acceleration": _largest([floor["peak_acceleration"] for floor in floors]),
+        "peak_drift_ratio": max((storey["peak_drift_ratio"] for storey in storeys), default=None),
+        "peak_corner_drift_ratio": max((storey["peak_corner_drift_ratio"] for storey in storeys), default=None),
+        "floors": floors,
+        "storeys": storeys,
+        "bearings": bearings,
+        "verdict": result.verdict.as_dict,
+        "energy": {
+            "peak_kinetic": float(extremes.energy[0]),
+            "peak_strain": float(extremes.energy[1]),
+            "damped": float(result.damped[-1]),
+            "dissipated": float(result.dissipated[-1].sum()),
+            "closure_error": result.energy_error[0],
+        },
+    }
+
+
+def _largest(peaks: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: max(one[key] for one in peaks) for key in peaks[0]}
 
 
 def floor_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str, Any]]:
