@@ -41,7 +41,7 @@ class Result(AnyResult, RunData):
 
     def judged(self) -> list[Judged]:
         """The bearing itself."""
-        return [Judged(0, "", self.scene.bearing, self.history, self.extremes, self.notes)]
+        return [Judged(0, "", self.scene.bearing, self.history, self.extremes, self.notes, self.events)]
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,8 @@ import numpy as np
 from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.extremes import Extremes, by_axis
-from msfp_gen.results.history import History
-from msfp_gen.results.sliding import intervals
+from msfp_gen.results.history import Event, History
+from msfp_gen.results.sliding import merged, open_times
 
 if TYPE_CHECKING:
     from msfp_gen.results.files import ResultFiles
@@ -55,7 +55,7 @@ def summarise(result: RunData) -> dict[str, Any]:
         **peaks_of_bearing(extremes, load),
         "friction": [surface.friction for surface in bearing.surfaces],
         "friction_at_pivot": None if sheet is None else list(sheet),
-        "uplift": uplift_of(result.history, extremes),
+        "uplift": uplift_of(result.history, extremes, result.events),
         "rims_met": rims_met(result),
         "energy": energy_balance(result.history),
     }
@@ -100,17 +100,17 @@ def peaks_of_bearing(extremes: Extremes, load: float | None) -> dict[str, Any]:
     }
 
 
-def uplift_of(history: Any, extremes: Extremes) -> dict[str, Any]:
+def uplift_of(history: Any, extremes: Extremes, events: Sequence[Event] = ()) -> dict[str, Any]:
     """Uplift of a bearing. history: with `time` and `lift`, shape (T, n-1) [m].
 
     Keys:
         height: largest clearance between the faces of any surface [m].
-        duration: longest time for which some surface is open [s], by the rows; 0 where it is shorter than their
-            distance.
-        count: how often one opened, by the rows.
+        duration: longest time for which some surface is open [s], by the events, of buildings by the rows: 0 where it
+            is shorter than their distance.
+        count: how often the bearing opened, likewise.
     """
     height = 0.0 if extremes.lift is None else float(extremes.lift.max())
-    spells = intervals(history.time, (history.lift > 0).any(axis=1)) if height else []
+    spells = merged(spell for spells in open_times(history, events) for spell in spells) if height else []
     duration = max((length for _, length in spells), default=0.0)
     return {"height": height, "duration": duration, "count": max(len(spells), int(height > 0))}
 

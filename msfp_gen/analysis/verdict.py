@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from msfp_gen.common.tables import Table
-from msfp_gen.results.sliding import intervals
+from msfp_gen.results.sliding import open_times
 from msfp_gen.scene.limits import Limits
 
 if TYPE_CHECKING:
     from msfp_gen.common.arrays import Array
     from msfp_gen.results.extremes import Extremes
+    from msfp_gen.results.history import Event
     from msfp_gen.results.note import Note
     from msfp_gen.scene.bearing import Bearing
 
@@ -28,7 +29,7 @@ SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of tex
 class Judged(NamedTuple):
     """A bearing alone, or one of a building: number from 1 and label; 0 and "" for a bearing alone.
 
-    history: its rows by the names of `History`. notes: of its monitors.
+    history: its rows by the names of `History`. notes: of its monitors. events: none of a bearing of a building.
     """
 
     number: int
@@ -37,6 +38,7 @@ class Judged(NamedTuple):
     history: Any
     extremes: Extremes
     notes: Sequence[Note]
+    events: Sequence[Event]
 
 
 class Value(NamedTuple):
@@ -242,8 +244,8 @@ def _uplift_height(one: Judged, limits: Limits) -> Iterator[Value]:
 
 
 def _uplift_duration(one: Judged, limits: Limits) -> Iterator[Value]:
-    for surface, lift in enumerate(one.history.lift.T, start=1):
-        start, length = max(intervals(one.history.time, lift > 0), key=lambda spell: spell[1], default=(0.0, 0.0))
+    for surface, spells in enumerate(open_times(one.history, one.events), start=1):
+        start, length = max(spells, key=lambda spell: spell[1], default=(0.0, 0.0))
         yield Value(surface, start, length, limits.uplift_duration)
 
 

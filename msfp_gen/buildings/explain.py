@@ -21,6 +21,7 @@ from msfp_gen.scene.effect_selection import (
     scene_doubts,
 )
 from msfp_gen.scene.friction_parameters import law_parameters
+from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.standing import unsteady
 from msfp_gen.specification.layout import Effects
@@ -79,6 +80,7 @@ def explain(scene: AnyScene) -> list[Table]:
             *doubt_tables(_doubts(scene)),
             *map(motion_table, scene.grounds[0]),
             *effect_tables(scene),
+            *_limits(scene.limits),
             _solver(scene),
         ]
     return [
@@ -91,6 +93,7 @@ def explain(scene: AnyScene) -> list[Table]:
         *_history("rotation of the top", scene.top_rotation),
         effect_table(scene.effect_selection),
         *friction_tables(scene.modelled.law, scene.bearing),
+        *_limits(scene.limits),
         _solver(scene),
     ]
 
@@ -287,6 +290,15 @@ def friction_tables(law: Law | None, bearing: Bearing) -> list[Table]:
     names = {name: f"{name} [{units[name]}]" if units[name] else name for name in law.parameters}
     lines = [(shown, *(f"{row[name]:.4g}" for row in rows)) for name, shown in names.items()]
     return [Table("friction law, surfaces bottom first", ("", *map(str, range(1, len(rows) + 1))), lines)]
+
+
+def _limits(limits: Limits | None) -> Iterator[Table]:
+    """The limits of the device that the scene gives, with the defaults of the others that have a number."""
+    if limits is not None:
+        units = {name: rule.unit for name, rule, _ in ruled_fields(Limits) if isinstance(rule, Quantity)}
+        values = {name: getattr(limits, name) for name in units}
+        rows = [(name, f"{value:g} {units[name]}") for name, value in values.items() if value is not None]
+        yield Table("limits of the device, for the verdict", (), rows)
 
 
 def _solver(scene: AnyScene) -> Table:

@@ -441,7 +441,7 @@ class BearingResult(AnyResult, HorizontalMotion):
 
     def judged(self) -> list[Judged]:
         """The bearing itself, with its number and its label."""
-        return [Judged(self.index + 1, self.label, self.bearing, self, self.extremes, self.notes)]
+        return [Judged(self.index + 1, self.label, self.bearing, self, self.extremes, self.notes, self.events)]
 
     @property
     def curve(self) -> Curve:

@@ -11,11 +11,14 @@ rim, do not slide. The definition has two forms:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.history import History
+from msfp_gen.results.history import Event, History
 
 SHARE = 0.05  # of the slip of all surfaces together, over an interval
 INSTANT_SHARE = 0.1  # the same at one instant
@@ -75,3 +78,41 @@ def intervals(time: Array, flags: Flags) -> list[tuple[float, float]]:
     change = np.diff(np.concatenate([[False], flags, [False]]).astype(int))
     starts, ends = edges[np.flatnonzero(change > 0)], edges[np.flatnonzero(change < 0)]
     return [(float(start), float(end - start)) for start, end in zip(starts, ends, strict=True) if end > start]
+
+
+def openings(time: Array, lift: Array, events: Iterable[Event]) -> list[tuple[float, float]]:
+    """Times in which a surface is open, as (start, length) [s]: by its events where there are some, else by the rows.
+
+    time, lift: ndarrays, shape (T,) [s], [m]. events: of the surface.
+    """
+    changes = [event for event in events if event.kind in ("lift_off", "landing")]
+    if not changes:
+        return intervals(time, lift > 0)
+    spells, start = [], float(time[0]) if lift[0] > 0 else None
+    for event in changes:
+        if event.kind == "lift_off":
+            start = event.time if start is None else start
+        elif start is not None:
+            spells.append((start, event.time - start))
+            start = None
+    return spells if start is None else [*spells, (start, float(time[-1]) - start)]
+
+
+def open_times(history: Any, events: Iterable[Event]) -> list[list[tuple[float, float]]]:
+    """The openings of every surface, bottom first. history: with `time` and `lift`, shape (T, n-1) [m]."""
+    of_surfaces: list[list[Event]] = [[] for _ in range(history.lift.shape[1] + 1)]
+    for event in events:
+        of_surfaces[event.surface].append(event)
+    return [openings(history.time, lift, own) for lift, own in zip(history.lift.T, of_surfaces[1:], strict=True)]
+
+
+def merged(spells: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Times that lie in any of several, as (start, length) [s]."""
+    union: list[tuple[float, float]] = []
+    for start, length in sorted(spells):
+        if union and start <= sum(union[-1]):
+            first = union[-1][0]
+            union[-1] = (first, max(sum(union[-1]), start + length) - first)
+        else:
+            union.append((start, length))
+    return union

@@ -29,10 +29,13 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.analysis.verdict import LIMITS, RIM_SHARE
+from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.cli import main
 from msfp_gen.common.identity import fingerprint
+from msfp_gen.results.history import Event
 from msfp_gen.results.note import Note
+from msfp_gen.results.sliding import merged, openings
 from msfp_gen.simulation.run_any import simulate as run_any
 
 OPENING = 3e-3  # [m]
@@ -236,6 +239,48 @@ def test_temperatures_of_a_building_begin_at_the_start() -> None:
     assert "peak T [degC]" in "\n".join(table.text for table in hot.bearings[0].tables())
 
 
+@pytest.mark.parametrize(
+    ("kinds", "first", "expected"),
+    [
+        ([(4.0, "lift_off"), (4.25, "landing"), (8.0, "lift_off"), (8.5, "landing")], 0.0, [(4.0, 0.25), (8.0, 0.5)]),
+        ([(0.5, "landing"), (19.0, "lift_off")], 1e-3, [(0.0, 0.5), (19.0, 1.0)]),
+        ([(4.0, "lift_off"), (4.1, "lift_off"), (4.25, "landing"), (4.3, "landing")], 0.0, [(4.0, 0.25)]),
+        ([(4.0, "rim_contact")], 0.0, [(2.995, 0.11)]),
+    ],
+)
+def test_events_say_how_long_a_surface_is_open(
+    kinds: list[tuple[float, Any]], first: float, expected: list[tuple[float, float]]
+) -> None:
+    """Also from the start or until the end of the run; without such events the rows do."""
+    time, lift = np.linspace(0.0, 20.0, 2001), np.zeros(2001)
+    lift[0], lift[300:311] = first, OPENING
+    events = [Event(when, 1, kind, np.zeros(3), np.zeros(3)) for when, kind in kinds]
+    assert [pytest.approx(spell) for spell in openings(time, lift, events)] == expected
+
+
+def test_openings_of_several_surfaces_are_one_of_the_bearing() -> None:
+    assert merged([(4.0, 0.5), (1.0, 0.5), (4.25, 0.5), (4.75, 0.25), (6.0, 1.0)]) == [
+        (1.0, 0.5),
+        (4.0, 1.0),
+        (6.0, 1.0),
+    ]
+    lifted = replace(
+        opened(),
+        events=tuple(
+            Event(when, surface, kind, np.zeros(3), np.zeros(3))
+            for when, surface, kind in [
+                (4.0, 2, "lift_off"),
+                (4.2, 3, "lift_off"),
+                (4.3, 2, "landing"),
+                (4.6, 3, "landing"),
+            ]
+        ),
+    )
+    assert lifted.summary["uplift"] == {"height": OPENING, "duration": pytest.approx(0.6), "count": 1}
+    spell = lifted.verdict.worst["uplift_duration"].value
+    assert (spell.surface, spell.time) == (3, 4.2) and spell.reached == pytest.approx(0.4)
+
+
 def test_tables_of_rims_name_the_surface() -> None:
     summary, printed = at_the_rims().summary, repr(at_the_rims())
     assert [one["rims_met"] for one in summary["bearings"]] == [[1, 4], [1], [1], [1, 4]]
@@ -339,3 +384,16 @@ def test_limits_of_a_file_and_of_python() -> None:
     changed = changed_scene("fenz-test1", {"limits.rim_force": "12 kN"})
     assert changed.limits == Limits(rim_force=12e3)
     assert changed_scene("hospital-ccc", {"limits.axial_load": 3e6}).limits == Limits(axial_load=3e6)
+
+
+@pytest.mark.parametrize("given", [load_scene("fenz-test1"), scene(frame())], ids=["bearing", "building"])
+def test_explain_has_the_limits_that_are_given(given: Scene | BuildingScene) -> None:
+    tables = [table for table in explain(replace(given, limits=LIMITED)) if "limits" in table.title]
+    assert [row[0] for row in tables[0].rows] == [
+        "rim_force",
+        "uplift_height",
+        "uplift_duration",
+        "temperature",
+        "displacement",
+    ]
+    assert tables[0].rows[0][1] == "12000 N" and not [t for t in explain(given) if "limits" in t.title]
