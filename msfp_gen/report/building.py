@@ -8,6 +8,7 @@ import numpy as np
 
 from msfp_gen.common.tables import Table
 from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
+from msfp_gen.report.content import TERMS as BEARING_TERMS
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.version import __version__
 
@@ -25,8 +26,7 @@ FIGURES = {
 }
 SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js", "frame.js", "player.js", "building.js")
 TERMS = (
-    ("friction pendulum bearing", "steel sliders in spherical dishes, between a structure and its foundation. It "
-     "slides when the ground moves, friction dissipates energy, and the weight on the curved dishes brings it back."),
+    BEARING_TERMS[0],
     ("u", "horizontal displacement across a bearing: base less top, less its value at the start."),
     ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
      "the bearing would lift off."),

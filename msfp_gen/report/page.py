@@ -90,6 +90,7 @@ def report_html(
         content = _of_bearing(result, frames, progress)
     content["summary"] += note_tables(result)
     scripts, data = content.pop("scripts"), content.pop("data")
+    device = ", ".join(dict.fromkeys(map(kind_of, result.scene.every_bearing)))
     return render(
         "page.html.jinja",
         **content,
@@ -98,7 +99,8 @@ def report_html(
         provenance=provenance_table(result),
         name=result.scene.name or "unnamed scene",
         kind="report",
-        title_block=title.rows(content["device"]),
+        title_block=title.rows(device),
+        scene=result.dataset.attrs["scene"],
         outcome=outcome(result),
         good=result.verdict.ok,
         speeds=SPEEDS,
@@ -112,17 +114,14 @@ def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[
     from markupsafe import Markup
 
     from msfp_gen.figures import FIGURES as PLOTS
-    from msfp_gen.scene.file.stored_motion import scene_attribute
 
     data = view(result, frames)
     return {
         "moving": "The bearing in motion",
         "stage": Markup(render("bearing.html.jinja")),
         "lead": _introduction(result),
-        "device": kind_of(result.scene.bearing),
         "terms": TERMS,
         "summary": summary_page(result),
-        "scene": scene_attribute(result.scene),
         "explanation": EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time)),
         "figures": list(_pictures(result, FIGURES, PLOTS, progress)),
         "data": data,
@@ -134,7 +133,6 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
     """What the page of a building shows."""
     from markupsafe import Markup
 
-    from msfp_gen.buildings.dataset import scene_text
     from msfp_gen.figures import BUILDING_FIGURES
     from msfp_gen.report import building
 
@@ -144,10 +142,8 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
         "moving": "The building in motion",
         "stage": Markup(stage),
         "lead": building.introduction(result),
-        "device": ", ".join(dict.fromkeys(kind_of(bearing.bearing) for bearing in result.scene.bearings)),
         "terms": building.TERMS,
         "summary": building.summary_page(result),
-        "scene": scene_text(result.scene),
         "explanation": building.explanation(data["frames"]["time"]["shape"][0], len(result.time)),
         "figures": list(_pictures(result, building.FIGURES, BUILDING_FIGURES, progress)),
         "data": data,
