@@ -196,7 +196,7 @@ def surface_table(bearing: Bearing) -> Table:
 
 
 def doubt_tables(doubts: Iterable[tuple[int, float, str]]) -> Iterator[Table]:
-    """Values that are hardly meant, as of `plausibility.doubtful_values`; no table without them."""
+    """Values that are hardly meant, as of `effect_selection.doubtful_values`; no table without them."""
     rows = [(text,) for _, _, text in doubts]
     if rows:
         yield Table("values that are hardly meant", ("value",), rows)

@@ -105,9 +105,10 @@ def stored_fields(
             if not (np.isfinite(values) | (missing if unknown else False)).all():
                 raise ValueError(f"{name} is not finite")
         arrays[f"{path}{name}"] = values
+        if variable.part and variable.field not in fields:
+            fields[variable.field] = np.empty([sizes[dim] for dim in variable.whole])
         if variable.part:
-            whole = np.empty([sizes[dim] for dim in variable.whole])
-            fields.setdefault(variable.field, whole)[variable.part] = values
+            fields[variable.field][variable.part] = values
         else:
             fields[variable.field] = values
     return fields

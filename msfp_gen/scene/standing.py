@@ -70,7 +70,7 @@ def check_standing(path: str, stiffness: float, needed: float, load: float) -> N
 def unsteady(path: str, stiffness: float, needed: float) -> Iterator[tuple[int, float, str]]:
     """The doubt where a plate stands while friction holds it alone, or would turn over under `MARGIN` times its load.
 
-    Yields 0 (no surface), the value and the text, as `plausibility.doubtful_values`. Arguments as of `check_standing`.
+    Yields 0 (no surface), the value and the text, as `doubtful_values`. Arguments as of `check_standing`.
     """
     if 0 < needed < np.inf and stiffness < MARGIN * needed:
         reason = f"the top plate turns over where N is {stiffness / needed:.2g} times that at rest"
