@@ -19,7 +19,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
-from msfp_gen.scene.file.motion_tables import KINDS, Paths, paths_in, resolved
+from msfp_gen.scene.file.motion_tables import KINDS, Paths, located, paths_in, resolved
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
@@ -206,7 +206,5 @@ def _values(given: Any, path: str, named: Table) -> Bearing:
 
 
 def _motion(given: Table, folder: Path | None) -> Motion:
-    values = dict(given)
-    if "file" in values:
-        values["file"] = resolved(values["file"], folder)
+    values = located(given, folder)
     return KINDS[values.pop("kind")](**values).build()

@@ -12,7 +12,7 @@ from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.changes import changed_table, keys_of
 from msfp_gen.scene.file.loader import scene_from_table, scene_table
-from msfp_gen.scene.file.motion_tables import resolved
+from msfp_gen.scene.file.motion_tables import resolved, with_spectrum
 from msfp_gen.scene.scene import Scene
 
 AnyScene = Scene | BuildingScene
@@ -62,6 +62,8 @@ def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[s
         for name in names:
             if name in inner and _are_texts(inner[name]):  # the schema refuses others
                 inner[name] = resolved(inner[name], folder, f"{place}.{name}")
+        if isinstance(inner.get("scale_to"), dict):
+            inner["scale_to"] = with_spectrum(inner["scale_to"], folder, f"{place}.scale_to")
     return found
 
 

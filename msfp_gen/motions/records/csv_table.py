@@ -15,7 +15,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.records.record import Record, common_window, derived_note, differentiated, stem
 from msfp_gen.motions.records.text import Lines, column, read_lines
 
-_COLUMN = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*")
+COLUMN = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*")
 _QUANTITIES = {"a": ("acceleration", "m/s^2"), "v": ("velocity", "m/s"), "u": ("displacement", "m")}
 _UNEVEN = 1e-3  # permitted deviation of printed times from even spacing, as a share of the time step
 
@@ -43,7 +43,7 @@ class Table:
 
 def matches(lines: Lines) -> bool:
     """Whether all columns of the first line that is not a comment have the form `name [unit]`."""
-    return all(_COLUMN.fullmatch(c) for c in _first(lines)[1].split(","))
+    return all(COLUMN.fullmatch(c) for c in first_line(lines)[1].split(","))
 
 
 def read_table(path: str | PathLike[str]) -> Table:
@@ -92,16 +92,16 @@ def write_csv(record: Record, path: str | PathLike[str]) -> Path:
     return target
 
 
-def _first(lines: Lines) -> tuple[int, str]:
-    """Index and text of the first line that is neither blank nor a comment."""
+def first_line(lines: Lines, header: str = "time [s], a1 [m/s^2], ...") -> tuple[int, str]:
+    """Index and text of the first line that is neither blank nor a comment. header: what it should be."""
     for index, line in enumerate(lines.lines):
         if line.strip() and not line.lstrip().startswith("#"):
             return index, line
-    lines.fail(0, "no header; begin with: time [s], a1 [m/s^2], ...")
+    lines.fail(0, f"no header; begin with: {header}")
 
 
 def _table(lines: Lines) -> Table:
-    head, header = _first(lines)
+    head, header = first_line(lines)
     names, units, factors = _columns(lines, head, header)
     rows, last, end = [], [], head
     for index in range(head + 1, len(lines)):
@@ -125,7 +125,7 @@ def _columns(lines: Lines, head: int, header: str) -> tuple[list[str], list[str]
     """Names, units and factors to SI of the columns; `head` is the index of the line of the header."""
     from msfp_gen.common.quantities import to_si
 
-    matches = [_COLUMN.fullmatch(c) for c in header.split(",")]
+    matches = [COLUMN.fullmatch(c) for c in header.split(",")]
     for text, match in zip(header.split(","), matches, strict=True):
         if match is None:
             lines.fail(

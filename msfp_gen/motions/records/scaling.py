@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import inf
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -17,16 +18,33 @@ from msfp_gen.motions.checks import finite, positive
 from msfp_gen.motions.records.correction import Corrected, baseline_corrected, uncorrected
 from msfp_gen.motions.records.record import Record
 from msfp_gen.motions.records.spectrum import DAMPING, ContinuousMotion, Progress, measure_index, response_spectrum
+from msfp_gen.motions.records.target import (
+    EN1998_END,
+    Pairs,
+    Tabulated,
+    check_pairs,
+    en1998_spectrum,
+    read_spectrum,
+    tabulated_spectrum,
+)
 
 _ACCELERATION = Quantity("m/s^2", above=0.0)
 _PERIOD = Quantity("s", above=0.0)
 _FIT_POINTS = 100  # number of periods of a fit to a design spectrum, evenly spaced on a logarithmic axis
-_TARGETS = ("pga", "sa and period", "sds, sd1 and between")
+_KEYS = ("pga", "sa", "period", "sds", "sd1", "ag", "ground", "spectrum", "between")
+_TARGETS = {
+    "pga": ("pga",),
+    "sa and period": ("sa", "period"),
+    "sds, sd1 and between": ("sds", "sd1", "between"),
+    "ag, ground and between": ("ag", "ground", "between"),
+    "spectrum and between": ("spectrum", "between"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleTo:
-    """Target of scaling: give `pga`, or `sa` and `period`, or `sds`, `sd1` and `between`.
+    """Target of scaling: `pga`; `sa` and `period`; or a spectrum with `between`: `sds` and `sd1`, `ag` and `ground`, or
+    `spectrum`.
 
     All three components are multiplied by the same factor, so their ratios do not change.
 
@@ -37,12 +55,15 @@ class ScaleTo:
         sds: ordinate of the design spectrum of ASCE 7 at short periods [m/s^2].
         sd1: ordinate of that spectrum at 1 s [m/s^2].
         long_period: its transition period to constant displacement, T_L [s].
-        between: shortest and longest period of the fit to it [s], by least squares of the logarithms.
+        ag: design ground acceleration of EN 1998-1 on ground of type A, gamma_I a_gR [m/s^2].
+        ground: type of the ground of EN 1998-1, A to E. spectrum_type: 1 or 2.
+        spectrum: path of a CSV file with the header `period [s], Sa [g]` or other units, or pairs [s], [m/s^2].
+        between: shortest and longest period of the fit to a spectrum [s], by least squares of the logarithms.
         component: component or measure that meets the target: E1, E2, E3, geomean, rotd50 or rotd100.
         damping: damping ratio of the spectra [-].
 
     Raises:
-        InputError: a value is not permitted, or the values do not form one of the three targets.
+        InputError: a value is not permitted, or the values do not form one of these targets.
     """
 
     pga: Annotated[float | None, _ACCELERATION] = None
@@ -51,17 +72,57 @@ class ScaleTo:
     sds: Annotated[float | None, _ACCELERATION] = None
     sd1: Annotated[float | None, _ACCELERATION] = None
     long_period: Annotated[float, _PERIOD] = 8.0
+    ag: Annotated[float | None, _ACCELERATION] = None
+    ground: Literal["", "A", "B", "C", "D", "E"] = ""
+    spectrum_type: Annotated[int, Quantity("", least=1, whole=True)] = 1
+    spectrum: Annotated[str | Pairs | None, Tabulated()] = None
     between: Annotated[tuple[float, float] | None, Quantity("s", above=0.0, shape=(2,))] = None
     component: Literal["E1", "E2", "E3", "geomean", "rotd50", "rotd100"] = "rotd50"
     damping: Annotated[float, Quantity("", above=0.0)] = DAMPING
 
     def __post_init__(self) -> None:
         check_fields(self, "scale_to")
-        keys = tuple(n for n in ("pga", "sa", "period", "sds", "sd1", "between") if getattr(self, n) is not None)
-        if keys not in (("pga",), ("sa", "period"), ("sds", "sd1", "between")):
+        keys = tuple(name for name in _KEYS if getattr(self, name) not in (None, ""))
+        if keys not in _TARGETS.values():
             raise InputError(f"scale_to: {', '.join(keys) or 'nothing'} given; give {', or '.join(_TARGETS)}")
         if self.between is not None and self.between[0] >= self.between[1]:
             raise InputError(f"scale_to.between = {list(self.between)}: give the shorter period first")
+        if isinstance(self.spectrum, str):
+            object.__setattr__(self, "spectrum", read_spectrum(self.spectrum))
+        if self.spectrum is not None:
+            check_pairs(self._pairs)
+        if self.spectrum_type > 2:
+            raise InputError(f"scale_to.spectrum_type = {self.spectrum_type}: give 1, or 2 for magnitudes up to 5.5")
+        if self.between is not None and not self.shortest <= self.between[0] < self.between[1] <= self.longest:
+            raise InputError(
+                f"scale_to.between = {list(self.between)}: the target has periods from {self.shortest:g} to "
+                f"{self.longest:g} s; stay within"
+            )
+
+    @property
+    def _pairs(self) -> Pairs:
+        assert isinstance(self.spectrum, tuple)
+        return self.spectrum
+
+    @property
+    def shortest(self) -> float:
+        """Shortest period of the target [s]."""
+        return 0.0 if self.spectrum is None else self._pairs[0][0]
+
+    @property
+    def longest(self) -> float:
+        """Longest period of the target [s]."""
+        if self.spectrum is not None:
+            return self._pairs[-1][0]
+        return inf if self.ag is None else EN1998_END
+
+    def shape(self, period: Array) -> Array:
+        """The target spectrum at periods within its range, shape (p,) [m/s^2]."""
+        if self.spectrum is not None:
+            return tabulated_spectrum(period, self._pairs)
+        if self.ag is not None:
+            return en1998_spectrum(period, self.ag, self.ground, self.spectrum_type, self.damping)
+        return asce7_spectrum(period, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
 
     def factor(self, motion: Record | Corrected | ContinuousMotion, progress: Progress | None = None) -> float:
         """Factor by which `motion` must be multiplied to meet the target; `progress` as of `response_spectrum`.
@@ -84,7 +145,7 @@ class ScaleTo:
         if self.between is None:
             return np.array([self.period], dtype=float), np.array([self.sa], dtype=float)
         periods = np.geomspace(*self.between, _FIT_POINTS)
-        return periods, asce7_spectrum(periods, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+        return periods, self.shape(periods)
 
     def curve(self, period: Array) -> tuple[Array, Array] | None:
         """The target as a curve for a plot of spectra; None for a peak acceleration.
@@ -100,7 +161,8 @@ class ScaleTo:
         if self.between is None:
             level = np.full(2, float(self.sa or 0.0))
             return np.array([0.8, 1.25]) * float(self.period or 0.0), level
-        return period, asce7_spectrum(period, self.sds or 0.0, self.sd1 or 0.0, self.long_period)
+        period = period[(period >= self.shortest) & (period <= self.longest)]
+        return period, self.shape(period)
 
     @classmethod
     def parse(cls, text: str) -> ScaleTo:
@@ -135,15 +197,18 @@ class ScaleTo:
         if self.between is None:
             return f"{self.component} pseudo-acceleration {self.sa:.4g} m/s^2 at {self.period:g} s"
         low, high = self.between
-        return (
-            f"{self.component} to the ASCE 7 spectrum of {self.sds:.4g} and {self.sd1:.4g} m/s^2, "
-            f"least squares from {low:g} to {high:g} s"
-        )
+        if self.spectrum is not None:
+            target = f"a spectrum of {len(self._pairs)} periods"
+        elif self.ag is not None:
+            target = f"the spectrum of EN 1998-1, type {self.spectrum_type}, ground {self.ground}, {self.ag:.4g} m/s^2"
+        else:
+            target = f"the ASCE 7 spectrum of {self.sds:.4g} and {self.sd1:.4g} m/s^2"
+        return f"{self.component} to {target}, least squares from {low:g} to {high:g} s"
 
 
 def _number(text: str) -> float | str:
     try:
-        return float(text)
+        return int(text) if text.strip().isdecimal() else float(text)
     except ValueError:
         return text.strip()
 

@@ -16,7 +16,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import catalogue, schema
-from msfp_gen.scene.file.motion_tables import KINDS, Pieces, resolved
+from msfp_gen.scene.file.motion_tables import KINDS, Pieces, located
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
 from msfp_gen.scene.file.toml_text import dumps, plain_values
 from msfp_gen.scene.limits import Limits
@@ -93,9 +93,7 @@ def scene_from_table(
     permitted. motion: replaces the `[motion]` table; motion_table: that from which it was made. Raises InputError.
     """
     valid = schema.validate_scene(table if motion is None else {**table, "motion": _ANY_MOTION})
-    motion_keys = dict(valid["motion"])
-    if "file" in motion_keys:
-        motion_keys["file"] = resolved(motion_keys["file"], folder)
+    motion_keys = located(valid["motion"], folder)
     top = dict(valid["top"])
     parts: Table = {name: kind(**valid.pop(name)) for name, kind in _PARTS.items() if name in valid}
     if "effects" in valid:

@@ -265,6 +265,32 @@ def resolved(file: str | tuple[str, ...], folder: Path | None, name: str = "moti
     return tuple(_resolved(path, folder, name) for path in file)
 
 
+def located(table: Mapping[str, Any], folder: Path | None, name: str = "motion") -> dict[str, Any]:
+    """The table of a motion with absolute paths of its files, and with the rows of a tabulated target spectrum.
+
+    folder, errors: as of `resolved`; name: of the table.
+    """
+    found = dict(table)
+    if "file" in found:
+        found["file"] = resolved(found["file"], folder, f"{name}.file")
+    if isinstance(found.get("scale_to"), Mapping):
+        found["scale_to"] = with_spectrum(found["scale_to"], folder, f"{name}.scale_to")
+    return found
+
+
+def with_spectrum(target: Mapping[str, Any], folder: Path | None, name: str) -> dict[str, Any]:
+    """The table of a target with the rows of its spectrum in place of the path of their file; else as of `located`."""
+    from msfp_gen.motions.records.target import read_spectrum
+
+    found = dict(target)
+    if isinstance(found.get("spectrum"), str):
+        path = Path(str(resolved(found["spectrum"], folder, f"{name}.spectrum")))
+        if not is_input(path):
+            raise InputError(f"{name}.spectrum = {str(path)!r}: no such file; paths are relative to the scene file")
+        found["spectrum"] = [list(pair) for pair in read_spectrum(path)]
+    return found
+
+
 def _resolved(file: str, folder: Path | None, name: str) -> str:
     try:
         path = ((folder or Path()) / file).resolve()

@@ -12,7 +12,7 @@ from msfp_gen.common.inputs import is_input
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file import schema
 from msfp_gen.scene.file.loader import toml_file
-from msfp_gen.scene.file.motion_tables import RecordMotion, resolved
+from msfp_gen.scene.file.motion_tables import RecordMotion, located, with_spectrum
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
@@ -61,15 +61,14 @@ def suite_from_table(
     if not valid["records"]:
         raise InputError("records = []: give at least one [[records]]")
     tables = [_located(record, folder, index) for index, record in enumerate(valid["records"])]
-    return _suite(tables, valid.get("scale_to"), progress)
+    target = valid.get("scale_to")
+    return _suite(tables, target and with_spectrum(target, folder, "scale_to"), progress)
 
 
 def _located(table: Table, folder: Path | None, index: int) -> Table:
     """The table of a record with absolute paths."""
-    if "file" not in table:
-        return table
     with errors_at("motion", f"records[{index}]"):
-        return {**table, "file": resolved(table["file"], folder)}
+        return located(table, folder)
 
 
 def _suite(tables: list[Table], target: Table | None, progress: Callable[[float, float], None] | None) -> Suite:
