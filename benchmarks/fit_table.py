@@ -46,13 +46,13 @@ def computed(result: Result) -> Array:
 
 def derivatives(result: Result) -> Array:
     """Their derivatives with respect to the coefficients, shape (6, 4)."""
-    gradients, found = result.gradients, []
-    assert gradients is not None
+    assert result.gradients is not None
+    slopes, found = result.gradients.arrays, []
     for index in range(4):
 
         def moved(change: float, index: int = index) -> Array:
             fields = ("base_displacement", "top_displacement", "sliding")
-            rows = {name: getattr(result.history, name) + change * gradients.rows[name][index] for name in fields}
+            rows = {name: getattr(result.history, name) + change * slopes[name][index] for name in fields}
             return np.array(
                 [stopping_displacement(replace(result.history, **rows), at) for at in STOPS.values()], float
             )
@@ -64,8 +64,8 @@ def derivatives(result: Result) -> Array:
             np.concatenate(
                 [
                     (moved(SMALL) - moved(-SMALL)) / (2 * SMALL),
-                    gradients.event_displacement[index, events, 0],
-                    gradients.event_top_force[index, events, 0] / LOAD,
+                    slopes["event_displacement"][index, events, 0],
+                    slopes["event_top_force"][index, events, 0] / LOAD,
                 ]
             )
         )
