@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from msfp_gen.common.output import replacing
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
-from msfp_gen.generator.schedule import Over, momentum_balances
+from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
@@ -65,22 +66,37 @@ stack.
 
 SCHEDULE = r"""## One evaluation of a stack
 
-The momentum balances (3.26)-(3.29) at given unknowns (2.119), from `generator/schedule.py`: which program runs over
-which bodies and surfaces, from the lowest up, and from which blocks to which. From the same lines the C is emitted that
-evaluates the balances and differentiates them, program by program. Bodies are numbered 1 to n as in PEER 2017/07, and
-surface $\gamma$ lies between bodies $\gamma$ and $\gamma+1$. Given are the coordinates `x`, the inertial `frame` with
-the translation of the base, `load_force` and `load_moment` on the top plate, the `unknowns` of the contacts, the state
-of `friction` and, where a mass rests on a vertical spring, its `foot_stage`. Two programs only gather:
-`rim_coordinates` the tilts of body $\gamma+1$ and their rates, `balances` the balances of a body, where with locked
-spin $\ddot\phi_k = 0$ takes the place of the axial one. The other programs follow below."""
+From `generator/schedule.py`: which program runs over which bodies and surfaces, and from which blocks to which. From
+the same lines the C is emitted that evaluates a stack, that differentiates it by the variables of a step, and that
+differentiates it by parameters, program by program. Bodies are numbered 1 to n as in PEER 2017/07, and surface
+$\gamma$ lies between bodies $\gamma$ and $\gamma+1$. Given are the coordinates `x`, the inertial `frame` with the
+translation of the base, `load_force` and `load_moment` on the top plate and, where a mass rests on a vertical spring,
+its `foot_stage`. The programs follow below, but for those that only gather, add or copy: `rim_coordinates`,
+`surface_moment`, `balances`, and with uplift `surface_force`, `split_moment`, `wrench_above`, `excess_force`."""
+
+CONDENSED = """### The condensed equations
+
+What a run solves: interface forces are summed from the top plate down, contacts are in closed form, and the angular
+balances are left. `contact` is evaluated for all surfaces at once, since C solves for the friction of the end of the
+stage (`stage`, `shear`)."""
+
+UPLIFT = """With uplift (`docs/uplift.md`) the unilateral contacts and the rims give the forces of the surfaces, and
+what these leave of the sums are further rows, `excess`. Forces and moments are then"""
+
+BALANCES = r"""### The momentum balances
+
+The balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them, with the state of `friction` and the
+`unknowns` of the contacts. With locked spin $\ddot\phi_k = 0$ takes the place of the axial balance of a body."""
 
 OVER = {
     Over.BASE: "base",
     Over.BODIES: "bodies $k = 2, \\dots, n$",
     Over.SURFACES: "surfaces $\\gamma = 1, \\dots, n-1$",
+    Over.DOWNWARD: "surfaces $\\gamma = n-1, \\dots, 1$",
+    Over.TOGETHER: "all surfaces at once",
     Over.TOP: "top plate",
 }
-PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n"}
+PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n", "slider": "slider"}
 
 TITLES = {
     "arms": "Distances along the axis, from (3.4)-(3.11)",
@@ -146,15 +162,28 @@ def place(text: str) -> str:
     return f"`{name}[{PLACES.get(index, index)}]`" if index else f"`{name}`"
 
 
-def schedule_section() -> list[str]:
-    """The schedule of the momentum balances as a table."""
+def schedule_table(passes: Iterable[Pass]) -> str:
+    """The calls of passes as a table."""
     lines = ["| over | program | reads | writes |", "|---|---|---|---|"]
-    for one in momentum_balances(Effects()):
+    for one in passes:
         for call in one.calls:
             reads, writes = (", ".join(map(place, places)) for places in (call.reads, call.writes))
-            program = f"`{call.program}`" + (", where it acts" if call.decision and call.decision.acts else "")
+            program = " or ".join(f"`{name}`" for name in call.programs)
+            program += ", where it acts" if isinstance(call.by, Decision) else ""
             lines.append(f"| {OVER[one.over]} | {program} | {reads} | {writes} |")
-    return [SCHEDULE, "\n".join(lines)]
+    return "\n".join(lines)
+
+
+def schedule_section() -> list[str]:
+    """The schedules of a model with every effect of the report, and what uplift changes."""
+    effects = Effects()
+    uplift = condensed(Effects(uplift=True))
+    return [
+        SCHEDULE,
+        *(CONDENSED, schedule_table(passes_of(condensed(effects)))),
+        *(UPLIFT, schedule_table((*uplift["forces"], *uplift["moments"]))),
+        *(BALANCES, schedule_table(passes_of(momentum_balances(effects)))),
+    ]
 
 
 def text() -> str:

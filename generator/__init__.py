@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from msfp_gen.specification.layout import ModelSpec
 
+    from .lower import Kernel
+
 
 @dataclass(frozen=True)
 class Generated:
@@ -40,6 +42,7 @@ def generate(spec: ModelSpec) -> Generated:
         spec: layout and effects.
     """
     from .derive import derive
+    from .drivers import directional_kernels
     from .emit import emit
     from .gradients import directional_programs
     from .lower import lower
@@ -48,8 +51,9 @@ def generate(spec: ModelSpec) -> Generated:
     equations = derive(spec)
     times.append(time.perf_counter())
     kernels = tuple(lower(program) for program in equations.programs)
-    wanted = directional_programs(equations.programs) if spec.gradients else ()
-    directional = tuple(lower(program) for program in wanted)
+    directional: tuple[Kernel, ...] = ()
+    if spec.gradients:
+        directional = (*directional_kernels(equations), *map(lower, directional_programs(equations.programs)))
     times.append(time.perf_counter())
     files = emit(equations, kernels, directional)
     times.append(time.perf_counter())

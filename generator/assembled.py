@@ -15,7 +15,7 @@ from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 from .derive import derive
 from .latex import result_statements, to_latex
 from .program import Program
-from .schedule import momentum_balances, unrolled
+from .schedule import momentum_balances, passes_of, unrolled
 
 Values = Mapping[str, sp.Expr]
 """Stored field of a block -> its value."""
@@ -110,7 +110,7 @@ def assembled() -> dict[str, sp.Expr]:
         ("unknowns", 0): {"theta": symbol("thetat_1"), "N": symbol("N_1")},
         ("friction", 0): {"Y": symbol("Y_1")},
     }
-    for name, reads, writes in unrolled(momentum_balances(spec.effects), spec.layout.surfaces):
+    for name, reads, writes in unrolled(passes_of(momentum_balances(spec.effects)), spec.layout.signs):
         aliases = [use.alias for use in p[name].inputs]
         result = evaluate(p[name], **dict(zip(aliases, (found[place] for place in reads), strict=True)))
         found |= dict.fromkeys(writes, result)  # each list takes the fields that it has

@@ -40,6 +40,7 @@ class Blocks:
     rim: Block
     rim_coordinates: Block
     rim_wrench: Block
+    split: Block
     gap: Block
     top_wrench: Block
     foot_before: Block
@@ -179,6 +180,10 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         "wrench": new("wrench")
         .vector("F", "N", "force on the body above the interface", POLAR)
         .vector("M", "N m", "moment on the body above, about the sphere centre", AXIAL)
+        .build(),
+        "split": new("split")
+        .vector("M", "N m", "moment on the body above, about its sphere centre", AXIAL)
+        .vector("B", "N m", "its opposite on the body below, about the sphere centre of that body", AXIAL)
         .build(),
         "local": new("local")
         .vector("p", "N", "contact force (normal and friction) in the basis of the body below", POLAR)

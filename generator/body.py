@@ -266,7 +266,7 @@ def slip_rotation(b: Blocks) -> Program:
     return p
 
 
-def to_local(b: Blocks, uplift: bool) -> Program:
+def to_local(b: Blocks, uplift: bool, rims: bool) -> Program:
     """Contact force and relative angular velocity of a surface in the basis of the body below it."""
     p = Program(
         "surface_local", "contact force and omega'_above - omega'_below in the basis of the body below (3.12), (3.19)"
@@ -276,10 +276,12 @@ def to_local(b: Blocks, uplift: bool) -> Program:
     x: Symbols = p.read(b.coordinates, "x", active=("psi1", "theta1", "phi1"))
     lower: Symbols = p.read(b.coordinates, "y", active=("phi1",))
     total: Symbols = p.read(b.vector, "tot")
-    rim: Symbols = p.read(b.vector, "rim")
     least: Vector = (sp.Integer(0), sp.Integer(0), LEAST_FORCE if uplift else sp.Integer(0))
     relative = relative_turning(p, above, x, lower)
-    contact = subtract(project((body["t1"], body["t2"], body["t3"]), total["F"]), rim["F"])
+    contact = project((body["t1"], body["t2"], body["t3"]), total["F"])
+    if rims:
+        rim: Symbols = p.read(b.rim, "rim", active=("f",))
+        contact = subtract(contact, rim["f"])
     tilt = {"tilt": above["cp"] * above["ct"]} if "tilt" in b.local.quantities else {}
     p.write(b.local, {"p": add(contact, least), "dw": relative, **tilt})
     return p

@@ -170,6 +170,18 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     return p
 
 
+def surface_moment(b: Blocks, rims: bool) -> Program:
+    """Moment of a surface on the body above, of contact and rim."""
+    p = Program("surface_moment", "moment of contact and rim on the body above, in the basis of the body below")
+    contact_: Symbols = p.read(b.contact, "c", active=("M",))
+    moment = contact_["M"]
+    if rims:
+        rim_contact: Symbols = p.read(b.rim, "rim", active=("M",))
+        moment = add(moment, rim_contact["M"])
+    p.write(b.moment, {"M": moment})
+    return p
+
+
 def gap(b: Blocks) -> Program:
     """Sliding displacement (3.20) and gap (3.21); the arccos is written as an atan2, which is exact at zero tilt."""
     p = Program("gap", "sliding displacement and gap (3.20), (3.21)")

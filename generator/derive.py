@@ -58,11 +58,12 @@ def derive(spec: ModelSpec) -> Equations:
         body.arms(blocks),
         body.forward(blocks),
         body.named_points(blocks),
-        body.to_local(blocks, effects.uplift),
+        body.to_local(blocks, effects.uplift, effects.rims),
         contact.contact(blocks, law),
         body.slip_rotation(blocks),
         contact.report_contact(blocks, law),
         contact.report_wrench(blocks, effects.rims),
+        contact.surface_moment(blocks, effects.rims),
         body.to_world(blocks),
         body.interface_force(blocks, massless),
         body.linear_balance(blocks, massless),
@@ -85,8 +86,7 @@ def derive(spec: ModelSpec) -> Equations:
     if effects.rims:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:
-        programs += [seat.seat_depth(blocks), seat.seat_inside(blocks), seat.seat_edge(blocks)]
-        programs.append(seat.rim_to_world(blocks))
+        programs += seat.programs(blocks, effects.rims)
         return Equations(spec, blocks, tuple(programs))
     column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
     programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))

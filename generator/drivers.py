@@ -1,11 +1,14 @@
-"""The drivers of a schedule as text for the template: the calls of its programs, for values and for derivatives."""
+"""The drivers of a schedule as text for the templates: the calls of its programs, for values and for derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from .derive import Equations
+from .gradients import directional
 from .lower import Kernel, lower
 from .program import Block, Program
 from .schedule import (
@@ -13,14 +16,20 @@ from .schedule import (
     LISTS,
     VARIABLES,
     Call,
+    Decision,
+    InC,
+    Kept,
     List,
     Over,
     Pass,
+    Schedule,
     calls_of,
     check,
+    condensed,
     index_of,
     list_of,
     momentum_balances,
+    passes_of,
     tangent_of,
     unknowns,
 )
@@ -28,26 +37,53 @@ from .schedule import (
 LOOPS = {
     Over.BODIES: "for (int k = 1; k <= MSFP_NB; ++k)",
     Over.SURFACES: "for (int j = 0; j < MSFP_NB; ++j)",
+    Over.DOWNWARD: "for (int j = MSFP_NB - 1; j >= 0; --j)",
 }
-ENDS = {"base": "0", "top": "MSFP_NB"}
+INDICES = {"base": "0", "top": "MSFP_NB", "slider": "msfp_slider(j)"}
+Programs = Mapping[str, Program]
+Lines = Callable[[Call, Programs], Iterator[str]]
 
 
 def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
-    """Tangents that the schedule calls and that no program has in this form."""
-    programs = {program.name: program for program in equations.programs}
-    called = (programs[call.program] for call in calls_of(momentum_balances(equations.spec.effects)))
-    return tuple(lower(tangent_of(program)) for program in called if tangent_of(program) is not program)
+    """Tangents that the schedules call and that no program has in this form."""
+    effects = equations.spec.effects
+    called = _called(momentum_balances(effects)) | _called(condensed(effects))
+    tangents = ((program, tangent_of(program)) for program in equations.programs if program.name in called)
+    return tuple(lower(tangent) for program, tangent in tangents if tangent is not program)
+
+
+def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
+    """Directional derivatives of the programs of the condensed equations."""
+    called = _called(condensed(equations.spec.effects))
+    return tuple(
+        lower(directional(program, _at_hand(called[program.name])))
+        for program in equations.programs
+        if program.name in called
+    )
 
 
 def schedule_context(equations: Equations) -> dict[str, Any]:
-    """What the template of the schedule needs."""
+    """What the templates of the schedules need."""
     programs = {program.name: program for program in equations.programs}
-    passes = momentum_balances(equations.spec.effects)
-    check(passes, programs, equations.blocks)
-    used = {place.partition("[")[0] for call in calls_of(passes) for place in (*call.reads, *call.writes)}
+    balances, equations_of_motion = momentum_balances(equations.spec.effects), condensed(equations.spec.effects)
+    moving = set[str]()
+    for schedule in (balances, equations_of_motion):
+        moving |= check(passes_of(schedule), programs, equations.blocks)
+    directed = _lists(equations_of_motion)
+    used = directed | _lists(balances)
+    read = {place.partition("[")[0] for call in _emitted(equations_of_motion) for place in call.reads}
     return {
-        "passes": [_pass(one, programs) for one in passes],
-        "declared": [_declared(one, equations) for name, one in LISTS.items() if name in used],
+        "parts": [_part(name, passes, programs, read) for name, passes in {**balances, **equations_of_motion}.items()],
+        "directed": list(equations_of_motion),
+        "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
+        "block_tangents": [
+            _declared(LISTS[name], equations) for name in used if name in moving and not LISTS[name].tangents
+        ],
+        "block_directions": [
+            _declared(LISTS[name], equations)
+            for name in directed
+            if not LISTS[name].directions and LISTS[name].kept is not Kept.PARAMETERS
+        ],
         "variables": [
             (kind, [_entries(name, quantities, equations) for name, quantities in parts])
             for kind, parts in VARIABLES.items()
@@ -56,20 +92,59 @@ def schedule_context(equations: Equations) -> dict[str, Any]:
     }
 
 
-def _pass(one: Pass, programs: Mapping[str, Program]) -> dict[str, Any]:
+def _called(schedule: Schedule) -> dict[str, Call]:
+    """The programs that a schedule calls in emitted C, each with one of its calls."""
+    return {name: call for call in _emitted(schedule) for name in call.programs}
+
+
+def _emitted(schedule: Schedule) -> list[Call]:
+    """The calls that are emitted, without those of C alone."""
+    return [call for call in calls_of(passes_of(schedule)) if not isinstance(call.by, InC)]
+
+
+def _lists(schedule: Schedule) -> dict[str, None]:
+    """The lists that emitted C reads or writes, in the order of `LISTS`."""
+    used = {place.partition("[")[0] for call in _emitted(schedule) for place in (*call.reads, *call.writes)}
+    used |= {place.partition("[")[0] for call in calls_of(passes_of(schedule)) for place in call.writes}
+    return {name: None for name in LISTS if name in used}
+
+
+def _at_hand(call: Call) -> bool:
+    """Whether the work area holds the results of a call while it is differentiated."""
+    return call.by is None and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
+
+
+def _part(name: str, passes: Iterable[Pass], programs: Programs, read: set[str]) -> dict[str, Any]:
+    calls = list(calls_of(passes))
+    forms: dict[str, Lines] = {"values": _values, "tangents": _tangents, "directions": partial(_directions, read=read)}
+    lines = {
+        form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
+        for form, of in forms.items()
+    }
     return {
-        "over": one.over.value,
-        "loop": LOOPS.get(one.over, ""),
-        "values": [line for call in one.calls for line in _values(call, programs[call.program])],
-        "columns": [line for call in one.calls for line in _columns(call, programs[call.program])],
+        "name": name,
+        "fails": any(isinstance(call.by, InC) and call.by.fails for call in calls),
+        "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
+        "passes": {
+            form: [
+                {"over": one.over.value, "loop": LOOPS.get(one.over, ""), "lines": many}
+                for one, many in written
+                if many
+            ]
+            for form, written in lines.items()
+        },
     }
 
 
-def _declared(one: List, equations: Equations) -> dict[str, Any]:
-    """Names in the record of the schedule, empty for what lies elsewhere."""
-    names = [text.removeprefix("s->") if text.startswith("s->") else "" for text in (one.member, one.columns)]
+def _unused(lines: Iterable[str]) -> list[str]:
+    """The arguments of a driver that its statements do not name."""
+    words = {word for line in lines for word in re.findall(r"\w+", line)}
+    return [name for name in ("p", "dp", "w", "d", "s", "ds") if name not in words]
+
+
+def _declared(one: List, equations: Equations) -> dict[str, str]:
     block: Block = getattr(equations.blocks, one.kind)
-    return {"names": names, "block": block.name, "length": one.length}
+    return {"name": one.name, "block": block.name, "length": one.length}
 
 
 def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict[str, Any]:
@@ -80,22 +155,31 @@ def _entries(name: str, quantities: Iterable[str], equations: Equations) -> dict
     parts = [part for quantity in quantities for part in block.quantities[quantity]]
     at = "[v->index]" if one.length else ""
     entries = [index[part] if isinstance(part, str) else -1 for part in parts]
-    return {"values": f"{one.member}{at}", "columns": f"{one.columns}{at}", "entries": entries}
+    return {"values": f"{one.values_in_c}{at}", "tangents": f"{one.tangents_in_c}{at}", "entries": entries}
 
 
 def _in_c(member: str, place: str) -> str:
     index = index_of(place)
-    index = ENDS.get(index, index).replace("-", " - ").replace("+", " + ")
+    index = INDICES.get(index, index.replace("-", " - ").replace("+", " + "))
     return f"{member}[{index}]" if index else member
 
 
-def _values(call: Call, program: Program) -> Iterator[str]:
+def _values(call: Call, programs: Programs) -> Iterator[str]:
     """Statements that evaluate a call."""
-    if call.decision is not None:
-        yield f"{call.decision.values};"
-        return
-    reads = [_in_c(list_of(place).member, place) for place in call.reads]
-    writes = [_in_c(list_of(place).member, place) for place in call.writes]
+    if isinstance(call.by, InC) and call.by.fails:
+        yield f"const int status = {call.by.values};"
+        yield "if (status)"
+        yield "    return status;"
+    elif isinstance(call.by, Decision | InC):
+        if call.by.values:
+            yield f"{call.by.values};"
+    else:
+        yield from _evaluated(call, programs[call.program])
+
+
+def _evaluated(call: Call, program: Program) -> Iterator[str]:
+    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
+    writes = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
     if len(writes) == 1:
         yield f"msfp_{program.name}({', '.join([*reads, *writes])});"
         return
@@ -106,30 +190,78 @@ def _values(call: Call, program: Program) -> Iterator[str]:
     yield "}"
 
 
-def _columns(call: Call, program: Program) -> Iterator[str]:
-    """Statements that differentiate a call whose values are known. A tangent stores these values once more."""
+def _tangents(call: Call, programs: Programs) -> Iterator[str]:
+    """Statements that differentiate a call by the variables of a step. A tangent stores the values once more."""
+    if isinstance(call.by, InC):
+        if call.by.tangents:
+            yield f"{call.by.tangents};"
+        return
+    writes = [_in_c(list_of(place).tangents_in_c, place) for place in call.writes]
+    yield from _chosen(call, writes, ((name, list(_tangent(call, programs[name], writes))) for name in call.programs))
+
+
+def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[str]:
     if not program.tangents:
         return
-    reads = [_in_c(list_of(place).member, place) for place in call.reads]
+    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
     places = [place for place, use in zip(call.reads, program.inputs, strict=True) if use.moving]
-    moving = [_in_c(list_of(place).columns, place) for place in places]
-    values = [_in_c(list_of(place).member, place) for place in call.writes]
-    writes = [_in_c(list_of(place).columns, place) for place in call.writes]
+    moving = [_in_c(list_of(place).tangents_in_c, place) for place in places]
+    values = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
     name = f"msfp_{tangent_of(program).name}_tangent"
-    if len(writes) > 1:
-        yield "{"
-        yield f"    double values[{_size(program)}], out[{_size(program)} * {COLUMNS}];"
-        yield f"    {name}({', '.join([*reads, 'values', *moving, 'out'])});"
-        yield from _copies(writes)
-        yield "}"
+    if len(writes) == 1:
+        yield f"{name}({', '.join([*reads, *values, *moving, *writes])});"
         return
-    statement = f"{name}({', '.join([*reads, *values, *moving, *writes])});"
-    if call.decision is None:
-        yield statement
+    yield "{"
+    yield f"    double values[{_size(program)}], out[{_size(program)} * {COLUMNS}];"
+    yield f"    {name}({', '.join([*reads, 'values', *moving, 'out'])});"
+    yield from _copies(writes)
+    yield "}"
+
+
+def _directions(call: Call, programs: Programs, read: set[str]) -> Iterator[str]:
+    """Statements that differentiate a call by parameters, with its values where the work area does not hold them.
+
+    read: the lists whose values some call reads.
+    """
+    if isinstance(call.by, InC):
+        yield f"{call.by.directions};"
         return
-    yield f"if ({call.decision.acts})"
-    yield f"    {statement}"
-    yield "else"
+    writes = [_in_c(list_of(place).directions_in_c, place) for place in call.writes]
+    names = {place.partition("[")[0] for place in call.writes}
+    values = any(LISTS[name].kept is Kept.HERE for name in names & read)
+    many = ((name, list(_direction(call, programs[name], writes, values))) for name in call.programs)
+    yield from _chosen(call, writes, many)
+
+
+def _direction(call: Call, program: Program, writes: list[str], with_values: bool) -> Iterator[str]:
+    if with_values:
+        yield from _evaluated(call, program)
+    reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
+    values = [_in_c(list_of(place).values_in_c, place) for place in call.writes] if _at_hand(call) else []
+    moving = [_in_c(list_of(place).directions_in_c, place) for place in call.reads]
+    name = f"msfp_{program.name}_direction"
+    if len(writes) == 1:
+        yield f"{name}({', '.join([*reads, *values, *moving, *writes])});"
+        return
+    yield "{"
+    yield f"    double out[{_size(program)} * MSFP_COLUMNS];"
+    yield f"    {name}({', '.join([*reads, *moving, 'out'])});"
+    yield from _copies(writes)
+    yield "}"
+
+
+def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[str]]]) -> Iterator[str]:
+    """Statements of the program that acts; where none does, the derivatives are zero."""
+    if not isinstance(call.by, Decision):
+        for _, statements in programs:
+            yield from statements
+        return
+    start = ""
+    for name, statements in programs:
+        yield f"{start}if ({call.by.acts[name]}) {{"
+        yield from (f"    {statement}" for statement in statements)
+        start = "} else "
+    yield "} else"
     yield f"    memset({writes[0]}, 0, sizeof {writes[0]});"
 
 

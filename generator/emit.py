@@ -24,7 +24,7 @@ from .printer import to_c
 from .program import Block, Use
 
 # Each is made from the template of its name.
-GRADIENT_FILES = ("msfp_gradient_kernels.h",)  # of models with gradients
+GRADIENT_FILES = ("msfp_gradient_kernels.h", "msfp_directions.h")  # of models with gradients
 FILES = (
     "msfp.h",
     "msfp_symbols.h",

@@ -22,19 +22,12 @@ CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
 friction and the coefficient of a friction law."""
 DIFFERENTIATED = {
-    "forward": True,
-    "surface_local": True,
-    "moment_to_world": True,
-    "interface_force": True,
-    "angular_balance": False,
     "body_energy": False,
-    "top_wrench": False,
     "spring_stage": False,
     "resting_foot": False,
     "foot": True,
     "top_energy": False,
     "gap": True,
-    "rim": False,
     "friction_power": False,
     "rim_energy": False,
     "restraint": False,
@@ -44,7 +37,8 @@ DIFFERENTIATED = {
     "slid_friction": False,
     "slip_work": False,
 }
-"""Programs that are differentiated, and whether the block of their results is at hand where this is done."""
+"""Programs outside of the schedules (`drivers.py`) that are differentiated, and whether the block of their results is
+at hand where this is done."""
 
 
 def _with_all_inputs(use: Use) -> Use:
@@ -107,7 +101,7 @@ def contact_lists(programs: Iterable[Program]) -> dict[str, object]:
 
 
 def directional_programs(programs: tuple[Program, ...]) -> Iterator[Program]:
-    """The directional derivatives that a model with gradients uses, in the order of its programs."""
+    """The directional derivatives that a model with gradients uses beside those of its schedules."""
     for program in programs:
         if program.name in DIFFERENTIATED:
             yield directional(program, DIFFERENTIATED[program.name])

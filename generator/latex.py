@@ -84,7 +84,6 @@ SYMBOLS: dict[str, dict[str, str]] = {
     },
     "force": {"F": r"P_{@,#}"},
     "moment": {"M": r"M_{@,#}"},
-    "rim_force": {"F": r"F_{c@,#}"},
     "local_moment": {"M": r"M_{@,#}"},
     "relative": {"dw": r"\Delta\omega'_{@,#}"},
     "wrench": {"F": r"P_{@,#}", "M": r"M_{@,#}"},
@@ -155,7 +154,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     "angular": {"r": r"\eta_{@,#}"},
 }
 # Kinds with components along the basis of the body below; all other vectors are along E_1, E_2, E_3.
-LOCAL_KINDS = {"local", "relative", "local_moment", "rim_force", "contact", "report_contact", "rim", "angular"}
+LOCAL_KINDS = {"local", "relative", "local_moment", "contact", "report_contact", "rim", "angular"}
 
 # Program -> alias of an argument -> number of its body or surface.
 PLACES: dict[str, dict[str, str]] = {
@@ -196,7 +195,6 @@ PLACES: dict[str, dict[str, str]] = {
 }
 # (program, alias) -> kind of record, where it differs from the name of the block.
 KINDS = {
-    ("surface_local", "rim"): "rim_force",
     ("moment_to_world", "loc"): "local_moment",
     **{(name, "fe"): "top_force" for name in ("top_wrench", "top_power")},
     **{(name, "me"): "top_moment" for name in ("top_wrench", "top_power")},

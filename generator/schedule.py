@@ -1,8 +1,9 @@
 """Schedules: which program runs over which bodies and surfaces, from which blocks to which.
 
 A program (`derive.py`) describes one body or one surface. A schedule states, as data, how the programs of a stack
-follow each other in one evaluation. The C that calls them is emitted from it twice: once for the values, and once for
-derivatives with respect to the inputs of the schedule, each program by its own tangent.
+follow each other in one evaluation. The C that calls them is emitted from it three times (`drivers.py`): for the
+values, for derivatives with respect to the variables of a step, and, in models with gradients, for directional
+derivatives with respect to parameters; each program by its own tangent.
 
 A place is a block in a list of blocks: `body[k-1]` is the block of the body below body k, `rim[j]` that of surface j,
 which lies between bodies j and j+1. `base` and `top` are the indices of the lowest and of the highest body.
@@ -10,7 +11,7 @@ which lies between bodies j and j+1. `base` and `top` are the indices of the low
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -25,25 +26,45 @@ COLUMNS = "MSFP_DOF"
 
 
 class Over(Enum):
-    """What a part of a schedule runs over, from the lowest body or surface up."""
+    """What a part of a schedule runs over."""
 
     BASE = "base"
     BODIES = "moving bodies k"
     SURFACES = "surfaces j"
+    DOWNWARD = "surfaces j, from the top down"
+    TOGETHER = "all surfaces j at once"
     TOP = "top"
 
 
 @dataclass(frozen=True)
 class Decision:
-    """C of a program of which the runtime decides whether it acts.
+    """C that decides whether a program acts, or which of several does.
 
     Attributes:
-        values: evaluates it, and sets what it writes to zero where it does not act.
-        acts: whether it acts; its derivatives are zero elsewhere. None: nothing that moves depends on it.
+        values: statement that evaluates it, and sets what it writes to zero where it does not act. Empty: the program
+            that the next decision needs is evaluated there, and only its derivatives are formed here.
+        acts: program -> the condition in C under which it acts. Where none does, the derivatives are zero.
     """
 
     values: str
-    acts: str | None = None
+    acts: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class InC:
+    """C that evaluates and differentiates a program itself, because it solves for what the program needs.
+
+    Attributes:
+        values: an expression, or with `fails` one that returns a status, at which the evaluation ends.
+        tangents: derivatives by the variables of a step; empty where nothing that moves depends on it.
+        directions: derivatives by parameters.
+        fails: whether `values` returns a status.
+    """
+
+    values: str
+    tangents: str
+    directions: str
+    fails: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,7 +77,12 @@ class Call:
     program: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    decision: Decision | None = None
+    by: Decision | InC | None = None
+
+    @property
+    def programs(self) -> tuple[str, ...]:
+        """The programs of which one acts: with a decision those of its conditions, otherwise the one of the call."""
+        return tuple(self.by.acts) if isinstance(self.by, Decision) else (self.program,)
 
 
 @dataclass(frozen=True)
@@ -67,8 +93,19 @@ class Pass:
     calls: tuple[Call, ...]
 
 
+Schedule = Mapping[str, tuple[Pass, ...]]
+"""Part of an evaluation -> its passes. Each part becomes functions of its own."""
+
 Place = tuple[str, int]
 """A list and the number of a block in it."""
+
+
+class Kept(Enum):
+    """Where C keeps a list, and so in which record its derivatives are."""
+
+    PARAMETERS = "p"
+    WORK = "w"
+    HERE = "s"
 
 
 @dataclass(frozen=True)
@@ -77,51 +114,78 @@ class List:
 
     Attributes:
         kind: name of the block in `Blocks`.
-        member: C of the list.
-        columns: C of the derivatives; empty for parameters and what is given as a function of time.
+        name: name in C.
+        kept: the parameters, the work area of an evaluation, or the blocks of the schedules alone.
         length: C of the number of blocks; empty for a single one.
+        tangents: whether the work area keeps derivatives by the variables of a step, which the steppers read.
+        directions: whether the work area keeps derivatives by parameters, likewise.
     """
 
     kind: str
-    member: str
-    columns: str = ""
+    name: str
+    kept: Kept = Kept.HERE
     length: str = ""
+    tangents: bool = False
+    directions: bool = False
+
+    @property
+    def values_in_c(self) -> str:
+        """C of the blocks."""
+        return f"{self.kept.value}->{self.name}"
+
+    @property
+    def tangents_in_c(self) -> str:
+        """C of their derivatives by the variables of a step; empty for parameters, which are constant there."""
+        if self.kept is Kept.PARAMETERS:
+            return ""
+        return f"w->d{self.name}" if self.tangents else f"ds->{self.name}"
+
+    @property
+    def directions_in_c(self) -> str:
+        """C of their derivatives by parameters."""
+        if self.kept is Kept.PARAMETERS:
+            return f"dp->{self.name}"
+        return f"d->{self.name}" if self.directions else f"ds->{self.name}"
 
 
-def _constant(kind: str, member: str, length: str = "") -> List:
-    return List(kind, member, "", length)
-
-
-def _moving(kind: str, owner: str, name: str, length: str = "") -> List:
-    return List(kind, f"{owner}->{name}", f"{owner}->d{name}", length)
-
-
+SURFACES, BODIES = "MSFP_NB", "MSFP_NB + 1"
 LISTS: Mapping[str, List] = {
-    "body_parameters": _constant("body_parameters", "p->body", "MSFP_NB + 1"),
-    "surface_parameters": _constant("surface_parameters", "p->surface", "MSFP_NB"),
-    "top_parameters": _constant("top_parameters", "p->top"),
-    "coefficient": _constant("coefficient", "w->coefficient", "MSFP_NB"),
-    "foot_stage": _constant("foot_stage", "s->foot_stage"),
-    "upright": _constant("upright", "s->upright"),
-    "foot": _constant("foot", "w->foot"),
-    "frame": _moving("body", "s", "frame"),
-    "x": _moving("coordinates", "w", "x", "MSFP_NB + 1"),
-    "body": _moving("body", "w", "body", "MSFP_NB + 1"),
-    "load_force": _moving("vector", "s", "load_force"),
-    "load_moment": _moving("moment", "s", "load_moment"),
-    "force": _moving("vector", "w", "force", "MSFP_NB + 1"),
-    "moment": _moving("moment", "w", "moment", "MSFP_NB + 1"),
-    "unknowns": _moving("unknowns", "s", "unknowns", "MSFP_NB"),
-    "friction": _moving("friction", "s", "friction", "MSFP_NB"),
-    "rim_coordinates": _moving("rim_coordinates", "s", "rim_coordinates", "MSFP_NB"),
-    "rim": List("rim", "w->rim", "s->drim", "MSFP_NB"),
-    "relative": _moving("relative", "s", "relative", "MSFP_NB"),
-    "report_contact": _moving("report_contact", "s", "report_contact", "MSFP_NB"),
-    "linear": _moving("linear", "s", "linear", "MSFP_NB + 1"),
-    "angular": _moving("angular", "s", "angular", "MSFP_NB + 1"),
-    "balances": _moving("balances", "s", "balances", "MSFP_NB + 1"),
+    "body_parameters": List("body_parameters", "body", Kept.PARAMETERS, BODIES),
+    "surface_parameters": List("surface_parameters", "surface", Kept.PARAMETERS, SURFACES),
+    "top_parameters": List("top_parameters", "top", Kept.PARAMETERS),
+    "coefficient": List("coefficient", "coefficient", Kept.WORK, SURFACES),
+    "foot_stage": List("foot_stage", "foot_stage"),
+    "upright": List("upright", "upright"),
+    "foot": List("foot", "foot", Kept.WORK, directions=True),
+    "frame": List("body", "frame"),
+    "x": List("coordinates", "x", Kept.WORK, BODIES, tangents=True, directions=True),
+    "body": List("body", "body", Kept.WORK, BODIES, tangents=True, directions=True),
+    "load_force": List("vector", "load_force"),
+    "load_moment": List("moment", "load_moment"),
+    "force": List("vector", "force", Kept.WORK, BODIES, tangents=True, directions=True),
+    "moment": List("moment", "moment", Kept.WORK, BODIES, tangents=True, directions=True),
+    "unknowns": List("unknowns", "unknowns", length=SURFACES),
+    "friction": List("friction", "friction", length=SURFACES),
+    "rim_coordinates": List("rim_coordinates", "rim_coordinates", length=SURFACES),
+    "rim": List("rim", "rim", Kept.WORK, SURFACES, directions=True),
+    "relative": List("relative", "relative", length=SURFACES),
+    "report_contact": List("report_contact", "report_contact", length=SURFACES),
+    "linear": List("linear", "linear", length=BODIES),
+    "angular": List("angular", "angular", length=BODIES),
+    "balances": List("balances", "balances", length=BODIES),
+    "local": List("local", "local", Kept.WORK, SURFACES, directions=True),
+    "stage": List("stage", "stage", length=SURFACES),
+    "shear": List("shear", "shear", length=SURFACES),
+    "contact": List("contact", "contact", Kept.WORK, SURFACES, directions=True),
+    "local_moment": List("moment", "local_moment", length=SURFACES),
+    "unilateral": List("unilateral", "unilateral", Kept.WORK, SURFACES),
+    "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, SURFACES),
+    "carried": List("vector", "carried", length=BODIES),
+    "excess": List("linear", "excess", length=SURFACES),
+    "joint_moment": List("moment", "joint_moment", length=SURFACES),
+    "below": List("moment", "below", Kept.WORK, BODIES),
 }
-"""All lists of blocks. p: parameters, w: work area of an evaluation, s: blocks of the schedule alone."""
+"""All lists of blocks."""
 
 VARIABLES: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "coordinate": (("x", tuple(f"{name}{order}" for order in ("", 1, 2) for name in ("psi", "theta", "phi"))),),
@@ -144,68 +208,166 @@ def unknowns(spec: ModelSpec) -> list[tuple[str, int, int]]:
     ]
 
 
-def momentum_balances(effects: Effects) -> tuple[Pass, ...]:
-    """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them."""
-    rim = (
-        Call("rim_coordinates", ("body[j]", "x[j+1]"), ("rim_coordinates[j]",)),
-        Call(
-            "rim",
-            ("surface_parameters[j]", "rim_coordinates[j]"),
-            ("rim[j]",),
-            Decision("msfp_rim_force(p, w, j, NULL)", "w->rim_active[j]"),
-        ),
-    )
+RIM = "w->rim_active[j]"
+"""Whether a rim pushes."""
+
+
+def _kinematics() -> Schedule:
+    """The bodies from the base up."""
+    return {
+        "base": (Pass(Over.BASE, (Call("forward", ("body_parameters[base]", "frame", "x[base]"), ("body[base]",)),)),),
+        "bodies": (Pass(Over.BODIES, (Call("forward", ("body_parameters[k]", "body[k-1]", "x[k]"), ("body[k]",)),)),),
+    }
+
+
+def _top(effects: Effects) -> Pass:
+    """Force and moment above the top plate, and the foot of a mass on a vertical spring."""
     support = ("upright",) if effects.top_rotation else ()
-    law = ("coefficient[j]",) if effects.law is not None else ()
-    return (
-        Pass(Over.BASE, (Call("forward", ("body_parameters[base]", "frame", "x[base]"), ("body[base]",)),)),
-        Pass(Over.BODIES, (Call("forward", ("body_parameters[k]", "body[k-1]", "x[k]"), ("body[k]",)),)),
-        Pass(
-            Over.TOP,
-            (
-                Call(
-                    "top_wrench",
-                    ("top_parameters", "foot_stage", "body[top]", "x[top]", "load_force", "load_moment", *support),
-                    ("force[top]", "moment[top]"),
-                ),
-                Call(
-                    "foot",
-                    ("top_parameters", "body[top]", "foot_stage"),
-                    ("foot",),
-                    Decision("msfp_move_foot(p, s->foot_stage, w)"),
-                ),
+    reads = ("top_parameters", "foot_stage", "body[top]", "x[top]", "load_force", "load_moment", *support)
+    return Pass(
+        Over.TOP,
+        (
+            Call("top_wrench", reads, ("force[top]", "moment[top]")),
+            Call(
+                "foot",
+                ("top_parameters", "body[top]", "foot_stage"),
+                ("foot",),
+                InC("msfp_move_foot(p, s->foot_stage, w)", "", "msfp_foot_columns(p, dp, s->at, ds->point, w, d)"),
             ),
         ),
+    )
+
+
+def _rim(effects: Effects) -> tuple[Call, ...]:
+    """The rim of surface j."""
+    if not effects.rims:
+        return ()
+    coordinates = Decision("", {"rim_coordinates": RIM})
+    slopes = "NULL" if effects.uplift else "s->jacobians ? s->jacobians->rim[j] : NULL"
+    rim = Decision(f"msfp_rim_force(p, w, j, {slopes})", {"rim": RIM})
+    return (
+        Call("rim_coordinates", ("body[j]", "x[j+1]"), ("rim_coordinates[j]",), coordinates),
+        Call("rim", ("surface_parameters[j]", "rim_coordinates[j]"), ("rim[j]",), rim),
+    )
+
+
+def momentum_balances(effects: Effects) -> Schedule:
+    """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them."""
+    law = ("coefficient[j]",) if effects.law is not None else ()
+    rim = ("rim[j]",) if effects.rims else ()
+    surfaces = Pass(
+        Over.SURFACES,
+        (
+            *_rim(effects),
+            Call("slip_rotation", ("body[j+1]", "x[j+1]", "x[j]"), ("relative[j]",)),
+            Call(
+                "report_contact",
+                ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *law),
+                ("report_contact[j]",),
+            ),
+            Call("report_wrench", ("body[j]", "report_contact[j]", *rim), ("force[j]", "moment[j]")),
+        ),
+    )
+    bodies = Pass(
+        Over.BODIES,
+        (
+            Call("linear_balance", ("body_parameters[k]", "body[k]", "force[k-1]", "force[k]"), ("linear[k]",)),
+            Call(
+                "angular_balance",
+                ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", "moment[k]"),
+                ("angular[k]",),
+            ),
+            Call("balances", ("linear[k]", "angular[k]", "x[k]"), ("balances[k]",)),
+        ),
+    )
+    return {
+        "balances": (*(one for passes in _kinematics().values() for one in passes), _top(effects), surfaces, bodies)
+    }
+
+
+def _uplift(rims: bool) -> tuple[Pass, ...]:
+    """Forces of the surfaces with uplift: of their unilateral contacts and rims, with what is left to balance."""
+    slider, wrench = "body[slider]", ("rim_wrench[j]",) if rims else ()
+    contact = Decision(
+        "msfp_unilateral_force(p, w, j)",
+        {"unilateral_edge": "w->standing[j] == MSFP_ON_EDGE", "unilateral_inside": "w->standing[j] == MSFP_ON_FACE"},
+    )
+    on_rim = Call("rim_to_world", ("body[j]", "x[j+1]", "rim[j]"), ("rim_wrench[j]",))
+    return (
         Pass(
             Over.SURFACES,
             (
-                *(rim if effects.rims else ()),
-                Call("slip_rotation", ("body[j+1]", "x[j+1]", "x[j]"), ("relative[j]",)),
-                Call(
-                    "report_contact",
-                    ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *law),
-                    ("report_contact[j]",),
-                ),
-                Call(
-                    "report_wrench",
-                    ("body[j]", "report_contact[j]", *(("rim[j]",) if effects.rims else ())),
-                    ("force[j]", "moment[j]"),
-                ),
+                Call("unilateral_inside", ("surface_parameters[j]", slider, "x[j+1]"), ("unilateral[j]",), contact),
+                *((on_rim,) if rims else ()),
+                Call("surface_force", ("unilateral[j]", *wrench), ("force[j]",)),
             ),
         ),
+        Pass(Over.TOP, (Call("wrench_above", ("force[top]", "moment[top]"), ("carried[top]", "below[top]")),)),
         Pass(
-            Over.BODIES,
+            Over.DOWNWARD,
             (
-                Call("linear_balance", ("body_parameters[k]", "body[k]", "force[k-1]", "force[k]"), ("linear[k]",)),
-                Call(
-                    "angular_balance",
-                    ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", "moment[k]"),
-                    ("angular[k]",),
-                ),
-                Call("balances", ("linear[k]", "angular[k]", "x[k]"), ("balances[k]",)),
+                Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "carried[j+1]"), ("carried[j]",)),
+                Call("excess_force", ("carried[j]", "force[j]"), ("excess[j]",)),
             ),
         ),
     )
+
+
+def condensed(effects: Effects) -> Schedule:
+    """The condensed equations: angular balances, with interface forces summed from the top down and contacts in closed
+    form. With uplift the surfaces give the forces, and what these leave of the sums are further rows.
+    """
+    rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
+    law = ("coefficient[j]",) if effects.law is not None else ()
+    summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
+    contact = InC(
+        "msfp_contacts(p, w, s->seed, s->g, s->jacobians ? s->jacobians->contact : NULL)",
+        "msfp_contact_tangents(w, ds->local, ds->contact)",
+        "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->seed, ds->all, d)",
+        fails=True,
+    )
+    split = ("surface_parameters[j]", "joint_moment[j]", "unilateral[j]", *(("rim_wrench[j]",) if effects.rims else ()))
+    moments = (
+        Call("surface_moment", ("contact[j]", *rim), ("local_moment[j]",)),
+        Call("moment_to_world", ("body[j]", "local_moment[j]"), ("joint_moment[j]" if uplift else "moment[j]",)),
+        *((Call("split_moment", split, ("moment[j]", "below[j]")),) if uplift else ()),
+    )
+    above = "below[k]" if uplift else "moment[k]"
+    balance = ("body_parameters[k]", "body[k]", "force[k-1]", "moment[k-1]", "force[k]", above)
+    return {
+        **_kinematics(),
+        "top": (_top(effects),),
+        "forces": (
+            *((Pass(Over.SURFACES, _rim(effects)),) if effects.rims else ()),
+            *(_uplift(effects.rims) if uplift else (Pass(Over.DOWNWARD, (summed,)),)),
+        ),
+        "surfaces": (
+            Pass(
+                Over.SURFACES,
+                (Call("surface_local", ("body[j]", "body[j+1]", "x[j+1]", "x[j]", "force[j]", *rim), ("local[j]",)),),
+            ),
+            Pass(
+                Over.TOGETHER,
+                (
+                    Call(
+                        "contact",
+                        ("surface_parameters[j]", "stage[j]", "local[j]", "shear[j]", *law),
+                        ("contact[j]",),
+                        contact,
+                    ),
+                ),
+            ),
+        ),
+        "moments": (
+            Pass(Over.SURFACES, moments),
+            Pass(Over.BODIES, (Call("angular_balance", balance, ("angular[k]",)),)),
+        ),
+    }
+
+
+def schedules(effects: Effects) -> tuple[Schedule, Schedule]:
+    """All schedules of a model: the momentum balances and the condensed equations."""
+    return momentum_balances(effects), condensed(effects)
 
 
 def list_of(place: str) -> List:
@@ -224,17 +386,31 @@ def calls_of(passes: Iterable[Pass]) -> Iterator[Call]:
         yield from one.calls
 
 
-def unrolled(passes: Iterable[Pass], surfaces: int) -> Iterator[tuple[str, list[Place], list[Place]]]:
-    """The programs of a stack one by one, each with the places that it reads and writes."""
+def passes_of(schedule: Schedule) -> Iterator[Pass]:
+    """All passes of an evaluation in order."""
+    for passes in schedule.values():
+        yield from passes
+
+
+def unrolled(passes: Iterable[Pass], signs: Sequence[int]) -> Iterator[tuple[str, list[Place], list[Place]]]:
+    """The programs of a stack one by one, each with the places that it reads and writes.
+
+    signs: +1 or -1 for each surface, concave up or down.
+    """
+    surfaces = len(signs)
     numbers = {
         Over.BASE: range(1),
         Over.BODIES: range(1, surfaces + 1),
         Over.SURFACES: range(surfaces),
+        Over.DOWNWARD: range(surfaces - 1, -1, -1),
+        Over.TOGETHER: range(surfaces),
         Over.TOP: range(surfaces, surfaces + 1),
     }
 
     def numbered(place: str, number: int) -> Place:
         index = {"": 0, "base": 0, "top": surfaces}.get(index_of(place))
+        if index_of(place) == "slider":
+            index = number + (signs[number] > 0)
         if index is None:
             index = number + int(index_of(place)[1:] or 0)
         return place.partition("[")[0], index
@@ -253,19 +429,22 @@ def tangent_of(program: Program) -> Program:
     return replace(program, name=f"{program.name}_columns", columns=COLUMNS)
 
 
-def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> None:
+def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> set[str]:
     """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
 
     Every derivative that a call reads must have been written by an earlier one, or belong to `VARIABLES`; and a call
-    must not take for constant what has derivatives.
+    must not take for constant what has derivatives. What C differentiates itself is checked for its places only.
+
+    Returns:
+        The lists that have derivatives.
     """
     moving = {(name, field.name) for parts in VARIABLES.values() for name, _ in parts for field in _block(name, blocks)}
-    for call in calls_of(passes):
-        program = programs[call.program]
+    every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
+    for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
-        assert call.decision is None or call.decision.acts or not program.tangents, call
-        needed = _differentiated(program)
+        assert not isinstance(call.by, InC) or call.by.tangents or not program.tangents, call
+        needed = set() if isinstance(call.by, InC) else _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
             assert getattr(blocks, list_of(place).kind) == use.block, (call, place)
             known = {field for name, field in moving if name == place.partition("[")[0]}
@@ -276,8 +455,9 @@ def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Block
         written = [(place.partition("[")[0], field.name) for place in call.writes for field in _block(place, blocks)]
         assert len(written) == len(program.output.block.fields), call
         for entry, field in zip(written, program.output.block.fields, strict=True):
-            if field.name in program.tangents and list_of(entry[0]).columns:
+            if field.name in program.tangents:
                 moving.add(entry)
+    return {name for name, _ in moving}
 
 
 def _block(place: str, blocks: Blocks) -> tuple[Field, ...]:

@@ -17,7 +17,7 @@ import sympy as sp
 from .blocks import Blocks
 from .functions import Select, Step
 from .program import Program, Vector
-from .vectors import add, combine, cross, dot, scale
+from .vectors import add, combine, cross, dot, scale, subtract
 
 Symbols = dict[str, Any]
 
@@ -108,7 +108,68 @@ def rim_to_world(b: Blocks) -> Program:
     p = Program("rim_to_world", "rim force: from the basis of the body below to E, and its moment by the separation")
     body: Symbols = p.read(b.body, "b", active=("t1", "t2", "t3"))
     x: Symbols = p.read(b.coordinates, "x", active=("d",))
-    rim: Symbols = p.read(b.vector, "rim")
-    force = p.let_vector(combine((body["t1"], body["t2"], body["t3"]), rim["F"]), "F")
+    rim: Symbols = p.read(b.rim, "rim", active=("f",))
+    force = p.let_vector(combine((body["t1"], body["t2"], body["t3"]), rim["f"]), "F")
     p.write(b.rim_wrench, {"F": force, "T": cross(force, x["d"])})
     return p
+
+
+def surface_force(b: Blocks, rims: bool) -> Program:
+    """Force of a surface on the body above, of its contact and its rim."""
+    p = Program("surface_force", "force of a surface on the body above: of its unilateral contact and its rim")
+    contact: Symbols = p.read(b.unilateral, "c", active=("F",))
+    force = contact["F"]
+    if rims:
+        rim: Symbols = p.read(b.rim_wrench, "rim", active=("F",))
+        force = add(force, rim["F"])
+    p.write(b.vector, {"F": force})
+    return p
+
+
+def split_moment(b: Blocks, rims: bool) -> Program:
+    """Moments of a surface on the bodies above and below, each about the sphere centre of its body.
+
+    They are equal but on the slider, where the moments of contact and rim by the separation are added.
+    """
+    p = Program("split_moment", "moments of a surface on the bodies above and below, each about its sphere centre")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    joint: Symbols = p.read(b.moment, "j")
+    contact: Symbols = p.read(b.unilateral, "c", active=("T",))
+    by_separation = contact["T"]
+    if rims:
+        rim: Symbols = p.read(b.rim_wrench, "rim", active=("T",))
+        by_separation = add(by_separation, rim["T"])
+    by_separation = p.let_vector(by_separation, "T")
+    above = p.let((1 + par["sign"]) / 2)
+    p.write(
+        b.split,
+        {
+            "M": add(joint["M"], scale(above, by_separation)),
+            "B": add(joint["M"], scale(p.let(above - 1), by_separation)),
+        },
+    )
+    return p
+
+
+def wrench_above(b: Blocks) -> Program:
+    """Force and moment above the top plate, with which the sums of the bodies below begin."""
+    p = Program("wrench_above", "force and moment above the top plate, with which sums from the top down begin")
+    force: Symbols = p.read(b.vector, "f")
+    moment: Symbols = p.read(b.moment, "m")
+    p.write(b.wrench, {"F": force["F"], "M": moment["M"]})
+    return p
+
+
+def excess_force(b: Blocks) -> Program:
+    """Balance of linear momentum of all bodies above a surface (3.26), (3.28): its residual."""
+    p = Program("excess_force", "balance of linear momentum of all bodies above a surface: left side less right side")
+    carried: Symbols = p.read(b.vector, "s")
+    force: Symbols = p.read(b.vector, "f")
+    p.write(b.linear, {"r": subtract(carried["F"], force["F"])})
+    return p
+
+
+def programs(b: Blocks, rims: bool) -> list[Program]:
+    """The programs of a model with uplift."""
+    contact = [seat_depth(b), seat_inside(b), seat_edge(b), *([rim_to_world(b)] if rims else [])]
+    return [*contact, surface_force(b, rims), split_moment(b, rims), wrench_above(b), excess_force(b)]

@@ -148,10 +148,9 @@ typedef struct {
     double reference;     /* weight and load, the scale of forces where no normal force is known [N] */
 #if MSFP_UPLIFT
     double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE], rim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE];
-    double below[MSFP_NB]
-                [MSFP_MOMENT_SIZE]; /* moment of a surface on the body below, about the sphere centre of that body */
-    double dunilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_DOF], drim_wrench[MSFP_NB][MSFP_RIM_WRENCH_SIZE * MSFP_DOF],
-        dbelow[MSFP_NB][MSFP_MOMENT_SIZE * MSFP_DOF];
+    /* Moment of a surface on the body below, about the sphere centre of that body; the last is that of the top. */
+    double below[MSFP_NB + 1][MSFP_MOMENT_SIZE];
+    int standing[MSFP_NB]; /* MSFP_OPEN, MSFP_ON_FACE or MSFP_ON_EDGE */
 #endif
     double dx[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_DOF];
     double dbody[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_DOF];

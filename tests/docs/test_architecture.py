@@ -207,7 +207,10 @@ def test_every_package_is_on_the_map():
 
 # The folders of the runtime, lowest first, and the headers that each may include beside its own.
 LAYERS = ("equations", "steppers", "run", "port", "api")
-GRADIENTS = ("gradients", {"run.h", "gradients.h", "msfp_gradient_kernels.h"})  # beside `api`, of some models
+GRADIENTS = (
+    "gradients",
+    {"run.h", "gradients.h", "msfp_gradient_kernels.h", "msfp_directions.h"},
+)  # beside `api`, of some models
 RUNTIME = ROOT / "msfp_gen" / "runtime"
 GENERATED = {"msfp_model.h", "msfp_kernels.h", "msfp_schedule.h"}
 OF_THE_TABLE = {"msfp_fields.h", "msfp_checks.h"}  # what the table of functions states about the model, and checks

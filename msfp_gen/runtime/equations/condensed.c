@@ -1,66 +1,53 @@
-/* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. */
+/* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. How they are
+ * evaluated is emitted from generator/schedule.py. */
 #include <math.h>
 #include <string.h>
 #include "equations.h"
 #include "msfp_kernels.h"
+#include "msfp_schedule.h"
 
 static const int unknown[ND] = MSFP_FREE;
-
-/* Interface forces that balance loads, weights and inertia, summed from the top down. With uplift the unilateral
- * contacts and the rims give the forces instead, and the differences are rows of the residual. */
-static void forces(const msfp_parameters *p, msfp_work *w, double *residual)
-{
-    double sum[FORCE];
-    memcpy(sum, w->force[NB], sizeof sum);
-    for (int j = NB - 1; j >= 0; --j) {
-        msfp_interface_force(p->body[j + 1], w->body[j + 1], sum, w->force[j]);
-        memcpy(sum, w->force[j], sizeof sum);
-#if MSFP_UPLIFT
-        msfp_unilateral_force(p, w, j);
-        for (int i = 0; i < MSFP_SPACE; ++i) /* these rows follow the angular ones */
-            residual[j * ND + NA + i] = sum[i] - w->force[j][i];
-#else
-        (void)residual;
-#endif
-    }
-}
-
-/* Moment of the surface above body k. */
-static const double *moment_above(const msfp_work *w, int k)
-{
-#if MSFP_UPLIFT
-    if (k < NB)
-        return w->below[k];
-#endif
-    return w->moment[k];
-}
 
 MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                              double g[MSFP_NB][2], double *residual, double *tangent)
 {
-    double out[MSFP_ANGULAR_SIZE];
-    msfp_surface_jacobians *jacobians = tangent ? &w->jacobians : NULL;
+    msfp_blocks s;
+    s.seed = seed;
+    s.g = g;
+    s.jacobians = tangent ? &w->jacobians : NULL;
+    msfp_set_inputs(p, at, seed->same_base, w, &s);
     if (!seed->same_base)
-        msfp_base(p, at, w);
-    msfp_kinematics(p, at, w);
-    msfp_top(p, at, w);
-    msfp_rims(p, w, jacobians);
-    forces(p, w, residual);
-#if MSFP_LAW
-    msfp_friction_conditions(at, w);
-#endif
-    const int status = msfp_surfaces(p, w, seed, g, jacobians);
+        msfp_base_values(p, w, &s);
+    msfp_bodies_values(p, w, &s);
+    msfp_top_values(p, w, &s);
+    if (!MSFP_RIMS)
+        for (int j = 0; j < NB; ++j)
+            msfp_rim_force(p, w, j, NULL);
+    msfp_forces_values(p, w, &s);
+    const int status = msfp_surfaces_values(p, w, &s);
     if (status)
         return status;
-    for (int k = 1; k <= NB; ++k) {
-        msfp_angular_balance(p->body[k], w->body[k], w->force[k - 1], w->moment[k - 1], w->force[k], moment_above(w, k),
-                             out);
-        memcpy(residual + (k - 1) * ND, out, NA * sizeof *residual);
-        w->lock[k - 1] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : out[MSFP_ANGULAR_SIZE - 1];
+    msfp_moments_values(p, w, &s);
+    for (int j = 0; j < NB; ++j) {
+        memcpy(residual + j * ND, s.angular[j + 1], NA * sizeof *residual);
+#if MSFP_UPLIFT
+        memcpy(residual + j * ND + NA, s.excess[j], MSFP_SPACE * sizeof *residual);
+#endif
+        w->lock[j] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : s.angular[j + 1][MSFP_ANGULAR_SIZE - 1];
     }
     if (tangent)
         msfp_tangent(p, at, seed, w, tangent);
     return MSFP_OK;
+}
+
+MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    msfp_blocks s;
+    msfp_block_tangents ds;
+    msfp_set_loads(p, at, &s);
+    memset(ds.load_force, 0, sizeof ds.load_force);
+    memset(ds.load_moment, 0, sizeof ds.load_moment);
+    msfp_top_tangents(p, w, &s, &ds);
 }
 
 void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *scale)

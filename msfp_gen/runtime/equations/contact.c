@@ -288,3 +288,19 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
     scatter(&all, w, g);
     return status;
 }
+
+#if MSFP_FORWARD_TANGENT
+void msfp_contact_tangents(const msfp_work *w, double dlocal[NB][INPUTS * DOF], double dcontact[NB][MSFP_CONTACT_SIZE * DOF])
+{
+    for (int j = 0; j < NB; ++j)
+        for (int r = 0; r <= MOMENT; ++r) {
+            double *row = dcontact[j] + (r < MOMENT ? r : MSFP_CONTACT_N) * DOF;
+            memset(row, 0, DOF * sizeof *row);
+            for (int k = 0; k < INPUTS; ++k) {
+                const double slope = w->jacobians.contact[(r * INPUTS + k) * LANES + j];
+                for (int c = 0; c < DOF; ++c)
+                    row[c] += slope * dlocal[j][k * DOF + c];
+            }
+        }
+}
+#endif

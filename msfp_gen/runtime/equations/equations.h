@@ -13,10 +13,19 @@
 #else
 #define MSFP_IF_LAW(...)
 #endif
+#if MSFP_RIMS
+#define MSFP_IF_RIMS(...) , __VA_ARGS__ /* one more argument where the surfaces have rims */
+#else
+#define MSFP_IF_RIMS(...)
+#endif
 #if MSFP_TOP_ROTATION
 #define MSFP_IF_TOP_ROTATION(...) , __VA_ARGS__ /* one more argument where the support of the top plate rotates */
 #else
 #define MSFP_IF_TOP_ROTATION(...)
+#endif
+
+#ifndef MSFP_FORWARD_TANGENT
+#define MSFP_FORWARD_TANGENT MSFP_UPLIFT /* whether the tangent is that of tangent_forward.c; tests define it */
 #endif
 
 /* Field of the block of coordinates: angle i of order 0, 1, 2. */
@@ -37,23 +46,16 @@ static inline int msfp_unknown_field(int order, int i)
     return msfp_coordinate_field(order, i);
 }
 
+/* The blocks of an evaluation that msfp_work has not (msfp_schedule.h). */
+typedef struct msfp_blocks msfp_blocks;
+typedef struct msfp_block_tangents msfp_block_tangents;
+
 /* ---- kinematics.c ---- */
 
-/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
-void msfp_inertial_frame(const msfp_point *at, double *body);
-/* The blocks of coordinates of all bodies. */
-void msfp_load_coordinates(const msfp_point *at, msfp_work *w);
-/* Kinematics of body 0. */
-void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* Kinematics of the moving bodies; body 0 is in `w`. */
-void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* Force and moment above the top plate: loads, springs, dampers, the supported mass. */
-void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* The same with columns, at a given load. */
-void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
-/* What acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
-void msfp_load_top(const msfp_parameters *p, const msfp_point *at, double *force, double *moment,
-                   double *stage MSFP_IF_TOP_ROTATION(double *upright));
+/* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, temperatures. */
+void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, int same_base, msfp_work *w, msfp_blocks *s);
+/* Of these what acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
+void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s);
 /* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
 void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w);
 /* Whether a vertical spring or damper acts on the top plate. */
@@ -80,31 +82,21 @@ void msfp_end_turns(const double rotation[2][3], double turns[3][3], double deri
 /* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 #if MSFP_UPLIFT
-/* Force of surface j, into w->force[j]: that of the unilateral contact, zero where it is open or its damping would
- * pull, and that of the rim. */
+enum { MSFP_OPEN, MSFP_ON_FACE, MSFP_ON_EDGE }; /* how a slider stands on its footprint */
+/* The body whose face is the footprint of surface j. */
+static inline int msfp_slider(int j)
+{
+    static const int signs[MSFP_NB] = MSFP_SIGNS;
+    return signs[j] > 0 ? j + 1 : j;
+}
+/* Unilateral contact of surface j, zero where it is open or its damping would pull. */
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);
-/* Columns of that force and of the moments of its parts; the force itself is in `w`. drim: columns of the rim force in
- * the basis of the body below. */
-void msfp_unilateral_tangent(const msfp_parameters *p, msfp_work *w, int j, const double *drim);
-/* Moments of surface j on the body above and on the body below, from the moment about the centre of its concave
- * side. */
-void msfp_split_moment(msfp_work *w, int j);
-/* Columns of those moments. */
-void msfp_split_moment_tangent(msfp_work *w, int j);
 #endif
 
 /* ---- surface.c ---- */
 
 /* Rim force of surface j; drim: its Jacobian [force, moment][inputs of the rim], or NULL. */
 void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim);
-/* Rim forces of all surfaces, with their Jacobians for the tangent, or NULL. */
-void msfp_rims(const msfp_parameters *p, msfp_work *w, msfp_surface_jacobians *jacobians);
-/* Moment of surface j on the body above, in the basis of the body below [N m]. */
-void msfp_surface_moment(const msfp_work *w, int j, double *moment);
-/* Contact force, slip, friction and moment of all surfaces; g as of msfp_condensed; jacobians: for the tangent, or NULL.
- * Returns a status. */
-int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
-                  msfp_surface_jacobians *jacobians);
 /* Sliding displacements and gaps (3.20), (3.21) [m] at given coordinates. */
 void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE]);
 
@@ -114,6 +106,9 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
 int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);
+/* Columns of the moments and of N from those of the inputs of the contacts, by that Jacobian, which is in `w`. */
+void msfp_contact_tangents(const msfp_work *w, double dlocal[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_DOF],
+                           double dcontact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_DOF]);
 #if MSFP_CLOSED_FORM
 /* Y after the body above has turned by `turn` [rad]. par: of the surface. */
 double msfp_friction_after_turn(const double *par, double Y, double turn);
@@ -125,7 +120,7 @@ void msfp_work_of_slip(const double *par, const double *slip, const double *end,
 void msfp_friction_conditions(const msfp_point *at, msfp_work *w);
 #endif
 
-/* ---- condensed.c, and its tangent in tangent.c or, with uplift, in tangent_uplift.c ---- */
+/* ---- condensed.c, and its tangent in tangent.c or in tangent_forward.c ---- */
 
 /* Natural size of each residual [MSFP_DOF]: (N + rim force) R (mu + 1/100) of the surface below; of a force N + rim
  * force. */
@@ -133,6 +128,8 @@ void msfp_residual_scale(const msfp_parameters *p, const msfp_work *w, double *s
 /* Largest residual relative to its natural size, infinite where one is not finite. worst: its row, unchanged if all are
  * zero. */
 double msfp_residual_size(const msfp_parameters *p, const msfp_work *w, const double *residual, int *worst);
+/* Columns of force and moment at the top at a given load, from those of the top plate: all in `w`. */
+void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Tangent [MSFP_DOF][MSFP_DOF] of the condensed equations at the evaluation in `w`. */
 void msfp_tangent(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                   double *tangent);

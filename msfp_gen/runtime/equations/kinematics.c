@@ -1,8 +1,9 @@
-/* kinematics.c: parameters, kinematics from the base upward, force and moment above the top plate, named points. */
+/* kinematics.c: parameters, what an evaluation is given, the foot of the supported mass, named points. */
 #include <math.h>
 #include <string.h>
 #include "equations.h"
 #include "msfp_kernels.h"
+#include "msfp_schedule.h"
 
 static const int signs[NB] = MSFP_SIGNS;
 
@@ -102,10 +103,12 @@ void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodie
 }
 
 /* The block of coordinates from q, v, a of a body; separated: with the separation, which the base has not. */
-static void load_coordinates(double *x, const double *q, const double *v, const double *a, int separated)
+MSFP_INLINE void load_coordinates(double *x, const double *q, const double *v, const double *a, int separated)
 {
     const double *orders[3] = { q, v, a };
+    MSFP_UNROLL
     for (int order = 0; order < 3; ++order)
+        MSFP_UNROLL
         for (int i = 0; i < (MSFP_PLANAR ? 1 : 3); ++i)
             x[msfp_coordinate_field(order, i)] = orders[order][MSFP_PLANAR ? 1 : i];
 #if MSFP_UPLIFT
@@ -117,14 +120,8 @@ static void load_coordinates(double *x, const double *q, const double *v, const 
 #endif
 }
 
-void msfp_load_coordinates(const msfp_point *at, msfp_work *w)
-{
-    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
-    for (int k = 1; k <= NB; ++k)
-        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
-}
-
-void msfp_inertial_frame(const msfp_point *at, double *body)
+/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
+static void inertial_frame(const msfp_point *at, double *body)
 {
     static const double e[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     memset(body, 0, MSFP_BODY_SIZE * sizeof *body);
@@ -136,20 +133,30 @@ void msfp_inertial_frame(const msfp_point *at, double *body)
     msfp_body_A_put(body, at->base[2]);
 }
 
-void msfp_base(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s)
 {
-    double below[MSFP_BODY_SIZE];
-    msfp_inertial_frame(at, below);
-    load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
-    msfp_forward(p->body[0], below, w->x[0], w->body[0]);
+    msfp_force_F_put(s->load_force, at->load);
+    msfp_moment_M_put(s->load_moment, at->load + 3);
+    msfp_foot_stage(p, at, s->foot_stage);
+#if MSFP_TOP_ROTATION
+    msfp_support_axis(at, s->upright);
+#endif
 }
 
-MSFP_WIDE void msfp_kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, int same_base, msfp_work *w, msfp_blocks *s)
 {
-    for (int k = 1; k <= NB; ++k) {
-        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
-        msfp_forward(p->body[k], w->body[k - 1], w->x[k], w->body[k]);
+    s->at = at;
+    if (!same_base) {
+        inertial_frame(at, s->frame);
+        load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     }
+    for (int k = 1; k <= NB; ++k)
+        load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
+    msfp_set_loads(p, at, s);
+#if MSFP_LAW
+    msfp_friction_conditions(at, w);
+#endif
+    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
 #if MSFP_TOP_ROTATION
@@ -211,17 +218,6 @@ void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *sta
         memset(stage, 0, MSFP_FOOT_STAGE_SIZE * sizeof *stage);
 }
 
-void msfp_load_top(const msfp_parameters *p, const msfp_point *at, double *force, double *moment,
-                   double *stage MSFP_IF_TOP_ROTATION(double *upright))
-{
-    msfp_force_F_put(force, at->load);
-    msfp_moment_M_put(moment, at->load + 3);
-    msfp_foot_stage(p, at, stage);
-#if MSFP_TOP_ROTATION
-    msfp_support_axis(at, upright);
-#endif
-}
-
 void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
 {
     const double *plate = w->body[NB];
@@ -234,48 +230,21 @@ void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
     w->foot[MSFP_FOOT_Y2] = plate[MSFP_BODY_AZ];
 }
 
+/* Kinematics of all bodies, without friction. */
+static void kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_blocks *s)
+{
+    memset(w, 0, sizeof *w);
+    msfp_set_inputs(p, at, 0, w, s);
+    msfp_base_values(p, w, s);
+    msfp_bodies_values(p, w, s);
+}
+
 void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
 {
     msfp_work w;
-    msfp_base(p, at, &w);
-    msfp_kinematics(p, at, &w);
+    msfp_blocks s;
+    kinematics(p, at, &w, &s);
     msfp_resting_foot(p->top, w.body[NB], foot);
-}
-
-static void split_wrench(const double *wrench, double *force, double *moment)
-{
-    memcpy(force, wrench, FORCE * sizeof *force);
-    memcpy(moment, wrench + FORCE, MOMENT * sizeof *moment);
-}
-
-MSFP_WIDE void msfp_top(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
-{
-    double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE];
-#if MSFP_TOP_ROTATION
-    double upright[MSFP_UPRIGHT_SIZE];
-#endif
-    msfp_load_top(p, at, force, moment, stage MSFP_IF_TOP_ROTATION(upright));
-    msfp_top_wrench(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright), wrench);
-    split_wrench(wrench, w->force[NB], w->moment[NB]);
-    msfp_move_foot(p, stage, w);
-    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
-}
-
-MSFP_WIDE void msfp_top_tangent(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
-{
-    static const double constant[MSFP_TOP_WRENCH_SIZE * DOF]; /* columns of a load that does not move */
-    double force[FORCE], moment[MOMENT], stage[MSFP_FOOT_STAGE_SIZE], wrench[MSFP_TOP_WRENCH_SIZE],
-        dwrench[MSFP_TOP_WRENCH_SIZE * DOF];
-#if MSFP_TOP_ROTATION
-    double upright[MSFP_UPRIGHT_SIZE];
-#endif
-    msfp_load_top(p, at, force, moment, stage MSFP_IF_TOP_ROTATION(upright));
-    msfp_top_wrench_tangent(p->top, stage, w->body[NB], w->x[NB], force, moment MSFP_IF_TOP_ROTATION(upright),
-                            wrench, w->dbody[NB], w->dx[NB], constant, constant, dwrench);
-    split_wrench(wrench, w->force[NB], w->moment[NB]);
-    w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
-    memcpy(w->dforce[NB], dwrench, sizeof w->dforce[NB]);
-    memcpy(w->dmoment[NB], dwrench + FORCE * DOF, sizeof w->dmoment[NB]);
 }
 
 static void points_of(const double *block, double *out /* [4][3][3] */)
@@ -298,12 +267,11 @@ void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *
                         double *bases)
 {
     msfp_work w;
-    double below[MSFP_BODY_SIZE], block[MSFP_POINTS_SIZE];
-    msfp_base(p, at, &w);
-    msfp_kinematics(p, at, &w);
-    msfp_inertial_frame(at, below);
+    msfp_blocks s;
+    double block[MSFP_POINTS_SIZE];
+    kinematics(p, at, &w, &s);
     for (int k = 0; k <= NB; ++k) {
-        msfp_named_points(p->dimensions[k], k ? w.body[k - 1] : below, w.x[k], block);
+        msfp_named_points(p->dimensions[k], k ? w.body[k - 1] : s.frame, w.x[k], block);
         points_of(block, points + k * 36);
         msfp_body_w_get(w.body[k], rotations + k * 12);
         msfp_body_wp_get(w.body[k], rotations + k * 12 + 3);

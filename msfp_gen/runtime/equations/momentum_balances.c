@@ -11,24 +11,8 @@ enum {
     ROWS = MSFP_BALANCES_SIZE /* of a body */
 };
 
-/* What the schedule is given: motion, load and friction at the point, and the unknowns (2.119). */
-static void set_inputs(const msfp_parameters *p, const msfp_point *at, const double *unknowns, msfp_work *w,
-                       msfp_balance_blocks *s)
-{
-    msfp_inertial_frame(at, s->frame);
-    msfp_load_coordinates(at, w);
-    msfp_load_top(p, at, s->load_force, s->load_moment, s->foot_stage MSFP_IF_TOP_ROTATION(s->upright));
-    for (int j = 0; j < NB; ++j)
-        memcpy(s->friction[j], at->f[j], sizeof s->friction[j]);
-#if MSFP_LAW
-    msfp_friction_conditions(at, w);
-#endif
-    for (int i = 0; i < MSFP_UNKNOWNS; ++i)
-        *msfp_variable_values(w, s, msfp_unknowns + i) = unknowns[i];
-}
-
 /* Hand the rates of friction on to the steppers, which read them in the blocks of the condensed equations. */
-static void give_friction_rates(const msfp_balance_blocks *s, msfp_work *w)
+static void give_friction_rates(const msfp_blocks *s, msfp_work *w)
 {
     for (int j = 0; j < NB; ++j) {
         memcpy(w->contact[j] + MSFP_CONTACT_DY, s->report_contact[j] + MSFP_REPORT_CONTACT_DY,
@@ -51,22 +35,28 @@ void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, cons
                             double *residual, const msfp_variable *variables, int count, double *jacobian,
                             double *rates)
 {
-    msfp_balance_blocks s;
-    set_inputs(p, at, unknowns, w, &s);
+    msfp_blocks s;
+    msfp_block_tangents ds;
+    s.jacobians = NULL;
+    msfp_set_inputs(p, at, 0, w, &s);
+    for (int j = 0; j < NB; ++j)
+        memcpy(s.friction[j], at->f[j], sizeof s.friction[j]);
+    for (int i = 0; i < MSFP_UNKNOWNS; ++i)
+        *msfp_variable_values(w, &s, msfp_unknowns + i) = unknowns[i];
     msfp_balances_values(p, w, &s);
     give_friction_rates(&s, w);
     memcpy(residual, s.balances[1], MSFP_UNKNOWNS * sizeof *residual);
     for (int first = 0; first < count; first += DOF) {
-        msfp_clear_variables(w, &s);
+        msfp_clear_variables(w, &ds);
         for (int i = first; i < count && i < first + DOF; ++i) {
-            double *columns = msfp_variable_columns(w, &s, variables + i);
+            double *columns = msfp_variable_tangents(w, &ds, variables + i);
             if (columns)
                 columns[i - first] = 1.0;
         }
-        msfp_balances_columns(p, w, &s);
-        put_columns(s.dbalances[1], MSFP_UNKNOWNS, first, count, jacobian);
+        msfp_balances_tangents(p, w, &s, &ds);
+        put_columns(ds.balances[1], MSFP_UNKNOWNS, first, count, jacobian);
         for (int j = 0; j < NB && rates; ++j)
-            put_columns(s.dreport_contact[j] + MSFP_REPORT_CONTACT_DY * DOF, FRICTION, first, count,
+            put_columns(ds.report_contact[j] + MSFP_REPORT_CONTACT_DY * DOF, FRICTION, first, count,
                         rates + (size_t)2 * j * count);
     }
 }

@@ -1,4 +1,4 @@
-/* surface.c: the sliding surfaces: rims, gaps, interface forces and moments. */
+/* surface.c: rims and gaps of the sliding surfaces. */
 #include <math.h>
 #include <string.h>
 #include "equations.h"
@@ -57,35 +57,4 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
         body[MSFP_BODY_CT] = msfp_cos(q[j][1]);
         msfp_gap(p->surface[j], body, sliding[j]);
     }
-}
-
-void msfp_rims(const msfp_parameters *p, msfp_work *w, msfp_surface_jacobians *jacobians)
-{
-    for (int j = 0; j < NB; ++j)
-        msfp_rim_force(p, w, j, jacobians ? jacobians->rim[j] : NULL);
-}
-
-void msfp_surface_moment(const msfp_work *w, int j, double *moment)
-{
-    for (int r = 0; r < MOMENT; ++r)
-        moment[r] = w->contact[j][r] + w->rim[j][FORCE + r];
-}
-
-MSFP_WIDE int msfp_surfaces(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[NB][2],
-                            msfp_surface_jacobians *jacobians)
-{
-    double moment[MOMENT];
-    for (int j = 0; j < NB; ++j)
-        msfp_surface_local(w->body[j], w->body[j + 1], w->x[j + 1], w->x[j], w->force[j], w->rim[j], w->local[j]);
-    const int status = msfp_contacts(p, w, seed, g, jacobians ? jacobians->contact : NULL);
-    if (status)
-        return status;
-    for (int j = 0; j < NB; ++j) {
-        msfp_surface_moment(w, j, moment);
-        msfp_moment_to_world(w->body[j], moment, w->moment[j]);
-#if MSFP_UPLIFT
-        msfp_split_moment(w, j);
-#endif
-    }
-    return MSFP_OK;
 }

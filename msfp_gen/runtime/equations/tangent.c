@@ -1,5 +1,5 @@
-/* tangent.c: the tangent of the condensed equations without uplift: an unknown moves its body and all bodies above it
- * as one rigid body.
+/* tangent.c: the fast tangent of the condensed equations, without uplift: an unknown moves its body and all bodies above
+ * it as one rigid body.
  *
  * Columns are formed from the top down in body-fixed frames (generator/columns.py). A body above an unknown sees only
  * the variation of its angular velocity and acceleration, a body below only the variation of the interface force.
@@ -11,7 +11,7 @@
 #include "equations.h"
 #include "msfp_kernels.h"
 
-#if !MSFP_UPLIFT
+#if !MSFP_FORWARD_TANGENT
 enum { LANES = MSFP_LANES };
 /* Fields of the local variation of a body: the inputs of the contact beside its force come first. */
 enum {
@@ -250,7 +250,7 @@ MSFP_WIDE void msfp_tangent(const msfp_parameters *p, const msfp_point *at, cons
     columns c;
     twists(w, factors, c.twist);
     for (int k = 1; k <= NB; ++k) {
-        msfp_surface_moment(w, k - 1, moment);
+        msfp_surface_moment(w->contact[k - 1] MSFP_IF_RIMS(w->rim[k - 1]), moment);
         msfp_local_variation(factors, w->body[k - 1], w->body[k], w->x[k], w->x[k - 1], w->force[k - 1], moment,
                              variation[k]);
     }

@@ -156,8 +156,9 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
 #if MSFP_CLOSED_FORM
     closed_form = seed->closed_form;
 #endif
-    msfp_rims(p, w, &w->jacobians);
-    const int status = closed_form ? msfp_surfaces(p, w, seed, g, &w->jacobians) : MSFP_OK;
+    for (int j = 0; j < NB; ++j)
+        msfp_rim_force(p, w, j, w->jacobians.rim[j]);
+    const int status = closed_form ? msfp_contacts(p, w, seed, g, w->jacobians.contact) : MSFP_OK;
     if (status)
         return status;
     msfp_contact_slopes(p, seed, w, (const double(*)[2])g, all, slopes);
@@ -212,12 +213,14 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
 }
 
 MSFP_COLUMNWISE void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
-                                          const msfp_seed *seed, const msfp_point_columns *dat, const msfp_work *w,
-                                          const msfp_slopes *slopes, int j, int all, msfp_work_columns *d)
+                                          const msfp_work *w, const msfp_point_columns *dat, const msfp_slopes *slopes,
+                                          const msfp_seed *seed, int all, msfp_work_columns *d)
 {
-    if (all)
-        contact_columns(p, dp, seed, dat, w, slopes, j, RESULTS, d);
-    else
-        contact_columns(p, dp, seed, dat, w, slopes, j, FEW, d);
+    for (int j = 0; j < NB; ++j) {
+        if (all)
+            contact_columns(p, dp, seed, dat, w, slopes, j, RESULTS, d);
+        else
+            contact_columns(p, dp, seed, dat, w, slopes, j, FEW, d);
+    }
 }
 #endif

@@ -41,6 +41,9 @@ typedef struct {
     int base_moves; /* whether those of body 0 may differ from zero; 0 in a new work, which is zero */
 } msfp_work_columns;
 
+/* Columns of the blocks of an evaluation that msfp_work_columns has not (msfp_directions.h). */
+typedef struct msfp_block_directions msfp_block_directions;
+
 /* Columns of the motion of the foot, after those of the top plate. */
 void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                        const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
@@ -71,9 +74,9 @@ void msfp_contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const 
  * Returns a status. */
 int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                              double g[MSFP_NB][2], int all, msfp_slopes *slopes, double *tangent);
-/* Columns of the contact of surface j, after those of its local block; all: as before. */
-void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                          const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j, int all,
+/* Columns of all contacts, after those of their local blocks; all: as before. */
+void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                          const msfp_point_columns *dat, const msfp_slopes *slopes, const msfp_seed *seed, int all,
                           msfp_work_columns *d);
 
 /* ---- observation.c: what is recorded ---- */
