@@ -110,6 +110,7 @@ TITLES = {
     "interface_force": "Force through the interface below: (3.26), (3.28) summed from the top",
     "surface_local": "Contact force and slip rotation in the basis of the body below (3.12), (3.19)",
     "slip_rotation": "Slip rotation alone (3.12), (3.19)",
+    "contact_stage": "The stage formula of friction, with the damping time of the contact",
     "contact": "Normal force and its position in closed form, friction (3.13)-(3.19)",
     "report_contact": "The same at given unknowns, as stated in PEER 2017/07 (3.13)-(3.19)",
     "report_wrench": "Force and moment of a surface on the body above, contact and rim",

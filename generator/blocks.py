@@ -29,6 +29,7 @@ class Blocks:
     relative: Block
     friction: Block
     shear: Block
+    before: Block
     stage: Block
     slip: Block
     slip_end: Block
@@ -196,6 +197,11 @@ def _interfaces(new: Maker, uplift: bool) -> dict[str, Block]:
         "shear": new("shear")
         .scalar("Y", "-", "friction force along t~1 over -mu N: Y + T dY/dt")
         .scalar("Z", "-", "friction force along t~2 over -mu N: Z + T dZ/dt", 0)
+        .build(),
+        "before": new("before")
+        .scalar("Y", "-", "Y that the earlier stages of the step give; Y itself outside of a step")
+        .scalar("Z", "-", "Z likewise", 0)
+        .scalar("beta", "s", "diagonal entry of the stage formula; 0 outside of a step")
         .build(),
         "stage": new("stage")
         .scalar("Y", "-", "Y that the earlier stages of the step give; Y itself outside of a step")

@@ -14,7 +14,7 @@ from msfp_gen.specification import friction_laws
 
 from . import laws
 from .blocks import Blocks
-from .functions import ArcTan2, Modulus
+from .functions import ArcTan2, Modulus, Select
 from .hysteresis import Shear, friction_rates
 from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale
@@ -158,7 +158,7 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
     signed_radius, rates = slip(p, friction_model, par, base, shear, loc["dw"])
     out = {**rates, **friction(p, friction_model, given, base, N, g, loc["dw"], signed_radius)}
     law = friction_model.coefficient
-    out |= laws.law_results(p, law, par, given, loc, N, shear.kept, rates)
+    out |= laws.law_results(p, law, par, given, stage, loc, N, shear.kept, rates)
     values = {**out, **f, "N": N, "sp": sp_, "cp": cp_, "st": st_, "ct": ct_}
     p.write(
         b.contact,
@@ -167,6 +167,18 @@ def contact(b: Blocks, friction_model: FrictionModel) -> Program:
         columns="MSFP_LOCAL",
     )
     p.lanes = "MSFP_LANES"
+    return p
+
+
+def contact_stage(b: Blocks) -> Program:
+    """Constants of the stage formula of Y, Z: f = f_0 + beta df/dt, so that f + T df/dt = f_0 + (beta + T) df/dt."""
+    p = Program("contact_stage", "constants of the stage formula of friction, with the damping time of the contact")
+    par: Symbols = p.read(b.surface_parameters, "par", active=False)
+    before: Symbols = p.read(b.before, "f", active=False)
+    tau = p.let(before["beta"] + par["td"])
+    rest = Select(tau, par["td"] / p.let(Select(tau, tau, 1)), 1)
+    given = {name: before[name] for name in b.stage.quantities if name not in ("tau", "rest")}
+    p.write(b.stage, {**given, "tau": tau, "rest": rest}, tangents=False)
     return p
 
 

@@ -63,6 +63,7 @@ def derive(spec: ModelSpec) -> Equations:
         body.slip_rotation(blocks),
         contact.report_contact(blocks, law),
         contact.report_wrench(blocks, effects.rims),
+        contact.contact_stage(blocks),
         contact.surface_moment(blocks, effects.rims),
         body.to_world(blocks),
         body.interface_force(blocks, massless),

@@ -25,8 +25,7 @@ COVER_TRANSITION = sp.Rational(1, 10)
 """Half-width of the transition, in (x/reach)^2 about 1, over which the patch uncovers the centre of the surface: x is
 within 5 % of `reach`."""
 
-COEFFICIENT_FIELDS = [
-    Field("mu", "-", "friction coefficient, solved for with Y and Z"),
+HEAT_FIELDS = [
     Field("rise", "K", "temperature rise since the start, without the contribution of the flux of this stage"),
     Field("warming", "s^1/2", "contribution of that flux, per unit of flux; 0 where the temperature is given"),
 ]
@@ -53,7 +52,7 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
         b,
         surface_parameters=with_fields(b.surface_parameters, numbers),
         coefficient=with_fields(
-            Block("coefficient", (), {}), COEFFICIENT_FIELDS if law.depends_on_temperature else COEFFICIENT_FIELDS[:1]
+            Block("coefficient", (), {}), [Field("mu", "-", "friction coefficient, solved for with Y and Z")]
         ),
         contact=contact,
     )
@@ -62,6 +61,8 @@ def add_law_fields(b: Blocks, law: Law | None) -> Blocks:
     heat = [FLUX_FIELD, Field("T", "degC", "temperature at the centre"), Field("law_mu", "-", "d mu/d mu likewise")]
     return replace(
         b,
+        before=with_fields(b.before, HEAT_FIELDS),
+        stage=with_fields(b.stage, HEAT_FIELDS),
         local=with_fields(b.local, [TILT_FIELD]),
         relative=with_fields(b.relative, [TILT_FIELD]),
         contact=with_fields(contact, heat),
@@ -82,7 +83,15 @@ def read_unknown_coefficient(p: Program, b: Blocks, law: Law | None, par: Symbol
 
 
 def law_results(
-    p: Program, law: Law | None, par: Symbols, given: Symbols, loc: Symbols, N: sp.Expr, kept: sp.Expr, slip: Symbols
+    p: Program,
+    law: Law | None,
+    par: Symbols,
+    given: Symbols,
+    stage: Symbols,
+    loc: Symbols,
+    N: sp.Expr,
+    kept: sp.Expr,
+    slip: Symbols,
 ) -> Symbols:
     """Results that a law adds to `contact`; empty for constant friction.
 
@@ -95,6 +104,7 @@ def law_results(
         law: friction law.
         par: symbols of the surface parameters.
         given: the result of `read_unknown_coefficient`.
+        stage: symbols of the block `stage`.
         loc: symbols of the block `local`.
         N: normal force.
         kept: derivative of the friction state with respect to the friction force over -mu N.
@@ -108,11 +118,11 @@ def law_results(
     if law.depends_on_temperature:
         share = flux_per_coefficient(p, par, variables, loc)
         results["flux"] = p.let(c["mu"] * share, "flux")
-        results["T"] = p.let(par["start_temperature"] + c["rise"] + c["warming"] * results["flux"], "T")
+        results["T"] = p.let(par["start_temperature"] + stage["rise"] + stage["warming"] * results["flux"], "T")
         variables["T"] = results["T"]
     mu = results["mu"] = coefficient(p, law, par, variables)
     if law.depends_on_temperature:
-        results["law_mu"] = p.let(partial_derivative(p, mu, variables["T"]) * c["warming"] * share)
+        results["law_mu"] = p.let(partial_derivative(p, mu, variables["T"]) * stage["warming"] * share)
     slope = p.let(partial_derivative(p, mu, variables["v"]) * kept)
     return results | {f"law_{name}": p.let(slope * slip[f"plastic_{name}"]) for name in ("Y", "Z")}
 
@@ -126,12 +136,11 @@ def evaluate_law(
     """
     if law is None:
         return par, {}
-    assert b.coefficient is not None
-    c: Symbols = p.read(b.coefficient, "c", active=False)
     variables = law_variables(p, law, par, N, slip["plastic"])
     if not law.depends_on_temperature:
         return {**par, "mu": coefficient(p, law, par, variables)}, {}
-    mu = coefficient(p, law, par, {**variables, "T": p.let(par["start_temperature"] + c["rise"], "T")})
+    stage: Symbols = p.read(b.stage, "h", active=False)
+    mu = coefficient(p, law, par, {**variables, "T": p.let(par["start_temperature"] + stage["rise"], "T")})
     return {**par, "mu": mu}, {"flux": mu * flux_per_coefficient(p, par, variables, loc)}
 
 

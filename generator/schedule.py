@@ -174,7 +174,8 @@ LISTS: Mapping[str, List] = {
     "angular": List("angular", "angular", length=BODIES),
     "balances": List("balances", "balances", length=BODIES),
     "local": List("local", "local", Kept.WORK, SURFACES, directions=True),
-    "stage": List("stage", "stage", length=SURFACES),
+    "before": List("before", "before", length=SURFACES),
+    "stage": List("stage", "stage", Kept.WORK, SURFACES, directions=True),
     "shear": List("shear", "shear", length=SURFACES),
     "contact": List("contact", "contact", Kept.WORK, SURFACES, directions=True),
     "local_moment": List("moment", "local_moment", length=SURFACES),
@@ -251,18 +252,24 @@ def _rim(effects: Effects) -> tuple[Call, ...]:
     )
 
 
+STAGE = Call("contact_stage", ("surface_parameters[j]", "before[j]"), ("stage[j]",))
+"""What the stage formula of friction, and of heat, gives."""
+
+
 def momentum_balances(effects: Effects) -> Schedule:
     """The momentum balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them."""
-    law = ("coefficient[j]",) if effects.law is not None else ()
+    heat = effects.law is not None and effects.law.depends_on_temperature
+    temperature = ("stage[j]",) if heat else ()
     rim = ("rim[j]",) if effects.rims else ()
     surfaces = Pass(
         Over.SURFACES,
         (
             *_rim(effects),
+            *((STAGE,) if heat else ()),
             Call("slip_rotation", ("body[j+1]", "x[j+1]", "x[j]"), ("relative[j]",)),
             Call(
                 "report_contact",
-                ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *law),
+                ("surface_parameters[j]", "unknowns[j]", "friction[j]", "relative[j]", *temperature),
                 ("report_contact[j]",),
             ),
             Call("report_wrench", ("body[j]", "report_contact[j]", *rim), ("force[j]", "moment[j]")),
@@ -344,7 +351,10 @@ def condensed(effects: Effects) -> Schedule:
         "surfaces": (
             Pass(
                 Over.SURFACES,
-                (Call("surface_local", ("body[j]", "body[j+1]", "x[j+1]", "x[j]", "force[j]", *rim), ("local[j]",)),),
+                (
+                    Call("surface_local", ("body[j]", "body[j+1]", "x[j+1]", "x[j]", "force[j]", *rim), ("local[j]",)),
+                    STAGE,
+                ),
             ),
             Pass(
                 Over.TOGETHER,

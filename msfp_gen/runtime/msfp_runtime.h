@@ -135,7 +135,7 @@ typedef struct {
     double body[MSFP_NB + 1][MSFP_BODY_SIZE];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE];
     double local[MSFP_NB][MSFP_LOCAL_SIZE];
-    double contact[MSFP_NB][MSFP_CONTACT_SIZE];
+    double stage[MSFP_NB][MSFP_STAGE_SIZE], contact[MSFP_NB][MSFP_CONTACT_SIZE];
     double rim[MSFP_NB][MSFP_RIM_SIZE];
     int rim_active[MSFP_NB]; /* whether the rim pushes */
     double rim_gap[MSFP_NB], rim_rate[MSFP_NB]; /* gap of a closed rim, with uplift of every rim, and its rate [m], [m/s] */

@@ -12,10 +12,9 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
                              double g[MSFP_NB][2], double *residual, double *tangent)
 {
     msfp_blocks s;
-    s.seed = seed;
     s.g = g;
     s.jacobians = tangent ? &w->jacobians : NULL;
-    msfp_set_inputs(p, at, seed->same_base, w, &s);
+    msfp_set_inputs(p, at, seed, w, &s);
     if (!seed->same_base)
         msfp_base_values(p, w, &s);
     msfp_bodies_values(p, w, &s);

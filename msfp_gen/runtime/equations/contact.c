@@ -32,41 +32,20 @@ typedef struct {
 #endif
 } lanes;
 
-#if MSFP_LAW
-void msfp_friction_conditions(const msfp_point *at, msfp_work *w)
-{
-    for (int j = 0; j < NB; ++j) {
-        double *x = w->coefficient[j];
-#if MSFP_HEAT
-        x[MSFP_COEFFICIENT_RISE] = at->rise[j];
-        x[MSFP_COEFFICIENT_WARMING] = at->warming;
-#else
-        (void)at;
-#endif
-        if (!(fabs(x[MSFP_COEFFICIENT_MU]) < 1e3)) /* not finite after a failed step */
-            x[MSFP_COEFFICIENT_MU] = 0.0;
-    }
-}
-#endif
-
 /* From the blocks of the surfaces to lanes. */
-MSFP_INLINE void gather(const msfp_parameters *p, const msfp_work *w, const msfp_seed *seed, double g[NB][2],
-                        lanes *all)
+MSFP_INLINE void gather(const msfp_work *w, double g[NB][2], lanes *all)
 {
     for (int s = 0; s < LANES; ++s) {
         const int j = s < NB ? s : NB - 1;
         for (int k = 0; k < INPUTS; ++k)
             all->local[k * LANES + s] = w->local[j][k];
-        for (int k = 0; k < FRICTION; ++k) {
+        for (int k = 0; k < FRICTION; ++k)
             all->g[k * LANES + s] = g[j][k];
-            all->stage[k * LANES + s] = seed->fp[j][k];
-        }
-        const double damping = p->surface[j][MSFP_SURFACE_PARAMETERS_TD], tau = seed->beta + damping;
-        all->stage[MSFP_STAGE_TAU * LANES + s] = tau;
-        all->stage[MSFP_STAGE_REST * LANES + s] = tau > 0.0 ? damping / tau : 1.0;
+        for (int k = 0; k < MSFP_STAGE_SIZE; ++k)
+            all->stage[k * LANES + s] = w->stage[j][k];
 #if MSFP_LAW
-        for (int k = 0; k < MSFP_COEFFICIENT_SIZE; ++k)
-            all->x[k * LANES + s] = w->coefficient[j][k];
+        const double mu = w->coefficient[j][MSFP_COEFFICIENT_MU];
+        all->x[s] = fabs(mu) < 1e3 ? mu : 0.0; /* not finite after a failed step */
 #endif
     }
 }
@@ -80,7 +59,7 @@ MSFP_INLINE void scatter(const lanes *all, msfp_work *w, double g[NB][2])
         for (int k = 0; k < FRICTION; ++k)
             g[j][k] = all->g[k * LANES + j];
 #if MSFP_LAW
-        w->coefficient[j][MSFP_COEFFICIENT_MU] = all->x[MSFP_COEFFICIENT_MU * LANES + j];
+        w->coefficient[j][MSFP_COEFFICIENT_MU] = all->x[j];
 #endif
     }
 }
@@ -121,7 +100,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
 #if MSFP_LAW
     double excess[LANES];
     for (int s = 0; s < LANES; ++s) {
-        excess[s] = all->x[MSFP_COEFFICIENT_MU * LANES + s] - out[MSFP_CONTACT_MU * LANES + s];
+        excess[s] = all->x[s] - out[MSFP_CONTACT_MU * LANES + s];
         size[s] = fabs(excess[s]) > size[s] ? fabs(excess[s]) : size[s];
         sum[s] += fabs(excess[s]);
     }
@@ -146,7 +125,7 @@ MSFP_INLINE int newton_step(lanes *all, double beta, double accuracy, double *st
             change += out[(MSFP_CONTACT_LAW_Y + c) * LANES + s] * newton[c * LANES + s];
         change = overshot ? 0.5 * step[FRICTION * LANES + s] : change / (1.0 - SLOPE(out, s));
         step[FRICTION * LANES + s] = change;
-        all->x[MSFP_COEFFICIENT_MU * LANES + s] += sign * change;
+        all->x[s] += sign * change;
 #endif
         for (int r = 0; r < FRICTION; ++r) {
             step[r * LANES + s] = overshot ? 0.5 * step[r * LANES + s] : newton[r * LANES + s];
@@ -176,9 +155,9 @@ MSFP_INLINE int friction_stage(const double *par, lanes *all, double beta, doubl
 MSFP_INLINE int jacobian_row(int r) { return r < MOMENT ? r : r == MOMENT ? MOMENT + UNKNOWNS : r - 1; }
 
 #if MSFP_CLOSED_FORM
-/* Y of all surfaces after the slip of the step, and their contacts; slope: dg/d(angular velocity of the body)
+/* Y of all surfaces after the slip of the step, with their blocks `stage`, and their contacts; slope: dg/d(angular velocity of the body)
  * [s/rad], or NULL. */
-MSFP_INLINE int closed_form_stage(const msfp_parameters *p, const msfp_work *w, const msfp_seed *seed, lanes *all,
+MSFP_INLINE int closed_form_stage(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, lanes *all,
                                   double *slope)
 {
     static const double unit[INPUTS] = { [MSFP_LOCAL_DWY] = 1.0 };
@@ -192,9 +171,11 @@ MSFP_INLINE int closed_form_stage(const msfp_parameters *p, const msfp_work *w, 
         } else
             msfp_slid_friction(p->surface[j], seed->slip[j], w->local[j], slid);
         all->g[s] = slid[MSFP_SLID_G];
-        all->stage[s] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
-        all->stage[MSFP_STAGE_TAU * LANES + s] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
-        all->stage[MSFP_STAGE_REST * LANES + s] = 1.0;
+        w->stage[j][MSFP_STAGE_Y] = slid[MSFP_SLID_Y]; /* the kernel leaves Y as it is, and gives its rate */
+        w->stage[j][MSFP_STAGE_TAU] = p->surface[j][MSFP_SURFACE_PARAMETERS_TD];
+        w->stage[j][MSFP_STAGE_REST] = 1.0;
+        for (int k = 0; k < MSFP_STAGE_SIZE; ++k)
+            all->stage[k * LANES + s] = w->stage[j][k];
         finite += slid[MSFP_SLID_Y];
     }
     msfp_contact_lanes(&p->lanes[0][0], all->stage, all->local, all->g, all->out);
@@ -271,7 +252,7 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
                             double *condensed)
 {
     lanes all;
-    gather(p, w, seed, g, &all);
+    gather(w, g, &all);
 #if MSFP_CLOSED_FORM
     if (seed->closed_form) {
         double slope[LANES];

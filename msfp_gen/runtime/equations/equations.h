@@ -52,8 +52,10 @@ typedef struct msfp_block_tangents msfp_block_tangents;
 
 /* ---- kinematics.c ---- */
 
-/* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, temperatures. */
-void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, int same_base, msfp_work *w, msfp_blocks *s);
+/* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
+ * temperatures. seed: NULL outside of a step. */
+void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                     msfp_blocks *s);
 /* Of these what acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
 void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s);
 /* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
@@ -114,10 +116,6 @@ void msfp_contact_tangents(const msfp_work *w, double dlocal[MSFP_NB][MSFP_LOCAL
 double msfp_friction_after_turn(const double *par, double Y, double turn);
 /* Work that friction stores and dissipates over a slip: blocks `slip`, `slip_end` and `slip_work`. */
 void msfp_work_of_slip(const double *par, const double *slip, const double *end, double *work);
-#endif
-#if MSFP_LAW
-/* Temperatures of the surfaces for the friction law, and a finite first guess of mu. */
-void msfp_friction_conditions(const msfp_point *at, msfp_work *w);
 #endif
 
 /* ---- condensed.c, and its tangent in tangent.c or in tangent_forward.c ---- */

@@ -143,19 +143,29 @@ void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks 
 #endif
 }
 
-MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, int same_base, msfp_work *w, msfp_blocks *s)
+MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
+                               msfp_blocks *s)
 {
     s->at = at;
-    if (!same_base) {
+    s->seed = seed;
+    if (!(seed && seed->same_base)) {
         inertial_frame(at, s->frame);
         load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     }
     for (int k = 1; k <= NB; ++k)
         load_coordinates(w->x[k], at->q[k - 1], at->v[k - 1], at->a[k - 1], 1);
     msfp_set_loads(p, at, s);
-#if MSFP_LAW
-    msfp_friction_conditions(at, w);
+    for (int j = 0; j < NB; ++j) {
+        double *before = s->before[j];
+        MSFP_UNROLL
+        for (int i = 0; i < MSFP_SHEAR_SIZE; ++i)
+            before[MSFP_BEFORE_Y + i] = seed ? seed->fp[j][i] : at->f[j][i];
+        before[MSFP_BEFORE_BETA] = seed ? seed->beta : 0.0;
+#if MSFP_HEAT
+        before[MSFP_BEFORE_RISE] = at->rise[j];
+        before[MSFP_BEFORE_WARMING] = at->warming;
 #endif
+    }
     w->reference = p->weight + fabs(at->load[0]) + fabs(at->load[1]) + fabs(at->load[2]);
 }
 
@@ -234,7 +244,7 @@ void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w)
 static void kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work *w, msfp_blocks *s)
 {
     memset(w, 0, sizeof *w);
-    msfp_set_inputs(p, at, 0, w, s);
+    msfp_set_inputs(p, at, NULL, w, s);
     msfp_base_values(p, w, s);
     msfp_bodies_values(p, w, s);
 }

@@ -38,7 +38,7 @@ void msfp_momentum_balances(const msfp_parameters *p, const msfp_point *at, cons
     msfp_blocks s;
     msfp_block_tangents ds;
     s.jacobians = NULL;
-    msfp_set_inputs(p, at, 0, w, &s);
+    msfp_set_inputs(p, at, NULL, w, &s);
     for (int j = 0; j < NB; ++j)
         memcpy(s.friction[j], at->f[j], sizeof s.friction[j]);
     for (int i = 0; i < MSFP_UNKNOWNS; ++i)

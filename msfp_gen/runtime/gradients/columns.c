@@ -107,6 +107,10 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
     msfp_set_loads(p, at, &s);
     kinematics(p, dp, w, &s, &ds, d);
     top(p, dp, w, &s, &ds, d);
+    for (int j = 0; j < NB; ++j) {
+        memcpy(ds.before[j] + MSFP_BEFORE_Y * C, dat->f[j], MSFP_SHEAR_SIZE * sizeof dat->f[j][0]);
+        memcpy(ds.before[j] + MSFP_BEFORE_BETA * C, dat->beta, sizeof dat->beta);
+    }
     msfp_forces_directions(p, dp, w, d, &s, &ds);
     msfp_surfaces_directions(p, dp, w, d, &s, &ds);
     if (!(wanted & MSFP_OF_RESIDUAL))

@@ -29,42 +29,6 @@ static const struct {
 /* Indices in the block of a contact. The moment comes first, then what the equations of the unknowns contain. */
 static const int result[RESULTS] = MSFP_CONTACT_RESULT_LIST;
 
-/* The block `stage` of surface j, as msfp_contacts forms it. */
-MSFP_INLINE void contact_stage(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w, int j,
-                               double *stage)
-{
-    const double T = p->surface[j][MSFP_SURFACE_PARAMETERS_TD], tau = seed->beta + T;
-    stage[MSFP_STAGE_TAU] = tau;
-    stage[MSFP_STAGE_REST] = tau > 0.0 ? T / tau : 1.0;
-    for (int i = 0; i < FRICTION; ++i)
-        stage[MSFP_STAGE_Y + i] = seed->fp[j][i];
-#if MSFP_CLOSED_FORM
-    if (seed->closed_form) {
-        double slid[MSFP_SLID_SIZE];
-        msfp_slid_friction(p->surface[j], seed->slip[j], w->local[j], slid);
-        stage[MSFP_STAGE_Y] = slid[MSFP_SLID_Y];
-        stage[MSFP_STAGE_TAU] = T;
-        stage[MSFP_STAGE_REST] = 1.0;
-    }
-#else
-    (void)w;
-#endif
-}
-
-/* Its columns where it is not in closed form. */
-MSFP_INLINE void stage_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_seed *seed,
-                               const msfp_point_columns *dat, int j, double *dstage)
-{
-    const double T = p->surface[j][MSFP_SURFACE_PARAMETERS_TD], tau = seed->beta + T;
-    for (int i = 0; i < FRICTION; ++i)
-        memcpy(dstage + (MSFP_STAGE_Y + i) * C, dat->f[j][i], sizeof dat->f[j][i]);
-    for (int c = 0; c < C; ++c) {
-        const double dT = dp->surface[j][MSFP_SURFACE_PARAMETERS_TD * C + c], dtau = dat->beta[c] + dT;
-        dstage[MSFP_STAGE_TAU * C + c] = dtau;
-        dstage[MSFP_STAGE_REST * C + c] = seed->beta > 0.0 ? (dT - T * dtau / tau) / tau : 0.0;
-    }
-}
-
 /* Eliminate the local unknowns from the Jacobians. They are g = fp + tau df/dt, and mu by its law; their matrix is near
  * the identity, so that elimination needs no pivots. rates: df/dt; rates and tau by lanes. */
 MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, double (*restrict jacobian)[INPUTS][LANES],
@@ -110,16 +74,15 @@ MSFP_INLINE void eliminate(const double *rates, const double *tau, int rows, dou
 MSFP_INLINE void contact_slopes(const msfp_parameters *p, const msfp_seed *seed, const msfp_work *w,
                                 const double g[MSFP_NB][2], int rows, msfp_slopes *slopes)
 {
-    double stage[MSFP_STAGE_SIZE * LANES], local[MSFP_LOCAL_SIZE * LANES], force[FRICTION * LANES], one[MSFP_STAGE_SIZE];
+    double stage[MSFP_STAGE_SIZE * LANES], local[MSFP_LOCAL_SIZE * LANES], force[FRICTION * LANES];
     double out[MSFP_CONTACT_SIZE * LANES], jacobian[RESULTS][INPUTS][LANES];
 #if MSFP_LAW
     double x[MSFP_COEFFICIENT_SIZE * LANES];
 #endif
     for (int s = 0; s < LANES; ++s) {
         const int j = s < MSFP_NB ? s : MSFP_NB - 1;
-        contact_stage(p, seed, w, j, one);
         for (int i = 0; i < MSFP_STAGE_SIZE; ++i)
-            stage[i * LANES + s] = one[i];
+            stage[i * LANES + s] = w->stage[j][i];
         for (int i = 0; i < MSFP_LOCAL_SIZE; ++i)
             local[i * LANES + s] = w->local[j][i];
         for (int i = 0; i < FRICTION; ++i)
@@ -188,7 +151,7 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
                                  const msfp_point_columns *dat, const msfp_work *w, const msfp_slopes *slopes, int j,
                                  int rows, msfp_work_columns *d)
 {
-    double dstage[MSFP_STAGE_SIZE * C], unknowns[UNKNOWNS * C];
+    double *dstage = d->stage[j], unknowns[UNKNOWNS * C];
     const double *const blocks[] = { dp->surface[j], dstage, d->local[j], unknowns, unknowns + FRICTION * C },
                         *inputs[INPUTS];
     MSFP_UNROLL
@@ -199,7 +162,7 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
         double dslid[MSFP_SLID_SIZE * C];
         msfp_slid_friction_direction(p->surface[j], seed->slip[j], w->local[j], dp->surface[j], dat->slip[j],
                                      d->local[j], dslid);
-        memset(dstage, 0, sizeof dstage);
+        memset(dstage, 0, sizeof d->stage[j]);
         memcpy(dstage + MSFP_STAGE_Y * C, dslid + MSFP_SLID_Y * C, sizeof(msfp_columns));
         memcpy(dstage + MSFP_STAGE_TAU * C, dp->surface[j] + MSFP_SURFACE_PARAMETERS_TD * C, sizeof(msfp_columns));
         memcpy(unknowns, dslid + MSFP_SLID_G * C, sizeof(msfp_columns));
@@ -207,8 +170,10 @@ MSFP_INLINE void contact_columns(const msfp_parameters *p, const msfp_parameter_
         return;
     }
 #endif
+    (void)p;
+    (void)seed;
+    (void)dat;
     (void)w;
-    stage_columns(p, dp, seed, dat, j, dstage);
     results_columns(slopes, inputs, GIVEN, rows, j, d->contact[j]);
 }
 

@@ -35,7 +35,7 @@ typedef struct {
 typedef struct {
     double x[MSFP_NB + 1][MSFP_COORDINATES_SIZE * MSFP_COLUMNS], body[MSFP_NB + 1][MSFP_BODY_SIZE * MSFP_COLUMNS];
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_COLUMNS], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_COLUMNS];
-    double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
+    double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
     int base_moves; /* whether those of body 0 may differ from zero; 0 in a new work, which is zero */
