@@ -16,13 +16,14 @@ from .program import Program, Statement, Use
 
 COLUMNS = 4
 """Parameters whose derivatives one call carries: as many numbers as the vectors of most processors hold."""
-CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu")
+CONTACT = ("dY", "dZ", "N", "Y", "Z", "sp", "cp", "st", "ct", "u", "v", "drill", "mu", "flux", "T")
 """Results of `contact`, beside its moment, whose derivatives are used."""
 CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
 friction and the coefficient of a friction law."""
 DIFFERENTIATED = {
     "body_energy": False,
+    "upright": False,
     "spring_stage": False,
     "resting_foot": False,
     "foot": True,

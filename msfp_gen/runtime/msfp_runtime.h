@@ -122,8 +122,10 @@ typedef struct {
 #endif
 } msfp_seed;
 
-/* Rows of the Jacobian of a contact: its moment, N, and in models with gradients dY/dt, dZ/dt. */
-#define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SHEAR_SIZE)
+/* What the states of a surface follow from: dY/dt, dZ/dt, and with heat its flux. */
+#define MSFP_SURFACE_RATES (MSFP_SHEAR_SIZE + (MSFP_HEAT > 0))
+/* Rows of the Jacobian of a contact: its moment, N, and in models with gradients these rates. */
+#define MSFP_CONTACT_ROWS (MSFP_MOMENT_SIZE + 1 + MSFP_GRADIENTS * MSFP_SURFACE_RATES)
 /* Jacobians of all surfaces with respect to their inputs: of the contacts, lane by lane; of the rims. */
 typedef struct {
     double contact[MSFP_CONTACT_ROWS * MSFP_LOCAL_SIZE * MSFP_LANES], rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_RIM_LOCAL];
@@ -158,7 +160,7 @@ typedef struct {
     double dnormal[MSFP_NB][MSFP_DOF];
     msfp_surface_jacobians jacobians;
 #if MSFP_GRADIENTS
-    double dfriction[MSFP_NB][MSFP_SHEAR_SIZE][MSFP_DOF]; /* of dY/dt, dZ/dt */
+    double drates[MSFP_NB][MSFP_SURFACE_RATES][MSFP_DOF];
 #endif
 } msfp_work;
 

@@ -136,8 +136,17 @@ def derived_parameters(parameters: Mapping[str, float | None]) -> dict[str, floa
     if (radius := parameters.get("patch_radius")) is not None:
         out |= {"area": pi * radius**2, "reach": radius * sqrt(pi / 4)}
     if (k := parameters.get("conductivity")) is not None and (d := parameters.get("diffusivity")) is not None:
-        out["heating"] = sqrt(d / pi) / k
+        out["heating"] = (d / pi) ** 0.5 / k
     return out
+
+
+def derived_slopes(parameters: Mapping[str, float | None], name: str) -> dict[str, float]:
+    """Derivatives of the `derived_parameters` with respect to the parameter `name`, by a complex step."""
+    step = 1e-200
+    moved: Any = {key: value for key, value in parameters.items() if value is not None}
+    moved[name] += step * 1j
+    derived: dict[str, Any] = derived_parameters(moved)
+    return {key: value.imag / step for key, value in derived.items() if isinstance(value, complex)}
 
 
 def proportional(law: Law, bearing: Bearing) -> bool:

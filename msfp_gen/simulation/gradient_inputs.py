@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.model.plane import motion_in_plane, wrench_in_plane
 from msfp_gen.motions.time_grid import snapped
+from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
 from msfp_gen.simulation.segment import Frame, state_in_plane, time_grid, wrench_pieces
 from msfp_gen.specification import contract
 
@@ -99,17 +99,22 @@ class _Inputs:
         """The contact patch of a surface has the radius of its slider's rim unless it is given."""
         bearing = self.scene.bearing
         for index, surface in enumerate(bearing.surfaces):
-            if "area" in self.surfaces and surface.patch_radius is None and bearing.slider(index) == body:
-                radius = bearing.slider_rim_radius(index)
-                self.arrays["surfaces"][index, self.surfaces.index("area")] = 2 * pi * radius
+            if surface.patch_radius is None and bearing.slider(index) == body:
+                self._surface_values(index, "patch_radius")
 
     def _surfaces(self) -> None:
         (row,), name = self.parameter.index, self.parameter.field
-        slope = 1.0
-        if name == "patch_radius":
-            name, slope = "area", 2 * pi * self.parameter.value
-        if name in self.surfaces:  # others belong to effects that the model leaves out
-            self.arrays["surfaces"][row, self.surfaces.index(name)] = slope
+        if name in self.surfaces:
+            self.arrays["surfaces"][row, self.surfaces.index(name)] = 1.0
+        self._surface_values(row, name)
+
+    def _surface_values(self, row: int, name: str) -> None:
+        """The values of a surface that a parameter of its friction law determines; none without a law that needs it."""
+        law = self.model.effects.law
+        values = {} if law is None else law_parameters(law, self.scene.bearing, row)
+        for derived, slope in derived_slopes(values, name).items() if name in values else ():
+            if derived in self.surfaces:
+                self.arrays["surfaces"][row, self.surfaces.index(derived)] = slope
 
     def _top(self) -> None:
         name, component = self.parameter.field, self.parameter.index

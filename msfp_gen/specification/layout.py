@@ -232,24 +232,10 @@ class ModelSpec:
     gradients: bool = False
 
     def __post_init__(self) -> None:
-        if self.gradients:
-            self._check_gradients()
-
-    def _check_gradients(self) -> None:
-        if self.effects.uplift:
+        if self.gradients and self.effects.uplift:
             raise InputError(
                 "effects.uplift = True: gradients are not computed through lift-off and landing; leave out the "
                 "gradients, or give uplift = false where the surfaces stay closed"
-            )
-        if self.effects.top_rotation:
-            raise InputError(
-                "effects.top_rotation = True: gradients are not computed with a support that rotates; leave out the "
-                "gradients, or the top_rotation"
-            )
-        if self.effects.law is not None and self.effects.law.depends_on_temperature:
-            raise InputError(
-                f"effects.friction = {self.effects.friction!r}: gradients are not computed through frictional heating; "
-                "leave out the gradients, or give a friction law without temperature"
             )
 
     @property

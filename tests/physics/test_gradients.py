@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from support import Array, scene_of
-from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
+from support.gradients import DAMPED, derivative, double, heated, single, step_of, triple, values_around
 
-from msfp_gen import Load, Motion, Scene, simulate
+from msfp_gen import Load, Motion, Rotation, Scene, simulate
 from msfp_gen.model.model import Model, build_model
 from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS
 from msfp_gen.results.row_unpacking import unpacked
@@ -31,6 +31,11 @@ RIG = ("top.axial_load", "top.stiffness", "top.damping", "top.rotational_stiffne
 MASS = (
     "top.mass", "top.inertia[0]", "top.height", "top.rotational_stiffness", "top.vertical_stiffness",
     "top.vertical_damping", "load.scale", "bearing.surfaces[1].friction_slow", "bearing.surfaces[1].velocity_rate",
+)  # fmt: skip
+HEAT = (
+    "bearing.surfaces[0].reference_pressure", "bearing.surfaces[0].velocity_rate",
+    "bearing.surfaces[0].start_temperature", "bearing.surfaces[0].conductivity", "bearing.surfaces[0].diffusivity",
+    "bearing.surfaces[0].patch_radius",
 )  # fmt: skip
 STATE = ("initial_state.q[0][0]", "initial_state.q[1][1]", "initial_state.v[1][1]", "initial_state.h[0][0]")
 WEAK = ("contact_damping", "mass", "centroid", "gravity", "stiffness", "damping", "rotational_stiffness",
@@ -125,6 +130,31 @@ def test_the_load_before_a_jump_counts_in_the_step_that_ends_there() -> None:
 @pytest.mark.slow
 def test_differences_with_the_same_steps_in_a_double_pendulum_below_a_mass() -> None:
     check_frozen(double(), [*STACK, *MASS, *STATE, "motion.direction"], 5e-5, weak=1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["implicit", "esdirk4"])
+def test_differences_with_the_same_steps_through_frictional_heating(method: str) -> None:
+    scene = heated(patch_radius=0.15)
+    values = check_frozen(replace(scene, solver=replace(scene.solver, method=method)), [*STACK, *HEAT], 1e-5, weak=1.0)
+    assert values["temperature"].max() > 40.0
+
+
+@pytest.mark.slow
+def test_differences_with_the_same_steps_where_a_patch_uncovers_the_centre() -> None:
+    """With small changes: the second derivative of the heat flux jumps where the patch begins to leave the centre."""
+    check_frozen(heated(patch_radius=0.03), ["bearing.surfaces[0].patch_radius", "bearing.surfaces[0].radius"], 1e-6)
+
+
+@pytest.mark.slow
+def test_differences_with_the_same_steps_between_plates_that_rotate() -> None:
+    """Base and support of the top plate rock about different axes."""
+    scene = triple(3.0)
+    motion = scene.motion.rocking(Rotation.harmonic(psi=0.004, theta=-0.002, frequency=0.6, cycles=1.75))
+    support = Rotation.harmonic(psi=-0.003, theta=0.005, frequency=0.5, cycles=1.5)
+    effects = replace(scene.effects, top_rotation=True)
+    scene = replace(scene, motion=motion, motion_table=None, top_rotation=support, effects=effects)
+    check_frozen(scene, [*STACK, *RIG], 1e-5, weak=10.0)
 
 
 @pytest.mark.slow

@@ -109,6 +109,17 @@ def rims_double() -> tuple[Scene, dict[str, float]]:
     return fine(scene, 1e-12, 0.1, 2e-4), paths | {"bearing.surfaces[1].rim_damping": 0.1}
 
 
+def rims_heated() -> tuple[Scene, dict[str, float]]:
+    """The same, while its surfaces warm up."""
+    scene, sizes = rims_double()
+    sizes = {path: size for path, size in sizes.items() if path not in LAW}
+    bearing = scene.bearing.replace(friction_slow=None, reference_pressure=5e6, velocity_rate=100.0, conductivity=0.5)
+    scene = replace(scene, bearing=bearing, effects=Effects(friction="pvt"))
+    assert simulate(scene).history.temperature.max() > 40.0
+    law = {"bearing.surfaces[0].start_temperature": 4e-3, "bearing.surfaces[0].conductivity": 4e-3}
+    return scene, {path: size for path, size in sizes.items() if path in COMMON or "surfaces[1]" in path} | law
+
+
 def rims_single() -> tuple[Scene, dict[str, float]]:
     """A single pendulum that meets its rim twice and leaves it."""
     effects = Effects(dimension="planar", sliders="massless")
@@ -131,6 +142,7 @@ def test_differences_with_free_steps_in_smooth_runs(case: Case) -> None:
 @pytest.mark.parametrize(
     ("case", "away"),
     [pytest.param(rims_single, 0.05, marks=slow), pytest.param(rims_double, 0.1, marks=slow),
+     pytest.param(rims_heated, 0.1, marks=slow),
      pytest.param(rims_triple, 1.0, marks=slow)],
 )  # fmt: skip
 def test_differences_with_free_steps_through_rim_contacts(case: Case, away: float) -> None:

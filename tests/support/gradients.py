@@ -39,6 +39,19 @@ def double() -> Scene:
     return replace(scene, duration=None, motion_table=None, output_step=None)
 
 
+def heated(patch_radius: float) -> Scene:
+    """The double pendulum, with friction that depends on pressure, velocity and temperature: its surfaces warm up."""
+    scene = double()
+    bearing = scene.bearing.replace(
+        friction_slow=None,
+        reference_pressure=50e6 * (0.03 / patch_radius) ** 2,
+        velocity_rate=100.0,
+        patch_radius=patch_radius,
+        conductivity=18.0 * (0.03 / patch_radius) ** 2,
+    )
+    return replace(scene, bearing=bearing, effects=Effects(friction="pvt", rims=False))
+
+
 def triple(duration: float = 6.0, **solver: Any) -> Scene:
     """The triple pendulum of PEER 2017/07 with damped contacts, at the start of test 2."""
     scene = scene_of("fenz-test2", duration=duration)

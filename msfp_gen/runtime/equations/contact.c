@@ -15,7 +15,8 @@ enum {
     FRICTION = MSFP_SHEAR_SIZE,
     UNKNOWNS = FRICTION + MSFP_LAW, /* local unknowns: g, and mu where it follows a law */
     ROWS = MOMENT + UNKNOWNS + 1,   /* of the Jacobian of a contact: M, dY, dZ, mu, N */
-    INPUTS = MSFP_LOCAL_SIZE        /* force and slip rotation */
+    INPUTS = MSFP_LOCAL_SIZE,       /* force and slip rotation */
+    FLUX = MSFP_CONTACT_ROWS - MSFP_GRADIENTS * (MSFP_HEAT > 0) /* the row of the flux, where there is one */
 };
 #if MSFP_HEAT
 #define SLOPE(out, s)                                                                                                  \
@@ -235,7 +236,9 @@ MSFP_INLINE void condense(const double *par, lanes *all, double *condensed)
                 for (int s = 0; s < LANES; ++s)
                     a[r][c][s] -= factor[s] * a[k][c][s];
         }
-    for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
+    /* Of the flux only gradients need derivatives (msfp_tangent_with_slopes). */
+    memset(condensed + FLUX * INPUTS * LANES, 0, (MSFP_CONTACT_ROWS - FLUX) * INPUTS * LANES * sizeof *condensed);
+    for (int r = 0; r < FLUX; ++r) {
         const double *row = jacobian + jacobian_row(r) * MSFP_LOCAL * LANES;
         for (int k = 0; k < INPUTS; ++k) {
             double *sum = condensed + (r * INPUTS + k) * LANES;

@@ -67,7 +67,9 @@ double msfp_sprung_mass(const msfp_parameters *p);
 /* The block `foot_stage`: zero without a spring. A spring on which no mass rests has a fixed end. */
 void msfp_foot_stage(const msfp_parameters *p, const msfp_point *at, double *stage);
 #if MSFP_TOP_ROTATION
-/* Axis of the support of the top plate and its angular velocity, into the block `upright`. */
+/* Tilt of the support of the top plate and its rate, as the block `support`. */
+void msfp_support(const msfp_point *at, double *support);
+/* Its axis and angular velocity, as the block `upright`. */
 void msfp_support_axis(const msfp_point *at, double *upright);
 #endif
 

@@ -170,12 +170,17 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
 }
 
 #if MSFP_TOP_ROTATION
-void msfp_support_axis(const msfp_point *at, double *upright)
+void msfp_support(const msfp_point *at, double *support)
 {
-    double support[MSFP_SUPPORT_SIZE];
     for (int order = 0; order < 2; ++order)
         for (int i = 0; i < PAIR; ++i)
             support[order * PAIR + i] = at->support[order][MSFP_PLANAR ? 1 : i];
+}
+
+void msfp_support_axis(const msfp_point *at, double *upright)
+{
+    double support[MSFP_SUPPORT_SIZE];
+    msfp_support(at, support);
     msfp_upright(support, upright);
 }
 #endif

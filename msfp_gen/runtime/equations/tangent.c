@@ -24,9 +24,9 @@ enum {
 };
 enum { INPUTS = MSFP_LOCAL_SIZE };
 #if MSFP_GRADIENTS
-#define FRICTION_ROW(w, j, i) (w)->dfriction[j][i]
+#define RATE_ROW(w, j, i) (w)->drates[j][i]
 #else
-#define FRICTION_ROW(w, j, i) NULL
+#define RATE_ROW(w, j, i) NULL
 #endif
 static const double no_twist[TWIST]; /* columns are derivatives at zero twist */
 
@@ -163,7 +163,7 @@ MSFP_INLINE void contact_row(const double *restrict slope, const double *restric
 #endif
 }
 
-/* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of dY/dt, dZ/dt. */
+/* Columns of the moment of surface j, in the basis of the body below, of N and in models with gradients of the rates. */
 MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, int j, const double *parts, columns *c)
 {
     double unused[FORCE], local[FORCE * DOF];
@@ -173,7 +173,7 @@ MSFP_INLINE void surface(msfp_work *w, const msfp_seed *seed, int j, const doubl
         contact_row(w->jacobians.contact + r * INPUTS * LANES + j, local, j, parts + r * ND * LANES + j, seed->cv,
                     r < MOMENT    ? c->moment_below + r * DOF
                     : r == MOMENT ? w->dnormal[j]
-                                  : FRICTION_ROW(w, j, r - MOMENT - 1));
+                                  : RATE_ROW(w, j, r - MOMENT - 1));
     for (int i = 0; i < 2 * PAIR && w->rim_active[j]; ++i)
         for (int r = 0; r < MOMENT; ++r)
             c->moment_below[r * DOF + j * ND + i % PAIR] += factors[i / PAIR] * rim[(FORCE + r) * MSFP_RIM_LOCAL + i];

@@ -40,6 +40,17 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
     msfp_bodies_directions(p, dp, w, d, s, ds);
 }
 
+#if MSFP_TOP_ROTATION
+void msfp_support_columns(const msfp_point *at, const msfp_point_columns *dat, double *dupright)
+{
+    double support[MSFP_SUPPORT_SIZE], dsupport[MSFP_SUPPORT_SIZE * C];
+    msfp_support(at, support);
+    for (int order = 0; order < 2; ++order)
+        memcpy(dsupport + order * PAIR * C, dat->support[order] + (MSFP_PLANAR ? 1 : 0), PAIR * sizeof(msfp_columns));
+    msfp_upright_direction(support, dsupport, dupright);
+}
+#endif
+
 /* Columns of the block `foot_stage`, as msfp_foot_stage fills it. */
 MSFP_INLINE void foot_stage(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, double *d)
@@ -61,7 +72,7 @@ MSFP_INLINE void top(const msfp_parameters *p, const msfp_parameter_columns *dp,
     msfp_put_axial(ds->load_moment, ds->point->load + 3);
     foot_stage(p, dp, s->at, ds->point, ds->foot_stage);
 #if MSFP_TOP_ROTATION
-    memset(ds->upright, 0, sizeof ds->upright); /* as prescribed */
+    msfp_support_columns(s->at, ds->point, ds->upright);
 #endif
     msfp_top_directions(p, dp, w, d, s, ds);
 }
@@ -110,6 +121,10 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
     for (int j = 0; j < NB; ++j) {
         memcpy(ds.before[j] + MSFP_BEFORE_Y * C, dat->f[j], MSFP_SHEAR_SIZE * sizeof dat->f[j][0]);
         memcpy(ds.before[j] + MSFP_BEFORE_BETA * C, dat->beta, sizeof dat->beta);
+#if MSFP_HEAT
+        memcpy(ds.before[j] + MSFP_BEFORE_RISE * C, dat->rise[j], sizeof dat->rise[j]);
+        memcpy(ds.before[j] + MSFP_BEFORE_WARMING * C, dat->warming, sizeof dat->warming);
+#endif
     }
     msfp_forces_directions(p, dp, w, d, &s, &ds);
     msfp_surfaces_directions(p, dp, w, d, &s, &ds);

@@ -20,7 +20,7 @@ enum {
     RESULTS = MSFP_CONTACT_RESULTS,
     INPUTS = MSFP_CONTACT_INPUTS,  /* the unknowns come last */
     GIVEN = INPUTS - UNKNOWNS,
-    FEW = MOMENT + UNKNOWNS /* results on which the motion depends */
+    FEW = MSFP_HEAT ? RESULTS : MOMENT + UNKNOWNS /* results on which the motion depends; the flux is among the last */
 };
 enum { PARAMETERS, STAGE, LOCAL }; /* blocks of inputs */
 static const struct {
@@ -125,9 +125,17 @@ int msfp_tangent_with_slopes(const msfp_parameters *p, const msfp_point *at, con
     if (status)
         return status;
     msfp_contact_slopes(p, seed, w, (const double(*)[2])g, all, slopes);
-    for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r) /* row MOMENT, that of N, does not enter the tangent */
-        memcpy(w->jacobians.contact + r * SIZE, slopes->of[r < MOMENT ? r : r == MOMENT ? 0 : r - 1][GIVEN - MSFP_LOCAL_SIZE],
-               SIZE * sizeof(double));
+    int from[MSFP_CONTACT_ROWS] = { 0 }; /* row MOMENT, that of N, does not enter the tangent */
+    for (int r = 0; r < RESULTS; ++r) {
+        if (r < MOMENT + FRICTION)
+            from[r < MOMENT ? r : r + 1] = r;
+#if MSFP_HEAT
+        if (result[r] == MSFP_CONTACT_FLUX)
+            from[MSFP_CONTACT_ROWS - 1] = r;
+#endif
+    }
+    for (int r = 0; r < MSFP_CONTACT_ROWS && !closed_form; ++r)
+        memcpy(w->jacobians.contact + r * SIZE, slopes->of[from[r]][GIVEN - MSFP_LOCAL_SIZE], SIZE * sizeof(double));
     msfp_tangent(p, at, seed, w, tangent);
     return MSFP_OK;
 }

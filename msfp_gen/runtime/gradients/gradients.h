@@ -29,6 +29,12 @@ typedef struct {
     msfp_columns q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2];
     msfp_columns foot[2], foot_beta, beta;
     double slip[MSFP_NB][MSFP_SLIP_SIZE * MSFP_COLUMNS]; /* of a quasi-static step, instead of f */
+#if MSFP_HEAT
+    msfp_columns rise[MSFP_NB], warming;
+#endif
+#if MSFP_TOP_ROTATION
+    msfp_columns support[2][6];
+#endif
 } msfp_point_columns;
 
 /* Of the results of one evaluation: blocks of msfp_work. */
@@ -44,6 +50,10 @@ typedef struct {
 /* Columns of the blocks of an evaluation that msfp_work_columns has not (msfp_directions.h). */
 typedef struct msfp_block_directions msfp_block_directions;
 
+#if MSFP_TOP_ROTATION
+/* Columns of the axis of a rotating support and of its angular velocity, as the block `upright`. */
+void msfp_support_columns(const msfp_point *at, const msfp_point_columns *dat, double *dupright);
+#endif
 /* Columns of the motion of the foot, after those of the top plate. */
 void msfp_foot_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                        const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
@@ -108,6 +118,9 @@ typedef struct {
     msfp_columns t, q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
     msfp_columns foot[MSFP_FOOT_SIZE], work[MSFP_WORKS];
     msfp_power_columns power;
+#if MSFP_HEAT
+    msfp_columns heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB];
+#endif
 } msfp_state_columns;
 
 #if MSFP_CLOSED_FORM
@@ -275,6 +288,26 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first);
 void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
 void msfp_complete_columns(msfp_run *run, msfp_group *group);
+
+/* ---- heat_columns.c: temperatures of the surfaces (heat.c) ---- */
+#if MSFP_HEAT
+/* Rates of the parts of the rise in all stages, and the parts at one of them: values, and columns. */
+typedef struct {
+    double rates[MSFP_STAGES][MSFP_NB][MSFP_HEAT], before[MSFP_NB][MSFP_HEAT];
+    msfp_columns drates[MSFP_STAGES][MSFP_NB][MSFP_HEAT], dbefore[MSFP_NB][MSFP_HEAT], heat[MSFP_NB][MSFP_HEAT],
+        flux[MSFP_NB];
+} msfp_heat_columns;
+
+/* A step: begin; rise and warming of stage i, into `dat`; its heat and rates, from the columns of the flux. */
+void msfp_heat_columns_begin(const msfp_run *run, const msfp_group *group, msfp_heat_columns *s);
+void msfp_heat_columns_prepare(const msfp_run *run, const msfp_group *group, const double *weights, int i,
+                               double h, msfp_heat_columns *s, msfp_point_columns *dat);
+void msfp_heat_columns_stage(const msfp_run *run, const msfp_group *group, int i, msfp_heat_columns *s);
+/* Rise of a state, into `dat`. */
+void msfp_heat_columns_point(const msfp_state_columns *ds, msfp_point_columns *dat);
+#else
+#define msfp_heat_columns_point(ds, dat) ((void)0)
+#endif
 
 /* ---- power_columns.c, work_columns.c: works of the energy balance, where they are asked for ---- */
 

@@ -31,6 +31,9 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
         t = nextafter(run->jumps[run->next_jump], -INFINITY);
     memset(dat->base, 0, sizeof dat->base);
     memset(dat->load, 0, sizeof dat->load);
+#if MSFP_TOP_ROTATION
+    memset(dat->support, 0, sizeof dat->support);
+#endif
     dat->base_moves = msfp_any_column(dt);
     for (int c = 0; c < C; ++c) {
         if (group->motion[c].pieces) {
@@ -55,6 +58,11 @@ MSFP_COLUMNWISE void msfp_inputs_columns(msfp_run *run, msfp_group *group, doubl
     msfp_add_scaled(dat->base[2], third, dt, 1.0, 6);
     msfp_history_at(&run->load, t, 2, found);
     msfp_add_scaled(dat->load, found[1], dt, 1.0, 6);
+#if MSFP_TOP_ROTATION
+    msfp_history_at(&run->support, t, 3, found);
+    for (int order = 0; order < 2; ++order)
+        msfp_add_scaled(dat->support[order], found[order + 1], dt, 1.0, 6);
+#endif
 }
 
 int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
@@ -85,6 +93,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     memcpy(dat->q, now->q, sizeof dat->q);
     memcpy(dat->v, now->v, sizeof dat->v);
     memcpy(dat->f, now->f, sizeof dat->f);
+    msfp_heat_columns_point(now, dat);
     msfp_inputs_columns(run, group, run->now.t, now->t, dat);
     if (first) {
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
@@ -103,6 +112,10 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
     }
     msfp_friction_columns(&group->work, now->df, NULL);
+#if MSFP_HEAT
+    for (int j = 0; j < NB; ++j)
+        memcpy(now->flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof now->flux[j]);
+#endif
     memcpy(now->foot, group->work.foot, sizeof now->foot);
     if (run->gradients->energies)
         msfp_initial_works(run, group, &at, &seed, (const double(*)[2])g);

@@ -90,6 +90,9 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
 #if MSFP_LAW
         row[MSFP_ROW_MU + j][c] = dcontact[MSFP_CONTACT_MU * C + c];
 #endif
+#if MSFP_HEAT
+        row[MSFP_ROW_TEMPERATURE + j][c] = dcontact[MSFP_CONTACT_T * C + c];
+#endif
     }
     msfp_gap(p->surface[j], w->body[j + 1], sliding);
     gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], sliding, gap);
@@ -123,7 +126,13 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
     msfp_get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
         memcpy(row[MSFP_ROW_TOP_MOMENT + (MSFP_PLANAR ? 1 : i)], d->moment[NB] + i * C, sizeof *row);
-    msfp_restraint_direction(p->top, w->body[NB], w->foot, dp->top, d->body[NB], d->foot, stored[0]);
+#if MSFP_TOP_ROTATION
+    double upright[MSFP_UPRIGHT_SIZE], dupright[MSFP_UPRIGHT_SIZE * C];
+    msfp_support_axis(at, upright);
+    msfp_support_columns(at, dat, dupright);
+#endif
+    msfp_restraint_direction(p->top, w->body[NB], w->foot MSFP_IF_TOP_ROTATION(upright), dp->top, d->body[NB],
+                             d->foot MSFP_IF_TOP_ROTATION(dupright), stored[0]);
     memcpy(row[MSFP_ROW_RESTRAINT], stored[MSFP_RESTRAINT_STORED], sizeof *row);
     memcpy(row[MSFP_ROW_TOP_SETTLEMENT], stored[MSFP_RESTRAINT_SETTLEMENT], sizeof *row);
     msfp_mechanical_columns(p, dp, at, dat, w, d, energy);

@@ -11,7 +11,7 @@
 #if MSFP_GRADIENTS
 #include "msfp_gradient_kernels.h"
 
-MSFP_STATIC_ASSERT(!MSFP_UPLIFT && !MSFP_TOP_ROTATION, gradients_of_powers); /* ModelSpec refuses them */
+MSFP_STATIC_ASSERT(!MSFP_UPLIFT, gradients_of_powers); /* ModelSpec refuses it */
 
 MSFP_COLUMNWISE void msfp_base_motion_columns(const msfp_point_columns *dat, double *dbase)
 {
@@ -63,8 +63,14 @@ MSFP_COLUMNWISE void msfp_columns_of_powers(const msfp_parameters *p, const msfp
     msfp_put_polar(dforce, dat->load);
     msfp_put_axial(dmoment, dat->load + 3);
     msfp_mechanical_columns(p, dp, at, dat, w, d, mechanical);
-    msfp_top_power_direction(p->top, w->body[NB], w->foot, w->x[NB], base, force, moment, dp->top, d->body[NB], d->foot,
-                             d->x[NB], dbase, dforce, dmoment, top[0]);
+#if MSFP_TOP_ROTATION
+    double upright[MSFP_UPRIGHT_SIZE], dupright[MSFP_UPRIGHT_SIZE * C];
+    msfp_support_axis(at, upright);
+    msfp_support_columns(at, dat, dupright);
+#endif
+    msfp_top_power_direction(p->top, w->body[NB], w->foot MSFP_IF_TOP_ROTATION(upright), w->x[NB], base, force, moment,
+                             dp->top, d->body[NB], d->foot MSFP_IF_TOP_ROTATION(dupright), d->x[NB], dbase, dforce,
+                             dmoment, top[0]);
     msfp_base_power_direction(w->body[0], base, w->force[0], w->moment[0], d->body[0], dbase, d->force[0], d->moment[0],
                               one);
     memcpy(power->load, top[MSFP_TOP_POWER_LOAD], sizeof power->load);

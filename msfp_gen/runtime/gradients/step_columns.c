@@ -54,6 +54,9 @@ MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_colu
 typedef struct {
     msfp_columns v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], foot[STAGES][2];
     double rates[STAGES][NB][2]; /* of Y, Z */
+#if MSFP_HEAT
+    msfp_heat_columns heat;
+#endif
 } stage_columns;
 
 /* Rates of the bodies [MSFP_NB][MSFP_NQ] at stage j. */
@@ -179,7 +182,7 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
     msfp_friction_columns(&group->work, df, NULL);
     for (int j = 0; j < NB; ++j)
         for (int d = 0; d < MSFP_SHEAR_SIZE; ++d)
-            add_rates(w->dfriction[j][d], x, df[j][d]);
+            add_rates(w->drates[j][d], x, df[j][d]);
     memcpy(f, dat->f, sizeof dat->f);
     msfp_add_columns(f[0], df[0], stage->beta, 2 * NB);
     if (msfp_any_column(dat->beta))
@@ -193,8 +196,8 @@ MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const do
     msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
 }
 
-/* The state at the stage that is solved; its works are those of group->next. */
-MSFP_INLINE void state_of_stage(const msfp_group *group, msfp_columns df[NB][2], msfp_columns f[NB][2],
+/* The state at stage i, which is solved; its works are those of group->next. */
+MSFP_INLINE void state_of_stage(const msfp_group *group, const stage_columns *s, int i, msfp_columns f[NB][2],
                                 msfp_state_columns *to)
 {
     const msfp_point_columns *dat = &group->point;
@@ -202,7 +205,11 @@ MSFP_INLINE void state_of_stage(const msfp_group *group, msfp_columns df[NB][2],
     memcpy(to->v, dat->v, sizeof to->v);
     memcpy(to->a, dat->a, sizeof to->a);
     memcpy(to->f, f, sizeof to->f);
-    memcpy(to->df, df, sizeof to->df);
+    memcpy(to->df, s->df[i], sizeof to->df);
+#if MSFP_HEAT
+    memcpy(to->heat, s->heat.heat, sizeof to->heat);
+    memcpy(to->flux, s->heat.flux, sizeof to->flux);
+#endif
     memcpy(to->foot, group->work.foot, sizeof to->foot);
     if (to != &group->next)
         memcpy(to->work, group->next.work, sizeof to->work);
@@ -221,6 +228,9 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
     int node = 0;
     if (MSFP_SHEAR_SIZE < 2)
         memset(s.df, 0, sizeof s.df);
+#if MSFP_HEAT
+    msfp_heat_columns_begin(run, group, &s.heat);
+#endif
     memcpy(s.v[0], now->v, sizeof s.v[0]);
     memcpy(s.a[0], now->a, sizeof s.a[0]);
     memcpy(s.df[0], now->df, sizeof s.df[0]);
@@ -233,17 +243,27 @@ static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
         for (int c = 0; c < C; ++c)
             dt[c] = now->t[c] + method->c[i] * group->h[c];
         msfp_inputs_columns(run, group, run->now.t + method->c[i] * h, dt, dat);
+#if MSFP_HEAT
+        msfp_heat_columns_prepare(run, group, method->a[i], i, h, &s.heat, dat);
+#endif
         solve_stage(run, group, i, Q, V);
         stage_results(run, group, i, (const double(*)[2])s.rates[i], s.df[i], f);
+#if MSFP_HEAT
+        for (int j = 0; j < NB; ++j) {
+            memcpy(s.heat.flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof s.heat.flux[j]);
+            add_rates(trail->work[i].drates[j][MSFP_SHEAR_SIZE], group->work.residual[0], s.heat.flux[j]);
+        }
+        msfp_heat_columns_stage(run, group, i, &s.heat);
+#endif
         memcpy(s.v[i], dat->v, sizeof s.v[i]);
         memcpy(s.a[i], dat->a, sizeof s.a[i]);
         memcpy(s.foot[i], group->work.foot + MSFP_FOOT_Y1 * C, sizeof s.foot[i]);
         if (run->gradients->energies)
             msfp_stage_works(run, group, i);
         if (node < run->node_count && i == method->nodes[node])
-            state_of_stage(group, s.df[i], f, &group->node[node++]);
+            state_of_stage(group, &s, i, f, &group->node[node++]);
     }
-    state_of_stage(group, s.df[method->stages - 1], f, next);
+    state_of_stage(group, &s, method->stages - 1, f, next);
 }
 
 #if MSFP_CLOSED_FORM
