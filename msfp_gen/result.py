@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise import Characterisation, characterise
 from msfp_gen.analysis.gradient_summary import summarise_gradients
-from msfp_gen.analysis.summary import rows_of_bearing, summarise
+from msfp_gen.analysis.summary import axial_load, rows_of_bearing, summarise
 from msfp_gen.analysis.tables import summary_tables
 from msfp_gen.analysis.verdict import Judged
 from msfp_gen.common.tables import Table
@@ -41,7 +41,9 @@ class Result(AnyResult, RunData):
 
     def judged(self) -> list[Judged]:
         """The bearing itself."""
-        return [Judged(0, "", self.scene.bearing, self.history, self.extremes, self.notes, self.events)]
+        return [
+            Judged(0, "", self.scene.bearing, axial_load(self), self.history, self.extremes, self.notes, self.events)
+        ]
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msfp_gen.results.note import Note
     from msfp_gen.scene.bearing import Bearing
 
-RIM_SHARE = 1 / 3  # rim force over the normal force of its surface, up to which the spring of a rim was compared
+RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 START_TEMPERATURE = 20.0  # of a surface without thermal parameters [degC]
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
@@ -29,12 +29,14 @@ SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of tex
 class Judged(NamedTuple):
     """A bearing alone, or one of a building: number from 1 and label; 0 and "" for a bearing alone.
 
-    history: its rows by the names of `History`. notes: of its monitors. events: none of a bearing of a building.
+    load: axial load at rest [N]; None where it varies. history: its rows by the names of `History`. notes: of its
+    monitors. events: none of a bearing of a building.
     """
 
     number: int
     label: str
     bearing: Bearing
+    load: float | None
     history: Any
     extremes: Extremes
     notes: Sequence[Note]
@@ -217,7 +219,8 @@ def _rim_force(one: Judged, limits: Limits) -> Iterator[Value]:
     rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
     if not any(note.kind == "rims" and not note.action for note in one.notes):
         reached = np.maximum(reached, bearing["rim_stiffness"] * np.maximum(0.0, -one.extremes.gap))
-    allowed = limits.rim_force or RIM_SHARE * np.median(one.history.normal_force, axis=0)
+    load = float(one.extremes.most_normal.max()) if one.load is None else one.load
+    allowed = limits.rim_force or RIM_SHARE * load
     return _by_surface(one, rows, reached, allowed)
 
 

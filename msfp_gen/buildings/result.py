@@ -441,7 +441,11 @@ class BearingResult(AnyResult, HorizontalMotion):
 
     def judged(self) -> list[Judged]:
         """The bearing itself, with its number and its label."""
-        return [Judged(self.index + 1, self.label, self.bearing, self, self.extremes, self.notes, self.events)]
+        return [
+            Judged(
+                self.index + 1, self.label, self.bearing, self.axial_load, self, self.extremes, self.notes, self.events
+            )
+        ]
 
     @property
     def curve(self) -> Curve:

@@ -14,11 +14,11 @@ _FORCE, _LENGTH, _TIME = Quantity("N", above=0.0), Quantity("m", above=0.0), Qua
 class Limits:
     """Limits of the device, of each bearing of a building. No number of a run depends on them, only its verdict.
 
-    rim_force: of a rim [N]; None: a third of the normal force of its surface, the median over time. rim_compression:
-    of a rim [m]; None: none. uplift_height: clearance between the faces of a surface [m]; None: the height at which
-    its rim acts, the rim_offset of its slider. uplift_duration: longest time for which a surface is open [s].
-    temperature: at the centre of a surface [degC]. axial_load: largest vertical force on what is carried [N]; None:
-    none. displacement: largest horizontal one across the bearing [m]; None: none. Raises InputError.
+    rim_force: of a rim [N]; None: a third of the axial load at rest, of the largest normal force where the load varies.
+    rim_compression: of a rim [m]; None: none. uplift_height: clearance between the faces of a surface [m]; None: the
+    height at which its rim acts, the rim_offset of its slider. uplift_duration: longest time for which a surface is
+    open [s]. temperature: at the centre of a surface [degC]. axial_load: largest vertical force on what is carried [N];
+    None: none. displacement: largest horizontal one across the bearing [m]; None: none. Raises InputError.
     """
 
     rim_force: Annotated[float | None, _FORCE] = None
