@@ -280,6 +280,10 @@ class TwoPort:
         raise RunError(f"two-port: {reason}", status=name)
 
 
+BEARING_STIFFNESS = 600.0  # vertical, of steel and liner, per newton of load [1/m] (docs/model.md)
+USUAL_RATIO = 0.1  # of critical damping
+
+
 def check_parts(scene: Scene) -> None:
     """Raise InputError where a scene has parts that a two-port has not."""
     for name in ("load", "top_rotation", "initial_state", "stop"):
@@ -293,6 +297,15 @@ def parts_of_rig(scene: Scene) -> tuple[NodeTop, float, Effects]:
     top = scene.top
     if not isinstance(top, RigTop):
         raise InputError(f"top.kind = {top.kind!r}: the interface of a two-port is that of a rig; give kind = 'rig'")
+    if not top.vertical_stiffness:
+        stiffness = BEARING_STIFFNESS * top.axial_load
+        damping = 2 * USUAL_RATIO * np.sqrt(stiffness * top.axial_load / scene.bearing.gravity)
+        usual = f": vertical_stiffness = {stiffness:.2g}, vertical_damping = {damping:.2g}" if stiffness > 0 else ""
+        raise InputError(
+            "top.vertical_stiffness = 0: both ends of a two-port move vertically, and this rig leaves its height free; "
+            "give the [top] of a scene file the spring of steel and liner, about 600 N/m per newton of load, with a "
+            f"tenth of the critical damping{usual}"
+        )
     interface = NodeTop(**{field.name: getattr(top, field.name) for field in fields(NodeTop)})
     effects = scene.effects
     if isinstance(effects, Auto):

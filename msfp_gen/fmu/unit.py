@@ -89,7 +89,8 @@ def write_fmu(
 
 
 def scene_of_unit(scene: Scene) -> Scene:
-    """The scene with the effects of the unit, at rest; raises InputError."""
+    """The scene with the effects of the unit, at rest, without what ends its run; raises InputError."""
+    scene = replace(scene, stop=None)
     if not isinstance(scene.top, MassTop):
         return scene_at_rest(scene.bearing, *parts_of_rig(scene), scene.solver)
     check_parts(scene)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,9 @@ import pytest
 from support import Array
 from support.ends import BEARING, INTERFACE, LOAD, STILL, advance, port, swing
 
-from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, TwoPort
+from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, TwoPort, load_scene
+from msfp_gen.fmu.unit import scene_of_unit
+from msfp_gen.scene.scene_fields import Stop
 
 STEP = 0.01  # [s]
 
@@ -224,6 +228,18 @@ def test_a_node_needs_stiffness_and_is_no_top_of_a_scene():
         Top.node(1e6, 0.0, 1e6)
     with pytest.raises(InputError, match=r"top = Top\.node\(\.\.\.\): another program moves it"):
         Scene(BEARING, Motion.ramp(0.1, 1.0), INTERFACE)
+
+
+def test_a_rig_preset_becomes_a_unit_with_the_values_that_its_message_gives():
+    rig = load_scene("fenz-test2")
+    with pytest.raises(InputError, match="this rig leaves its height free") as caught:
+        scene_of_unit(rig)
+    found = re.search(r"vertical_stiffness = (\S+), vertical_damping = (\S+)$", str(caught.value))
+    assert found is not None and float(found[1]) == pytest.approx(600 * 112e3, rel=0.05)
+    stiffness, damping = float(found[1]), float(found[2])
+    top = replace(rig.top, vertical_stiffness=stiffness, vertical_damping=damping)
+    unit = scene_of_unit(replace(rig, top=top, stop=Stop(displacement=0.1)))
+    assert unit.top.vertical_stiffness == stiffness and unit.stop is None and unit.modelled.top_rotation
 
 
 @pytest.mark.slow
