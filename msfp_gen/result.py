@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
 from msfp_gen.analysis.characterise import Characterisation, characterise
-from msfp_gen.analysis.gradient_summary import summarise_gradients
-from msfp_gen.analysis.summary import axial_load, rows_of_bearing, summarise
+from msfp_gen.analysis.summary import axial_load, rows_of_bearing, summarise, summarise_gradients
 from msfp_gen.analysis.tables import summary_tables
 from msfp_gen.analysis.verdict import Judged
 from msfp_gen.common.tables import Table
