@@ -111,10 +111,12 @@ def run(
     except KeyboardInterrupt:
         note(f"what is done is kept in {output}; the same command continues")
         raise
-    _report(done, output, as_json)
+    judged = any(column.name == "limits_exceeded" for column in definition.keep.columns())
+    _report(done, output, as_json, judged)
 
 
-def _report(done: Outcome, output: Path, as_json: bool) -> None:
+def _report(done: Outcome, output: Path, as_json: bool, judged: bool) -> None:
+    """Print how far the study is; `judged`: and how many of its runs exceeded limits of the device."""
     if as_json:
         say(json.dumps(done._asdict(), indent=2))
         return
@@ -122,6 +124,12 @@ def _report(done: Outcome, output: Path, as_json: bool) -> None:
     say(f"{done.before + done.done} of {done.runs} runs are in {output}{before}; {done.failed} failed")
     if done.failed:
         note("runs that failed are rows with their status and message")
+    if judged and done.before + done.done:
+        from msfp_gen.studies import read_study
+
+        limits = read_study(output, ["limits_exceeded"])["limits_exceeded"].fillna("")
+        if exceeded := int((limits != "").sum()):
+            note(f"{exceeded} of the runs exceeded limits of the device: see the column limits_exceeded")
 
 
 @group.command(epilog="Examples:\n\n\b\n  msfp-gen study status out\n  msfp-gen study status out --json")

@@ -87,7 +87,7 @@ def openings(time: Array, lift: Array, events: Iterable[Event]) -> list[tuple[fl
     """
     changes = [event for event in events if event.kind in ("lift_off", "landing")]
     if not changes:
-        return intervals(time, lift > 0)
+        return intervals(time, lift > 0) if lift.any() else []
     spells, start = [], float(time[0]) if lift[0] > 0 else None
     for event in changes:
         if event.kind == "lift_off":
