@@ -12,6 +12,7 @@ import numpy as np
 
 from msfp_gen.common.tables import Table
 from msfp_gen.results.sliding import open_times
+from msfp_gen.scene.friction_parameters import start_temperatures
 from msfp_gen.scene.limits import Limits
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from msfp_gen.scene.bearing import Bearing
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
-START_TEMPERATURE = 20.0  # of a surface without thermal parameters [degC]
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
 
 
@@ -259,21 +259,23 @@ def _temperature(one: Judged, limits: Limits) -> Iterator[Value]:
         yield from _by_surface(one, rows, reached, limits.temperature)
     for note in one.notes:
         if note.kind == "heat" and not note.action:
-            start = getattr(one.bearing.surfaces[note.surface - 1], "start_temperature", None)
-            start = START_TEMPERATURE if start is None else start
+            start = float(start_temperatures(one.bearing)[note.surface - 1])
             yield Value(note.surface, note.time, start + note.value, limits.temperature)
 
 
+def _of_bearing(one: Judged, rows: Array, reached: float, allowed: float | None) -> Iterator[Value]:
+    """The value of a whole bearing, where a limit is given. rows: shape (T,), of which the largest has the time."""
+    if allowed is not None:
+        yield Value(0, float(one.history.time[rows.argmax()]), reached, allowed)
+
+
 def _axial_load(one: Judged, limits: Limits) -> Iterator[Value]:
-    if limits.axial_load is not None:
-        row = int(np.abs(one.history.top_force[:, 2]).argmax())
-        yield Value(0, float(one.history.time[row]), float(one.extremes.top_force[2]), limits.axial_load)
+    rows = np.abs(one.history.top_force[:, 2])
+    return _of_bearing(one, rows, float(one.extremes.top_force[2]), limits.axial_load)
 
 
 def _displacement(one: Judged, limits: Limits) -> Iterator[Value]:
-    if limits.displacement is not None:
-        row = int(one.history.horizontal.argmax())
-        yield Value(0, float(one.history.time[row]), float(one.extremes.displacement[3]), limits.displacement)
+    return _of_bearing(one, one.history.horizontal, float(one.extremes.displacement[3]), limits.displacement)
 
 
 def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:

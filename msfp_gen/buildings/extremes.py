@@ -10,7 +10,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array, parts
 from msfp_gen.results.extremes import largest
-from msfp_gen.specification.friction_laws import HEAT
+from msfp_gen.scene.friction_parameters import start_temperatures
 
 if TYPE_CHECKING:
     from msfp_gen.buildings.scene import BuildingScene
@@ -233,10 +233,7 @@ def temperature_of(bearing: Bearing, recorded: Array) -> Array:
 
     recorded: 0 where the model has none; the surface is then as at the start.
     """
-    start = [
-        HEAT["start_temperature"] if x.start_temperature is None else x.start_temperature for x in bearing.surfaces
-    ]
-    return np.where(recorded == 0.0, np.array(start, dtype=float), recorded)
+    return np.where(recorded == 0.0, start_temperatures(bearing), recorded)
 
 
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:

@@ -254,6 +254,12 @@ def published_softening(rise: float) -> float:
     return float(1.0 - warm / cold)
 
 
+def start_temperatures(bearing: Bearing) -> NDArray[np.float64]:
+    """Temperatures of the surfaces at the start, with the default of `HEAT`, shape (n-1,) [degC]."""
+    default = HEAT["start_temperature"]
+    return np.array([default if x.start_temperature is None else x.start_temperature for x in bearing.surfaces], float)
+
+
 def heated_contacts(bearing: Bearing) -> list[tuple[float, float]]:
     """sqrt(D/pi)/k over the contact area of every surface, with the defaults of `HEAT` [K s^1/2/J]; and the sliding
     displacement up to which the contact covers the centre of the surface [m].
