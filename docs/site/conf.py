@@ -20,12 +20,15 @@ author = "The msfp-gen developers"
 copyright = author
 version = release = __version__
 
-sys.path.insert(0, str(Path(__file__).parent))  # figure_scraper
+sys.path.insert(0, str(Path(__file__).parent))  # figure_scraper, excerpts
+import excerpts  # noqa: E402
+
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 if os.environ.get("MSFP_GEN_SITE_GALLERY") == "1":  # the gallery runs every example
     extensions.append("sphinx_gallery.gen_gallery")
 root_doc = "index"
 exclude_patterns = [
+    "search_texts.js.in",
     "**/GALLERY_HEADER.rst",
     "gallery_scripts/**",
     "**/sg_execution_times.rst",
@@ -41,7 +44,7 @@ html_theme_options: dict[str, Any] = {
     "show_prev_next": False,
     # Pages of one wide table use the whole width.
     "secondary_sidebar_items": {"**": ["page-toc"], "docs/validation": [], "docs/comparison": []},
-    "header_links_before_dropdown": 12,
+    "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],
     "icon_links": [],
@@ -89,8 +92,10 @@ def _block(writer: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Formulas become MathML, which browsers draw without a script."""
+    """Formulas become MathML, which browsers draw without a script; the search shows excerpts without a server."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.connect("html-page-context", excerpts.only_on_search)
+    app.connect("build-finished", excerpts.write)
 
 
 html_math_renderer = "mathml"

@@ -71,9 +71,10 @@ def collect(source: Path, *, gallery: bool) -> None:
     if gallery:
         write_gallery(source / "gallery_scripts")
         return
-    page = source / "tutorials.md"
-    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if "gallery/index" not in line]
-    page.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for name in ("tutorials.md", "buildings.md"):
+        page = source / name
+        lines = [line for line in page.read_text(encoding="utf-8").splitlines() if "gallery/" not in line]
+        page.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def command_page() -> str:
@@ -103,8 +104,9 @@ def write_gallery(folder: Path) -> None:
         f"{title}\n{'=' * len(title)}\n\nThe scenes and notebooks in `examples/`, run.\n"
     )
     (folder / "examples").mkdir()  # sphinx-gallery runs a script where it lies
-    for path in sorted((ROOT / "examples").glob("*.toml")):
-        shutil.copy(path, folder / "examples")
+    for path in (*sorted((ROOT / "examples").glob("*.toml")), ROOT / "examples" / "building" / "building.toml"):
+        (folder / path.relative_to(ROOT)).parent.mkdir(exist_ok=True)
+        shutil.copy(path, folder / path.relative_to(ROOT))
         (folder / f"plot_{path.stem}.py").write_text(scene_script(path), encoding="utf-8")
     for path in sorted((ROOT / "examples").glob("*.ipynb")):
         (folder / f"plot_{path.stem}.py").write_text(notebook_script(path), encoding="utf-8")
@@ -113,14 +115,19 @@ def write_gallery(folder: Path) -> None:
 def scene_script(path: Path) -> str:
     """A script that runs a scene file; its text is the comment at the head of the file."""
     text = path.read_text(encoding="utf-8")
-    tomllib.loads(text)
+    building = "building" in tomllib.loads(text)
     about = [line.lstrip("# ").rstrip() for line in text.partition("\n\n")[0].splitlines()]
     command = next(line for line in about if line.startswith("msfp-gen "))
     words = " ".join(line for line in about if line != command)
     title = f"{about[0].partition(':')[0].removesuffix('.')} ({path.name})"
-    return f'''"""
+    return (BUILDING_SCRIPT if building else BEARING_SCRIPT).format(
+        title=title, line="=" * len(title), words=words, command=command, name=path.relative_to(ROOT / "examples")
+    )
+
+
+HEAD = '''"""
 {title}
-{"=" * len(title)}
+{line}
 
 {words}
 
@@ -132,9 +139,12 @@ The same from Python:
 """
 
 from msfp_gen import load_scene, simulate
-from msfp_gen.figures import plot_result, plot_section
+'''
+BEARING_SCRIPT = (
+    HEAD
+    + """from msfp_gen.figures import plot_result, plot_section
 
-result = simulate(load_scene("examples/{path.name}"))
+result = simulate(load_scene("examples/{name}"))
 figure = plot_result(result)
 
 # %%
@@ -149,7 +159,29 @@ summary = result.summary
 print("peak displacement [mm]", round(1e3 * summary["peak_displacement"]["radial"], 1))
 print("peak force over load", round(summary["peak_force_ratio"], 4))
 print("rims met", summary["rims_met"])
-'''
+"""
+)
+BUILDING_SCRIPT = (
+    HEAD
+    + """from msfp_gen.figures import plot_axial_forces, plot_building
+
+result = simulate(load_scene("examples/{name}"))
+figure = plot_building(result)
+
+# %%
+# The axial force of every bearing:
+
+figure = plot_axial_forces(result)
+
+# %%
+# What it reached:
+
+summary = result.summary
+print("peak displacement [mm]", round(1e3 * summary["peak_displacement"]["radial"], 1))
+print("base shear over weight", round(summary["peak_force_ratio"], 3))
+print("drift at corners [%]", round(100 * summary["peak_corner_drift_ratio"], 3))
+"""
+)
 
 
 def notebook_script(path: Path) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support import ROOT, thinned
 
-from msfp_gen import load_scene, presets, simulate
+from msfp_gen import BuildingScene, load_scene, presets, simulate
 
 EXAMPLES = ROOT / "examples"
 BEARINGS = {
@@ -46,3 +48,12 @@ def test_example_runs_as_its_name_says(name):
 def test_command_in_the_header_is_right(name):
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
     assert f"#     msfp-gen run examples/{name}.toml --plot {name}.png\n" in text
+
+
+def test_the_example_of_a_building_stays_within_the_limits_of_its_bearings() -> None:
+    path = EXAMPLES / "building" / "building.toml"
+    scene = load_scene(path)
+    assert isinstance(scene, BuildingScene)
+    result = simulate(replace(scene, duration=12.0))
+    assert result.succeeded and not result.notes and not result.verdict.exceeded
+    assert f"#     msfp-gen run {path.relative_to(ROOT)} --plot building.png\n" in path.read_text(encoding="utf-8")

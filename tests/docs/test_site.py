@@ -21,10 +21,12 @@ needs_sphinx = pytest.mark.skipif(bool(MISSING), reason=f"the extra 'docs' is no
 def tree() -> list[str]:
     """Documents that the section pages list, as they are named there."""
     found = []
-    for page in sorted(SITE.glob("*.md")):
+    for page in sorted(SITE.rglob("*.md")):
         for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             lines = [line.strip() for line in block.splitlines() if line.strip() and not line.startswith(":")]
-            found += [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
+            folder = page.parent.relative_to(SITE).as_posix()
+            names = [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
+            found += names if folder == "." else [f"{folder}/{name}" for name in names]
     return found
 
 
@@ -38,7 +40,7 @@ def test_every_page_stands_in_one_section() -> None:
 def test_the_python_interface_is_complete() -> None:
     import msfp_gen
 
-    page = (SITE / "api.md").read_text(encoding="utf-8")
+    page = "".join(path.read_text(encoding="utf-8") for path in sorted((SITE / "api").glob("*.md")))
     named = set(re.findall(r"auto(?:class|function|exception):: (\w+)$", page, re.MULTILINE))
     assert named == set(msfp_gen.__all__) - {"__version__", "presets"}
     assert "msfp_gen.scene.file.presets" in page
@@ -72,8 +74,13 @@ def check_site(folder: Path) -> None:
                 assert (path.parent / re.sub(r"[?#].*", "", address)).exists(), f"{path.name}: {address}"
     for style in folder.rglob("*.css"):
         assert not re.search(r"(@import|url\()\s*['\"]?(https?:)?//", style.read_text(encoding="utf-8")), style.name
-    api = (folder / "api.html").read_text(encoding="utf-8")
-    assert all(f'id="msfp_gen.{name}"' in api for name in ("simulate", "load_scene", "Bearing", "Scene", "RunError"))
+    for page, names in {"running": ("simulate", "load_scene"), "scenes": ("Bearing",), "errors": ("RunError",)}.items():
+        api = (folder / "api" / f"{page}.html").read_text(encoding="utf-8")
+        assert all(f'id="msfp_gen.{name}"' in api for name in names)
+    texts = (folder / "_static" / "search_texts.js").read_text(encoding="utf-8")
+    assert "Friction pendulum bearings isolate buildings from earthquakes" in texts and '"docs/buildings"' in texts
+    users = [path.name for path in pages if "search_texts.js" in path.read_text(encoding="utf-8")]
+    assert users == ["search.html"], "only the search loads the texts of all pages"
     assert "msfp-gen explain" in (folder / "cli.html").read_text(encoding="utf-8")
     model = (folder / "docs" / "model.html").read_text(encoding="utf-8")
     assert "<math" in model and "$" not in re.sub(
@@ -101,7 +108,7 @@ def test_gallery_runs_every_example(tmp_path: Path) -> None:
     check_site(tmp_path / "site")
     examples = {path.stem for path in (ROOT / "examples").iterdir() if path.suffix in (".toml", ".ipynb")}
     shown = {path.stem.removeprefix("plot_") for path in (tmp_path / "site" / "gallery").glob("plot_*.html")}
-    assert examples == shown
+    assert examples | {"building"} == shown
     for path in (tmp_path / "site" / "gallery").glob("plot_*.html"):
         page = path.read_text(encoding="utf-8")
         assert f"_images/sphx_glr_{path.stem}_001.png" in page, f"{path.name} has no figure"
