@@ -24,8 +24,8 @@ static const double *take(const double **at, int count)
     return found;
 }
 
-/* Run to the end. Returns the status, an index into the names of the page. */
-EXPORTED(explore) int explore(const double *input)
+/* Begin a run; `advance` then takes its steps. */
+EXPORTED(begin) void begin(const double *input)
 {
     const double *at = input;
     const double *number = take(&at, 12);
@@ -67,8 +67,17 @@ EXPORTED(explore) int explore(const double *input)
     msfp_run_free(&run);
     memset(&run, 0, sizeof run);
     msfp_run_start(&run, &parameters, &motion, &load, jump, jumps, &options, q, v, f);
-    while (msfp_run_advance(&run, 100000))
-        ;
+}
+
+/* Take so many steps at most. Returns whether the run goes on. */
+EXPORTED(advance) int advance(int steps)
+{
+    return msfp_run_advance(&run, steps);
+}
+
+/* The status, an index into the names of the page. */
+EXPORTED(status) int status(void)
+{
     return run.status;
 }
 

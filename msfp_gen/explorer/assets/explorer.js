@@ -14,16 +14,30 @@ function nominalSettings(problem) {
   return { friction: nominalOf(problem, "friction"), radius: nominalOf(problem, "radius"), load: 1, amplitude: 1, rate: 1, angle: 0 };
 }
 
-// One slider; `read` and `write` get and set the value in the settings, `text` shows it.
-function addSlider(parent, { name, low, high, value, text, write }) {
-  const label = element(parent, "label", { class: "control" });
-  element(label, "span", {}, name);
-  const input = element(label, "input", { type: "range", min: low, max: high, step: "any", value, "data-name": name });
-  const shown = element(label, "output", {}, text(value));
+// One slider with its number, which may be typed; `write` sets the value in the settings. The number is `factor` times the
+// value, in `unit`, with so many `digits`; a number beyond the slider becomes its nearest end.
+function addSlider(parent, { name, low, high, value, factor = 1, unit, digits, write }) {
+  const row = element(parent, "div", { class: "control" });
+  const id = `slider-${parent.children.length}`;
+  element(row, "label", { for: id }, name);
+  const input = element(row, "input", { id, type: "range", min: low, max: high, step: "any", value, "data-name": name });
+  const number = element(row, "input", { type: "number", step: "any", "aria-label": `${name} [${unit}]`, "data-number": name });
+  element(row, "span", {}, unit);
   input.value = value;
+  const set = (v) => {
+    write(v);
+    number.value = (v * factor).toFixed(digits);
+  };
+  set(value);
   input.addEventListener("input", () => {
-    write(Number(input.value));
-    shown.textContent = text(Number(input.value));
+    set(Number(input.value));
+    request();
+  });
+  number.addEventListener("change", () => {
+    const typed = number.value === "" ? Number(input.value) : Number(number.value) / factor;
+    const v = Math.min(high, Math.max(low, typed));
+    input.value = v;
+    set(v);
     request();
   });
 }
@@ -36,28 +50,28 @@ function addControls() {
   const ranged = (value, [low, high]) => ({ low: low * value, high: high * value, value });
   settings.friction.forEach((value, k) => addSlider(panel, {
     name: `friction of surface ${k + 1}`, ...ranged(value || 0.05, RANGE.friction), value,
-    text: (v) => `${fixed(100 * v, 2)} %`, write: (v) => { settings.friction[k] = v; },
+    factor: 100, unit: "%", digits: 2, write: (v) => { settings.friction[k] = v; },
   }));
   settings.radius.forEach((value, k) => addSlider(panel, {
     name: `radius of surface ${k + 1}`, ...ranged(value, RANGE.radius),
-    text: (v) => `${fixed(1000 * v, 0)} mm`, write: (v) => { settings.radius[k] = v; },
+    factor: 1000, unit: "mm", digits: 0, write: (v) => { settings.radius[k] = v; },
   }));
   if (problem.axialLoad !== null) addSlider(panel, {
-    name: "axial load", ...ranged(1, RANGE.load), text: (v) => `${fixed((v * problem.axialLoad) / 1000, 0)} kN`,
+    name: "axial load", ...ranged(1, RANGE.load), factor: problem.axialLoad / 1000, unit: "kN", digits: 0,
     write: (v) => { settings.load = v; },
   });
   addSlider(panel, {
     name: problem.record ? "scale of the record" : "amplitude", ...ranged(1, RANGE.amplitude),
-    text: (v) => (problem.record ? `${fixed(v, 2)} ×` : `${fixed(1000 * v * problem.amplitude, 1)} mm`),
+    ...(problem.record ? { unit: "×", digits: 2 } : { factor: 1000 * problem.amplitude, unit: "mm", digits: 1 }),
     write: (v) => { settings.amplitude = v; },
   });
   if (!problem.record) addSlider(panel, {
     name: problem.period ? "frequency" : "speed", ...ranged(1, RANGE.rate),
-    text: (v) => (problem.period ? `${fixed(v / problem.period, 4)} Hz` : `${fixed(v, 2)} ×`),
+    ...(problem.period ? { factor: 1 / problem.period, unit: "Hz", digits: 4 } : { unit: "×", digits: 2 }),
     write: (v) => { settings.rate = v; },
   });
   if (!problem.planar) addSlider(panel, {
-    name: "direction", low: -90, high: 90, value: 0, text: (v) => `${fixed(v, 0)}°`,
+    name: "direction", low: -90, high: 90, value: 0, unit: "°", digits: 0,
     write: (v) => { settings.angle = (v * Math.PI) / 180; },
   });
 }
@@ -78,7 +92,13 @@ function answered({ data }) {
     choose(0);
     return;
   }
+  if (data.progress !== undefined) {
+    find("progress").hidden = false;
+    find("progress").value = data.progress;
+    return;
+  }
   state.busy = false;
+  find("progress").hidden = true;
   if (data.index === state.index) {
     if (data.failure) fail(data.failure);
     else show(data);
@@ -160,7 +180,8 @@ function show({ found, settings, request: begun, cost }) {
     const rim = numbers.gap[k] <= 0 ? ", rim met" : "";
     return [`surface ${k + 1}`, `${fixed(1000 * slid, 2)} mm, ${fixed((100 * slid) / capacity, 0)} % of capacity${rim}`];
   }));
-  table(find("regimes"), regimes(problem, numbers).slice(0, 12).map(({ set, from }) => [`from ${fixed(1000 * from, 1)} mm`, set]));
+  find("regime-table").hidden = !numbers.straight;
+  if (numbers.straight) table(find("regimes"), regimes(problem, numbers).slice(0, 12).map(({ set, from }) => [`from ${fixed(1000 * from, 1)} mm`, set]));
   state.last = { problem, found, settings, numbers, markers };
   find("row").max = numbers.at.count - 1;
   find("row").value = state.row ?? numbers.peak;

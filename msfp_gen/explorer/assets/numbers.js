@@ -7,6 +7,7 @@ const CLOSURE = 0.05;
 const NEAR_PEAK = 0.999;
 const MOBILISED = 0.9;
 const INSTANT_SHARE = 0.1;
+const TRANSVERSE = 0.02;
 
 // Reads the fields of rows by name: read("normal", row) is an array of as many numbers as the field has.
 function reader(problem, { rows, start }) {
@@ -96,6 +97,7 @@ function numbersOf(problem, found, angle) {
   };
   return {
     at, u, path, force, peak,
+    straight: !problem.record && u.every((v) => Math.abs(v[1] * axis[0] - v[0] * axis[1]) <= TRANSVERSE * most),
     peakDisplacement: extreme("displacement"),
     peakForce: extreme("top_force"),
     sliding: extreme("sliding"),

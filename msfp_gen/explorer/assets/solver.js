@@ -85,13 +85,18 @@ function inputOf(problem, settings) {
   return input;
 }
 
-// One run. rows: [row][field], as `problem.row` names the fields; extremes: over all steps; start: of r_01 - r_nn [m].
-function solve({ exports }, problem, settings) {
+const STEPS = 500; // between two reports of progress
+
+// One run; `progress` is called with the share of its time that is done. rows: [row][field], as `problem.row` names the fields; extremes: over all steps; start: of r_01 - r_nn [m].
+function solve({ exports }, problem, settings, progress) {
   const input = inputOf(problem, settings);
   const place = exports.reserve(input.length);
   if (place === 0) throw new Error("no memory for the motion");
   new Float64Array(exports.memory.buffer, place, input.length).set(input);
-  const status = problem.statuses[exports.explore(place)];
+  const duration = problem.numbers[NUMBERS.duration] / settings.rate;
+  exports.begin(place);
+  while (exports.advance(STEPS)) progress(exports.reached() / duration);
+  const status = problem.statuses[exports.status()];
   const copy = (at, length) => new Float64Array(exports.memory.buffer, at, length).slice();
   const width = problem.row[""][0];
   return {

@@ -14,8 +14,14 @@ onmessage = ({ data }) => {
   }
   const { request, index, settings } = data;
   const begin = performance.now();
+  let told = begin;
+  const progress = (share) => {
+    if (performance.now() - told < 100) return;
+    told = performance.now();
+    postMessage({ progress: share });
+  };
   try {
-    const found = solve(instances[problems[index].module], problems[index], settings);
+    const found = solve(instances[problems[index].module], problems[index], settings, progress);
     const cost = performance.now() - begin;
     postMessage({ request, index, settings, found, cost }, [found.rows.buffer, found.extremes.buffer]);
   } catch (error) {

@@ -200,7 +200,7 @@ def test_rows_are_those_of_python_wherever_the_sliders_stand(browser, name):
     """Bit by bit, at random places of all sliders together."""
     choose(browser, name)
     sliders = browser.execute_script(
-        "const inputs = [...find('controls').querySelectorAll('input')];"
+        "const inputs = [...find('controls').querySelectorAll('input[type=range]')];"
         "return inputs.map((input) => [input.dataset.name, Number(input.min), Number(input.max)])"
     )
     assert len(sliders) >= 6
@@ -212,6 +212,59 @@ def test_rows_are_those_of_python_wherever_the_sliders_stand(browser, name):
         check_rows(browser, name)
         seen.add(browser.execute_script("return state.last.found.status"))
     assert "ok" in seen or "stopped" in seen
+
+
+def test_a_number_may_be_typed_beside_its_slider(browser):
+    """In the unit of the page; beyond the slider it becomes its end."""
+    choose(browser, "becker-circle-88")
+    typed = SLIDE.replace("data-name", "data-number").replace('"input"', '"change"')
+    read = "const of = (key) => document.querySelector(`[data-${key}='direction']`); return [of('name'), of('number')]"
+    for given, shown in (("-30", -30.0), ("400", 90.0), ("", 90.0)):
+        act(browser, typed, "direction", given)
+        slider, number = browser.execute_script(f"{read}.map((input) => Number(input.value))")
+        assert slider == number == shown
+    act(browser, typed, "friction of surface 1", "7.5")
+    assert browser.execute_script("return state.settings.friction[0]") == 0.075
+
+
+@pytest.mark.parametrize("name", EXPLORED)
+def test_sliding_regimes_are_those_of_motions_in_one_direction(browser, name):
+    """A record and an orbit have no sequence of them."""
+    choose(browser, name)
+    hidden = browser.execute_script("return find('regime-table').hidden")
+    assert hidden == name.startswith(("ridgecrest", "becker"))
+    assert hidden or browser.execute_script("return find('regimes').children.length") > 0
+
+
+def test_a_run_reports_its_progress(browser):
+    """The worker tells shares of the time that rise; here after every chunk of steps."""
+    shares = browser.execute_script(
+        "const source = find('worker').textContent;"
+        "const { decoded, solve } = new Function(source.slice(0, source.indexOf('onmessage =')) "
+        "+ 'return { decoded, solve };')();"
+        "const index = arguments[0], problem = problemAt(index), bytes = explorer.modules[problem.module];"
+        "const code = Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0));"
+        "const made = new WebAssembly.Instance(new WebAssembly.Module(code), {});"
+        "made.exports._initialize();"
+        "const shares = [];"
+        "solve(made, decoded(problem), nominalSettings(problem), (share) => shares.push(share));"
+        "return shares",
+        EXPLORED.index("ridgecrest-clc"),
+    )
+    assert len(shares) > 2 and shares == sorted(shares) and shares[0] > 0 and shares[-1] < 1
+
+
+@pytest.mark.parametrize("width", [400, 1900])
+def test_the_page_uses_its_window_and_no_more(browser, width):
+    browser.set_window_size(width, 1000)
+    try:
+        choose(browser, "becker-eight-88")
+        inner, wide = browser.execute_script("return [window.innerWidth, document.documentElement.scrollWidth]")
+        assert wide <= inner
+        used = browser.execute_script("return document.querySelector('main').getBoundingClientRect().width")
+        assert used > 0.85 * inner
+    finally:
+        browser.set_window_size(1400, 1000)
 
 
 def slide(browser, name, **settings):
