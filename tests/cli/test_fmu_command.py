@@ -34,7 +34,7 @@ MASS = 'top = { kind = "mass", mass = 11e3, inertia = 5e3, height = 0.5 }\n'
             "give 'inertial' and no uplift",
         ),
         (MASS + 'solver = { method = "dopri5" }\n', ["-o", "b.fmu"], "give 'implicit' or 'esdirk4'"),
-        (MASS + "stop = { displacement = 0.1 }\n", ["-o", "b.fmu"], "stop: the ends"),
+        (MASS + 'load = { kind = "constant", force = [1e3, 0.0, 0.0] }\n', ["-o", "b.fmu"], "load: the ends"),
     ],
 )
 def test_what_it_refuses(
