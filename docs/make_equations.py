@@ -62,6 +62,8 @@ stack.
 - Friction over a slip is of planar models without masses. In a step of such a model the body above turns by
   $\alpha + \beta\,\Delta\omega'$, $Y^0$ and $Y^1$ are $Y$ at its ends and $\bar{N}$ is the mean normal force. $W_f$ is
   the work [J] that friction stores and $W_d$ the work that it dissipates.
+- $\eta_V$ is 1 without uplift; with it the compliance of the vertical spring and of the unilateral contacts over that
+  of the spring.
 - $x_1, x_2, \dots$ are local intermediate values of a program."""
 
 SCHEDULE = r"""## One evaluation of a stack
@@ -99,7 +101,7 @@ OVER = {
 PLACES = {"j": "γ", "j+1": "γ+1", "base": "1", "top": "n", "slider": "slider"}
 
 TITLES = {
-    "arms": "Distances along the axis, from (3.4)-(3.11)",
+    "body_block": "Distances along the axis, from (3.4)-(3.11)",
     "forward": "Kinematics of a body from the body below: (2.1)-(2.6), (3.4)-(3.12), and rates with (2.36)",
     "gap": "Sliding and gap (3.20), (3.21)",
     "rim": "Rim contact (3.20)-(3.25), applied only while it pushes",

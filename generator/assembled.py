@@ -53,16 +53,12 @@ def evaluate(program: Program, **inputs: Values) -> dict[str, sp.Expr]:
     return {field: expression.xreplace(known) for field, expression in program.results.items()}
 
 
-def dimensions(height: str, centroid: str, lower: sp.Expr, upper: sp.Expr) -> dict[str, sp.Expr]:
-    """Dimensions of a body between two concave-up surfaces of radii `lower` and `upper`."""
-    return {
-        "height": symbol(height),
-        "centroid": symbol(centroid),
-        "sign_lower": sp.Integer(1),
-        "sign_upper": sp.Integer(1),
-        "radius_lower": lower,
-        "radius_upper": upper,
-    }
+def body(k: int, lower: sp.Expr, upper: sp.Expr) -> dict[str, Values]:
+    """Values of body k between two concave-up surfaces of radii `lower` and `upper`, by alias of `body_block`."""
+    values = {"height": symbol(f"ell_{k}"), "centroid": symbol(f"z_{k}"), "mass": symbol(f"m_{k}")}
+    values |= {"inertia_transverse": symbol(f"lambda_{k}"), "inertia_axial": sp.Integer(0)}
+    sides = {"sign_lower": sp.Integer(1), "sign_upper": sp.Integer(1), "radius_lower": lower, "radius_upper": upper}
+    return {"b": values, "s": {**sides, "gravity": symbol("g")}}
 
 
 def coordinates(k: int) -> dict[str, sp.Expr]:
@@ -92,9 +88,7 @@ def assembled() -> dict[str, sp.Expr]:
     spec = ModelSpec(Layout(2, 1, 0), Effects(dimension="planar", rims=False, bouc_wen="report"))
     p = {program.name: program for program in derive(spec).programs}
     R, zero = symbol("R_1"), sp.Integer(0)
-    lower = evaluate(p["arms"], d=dimensions("ell_1", "z_1", zero, R))
-    plate = evaluate(p["arms"], d=dimensions("ell_2", "z_2", R, zero))
-    plate |= {"m": symbol("m_2"), "jt": symbol("lambda_2"), "ja": zero, "g": symbol("g")}
+    lower, plate = evaluate(p["body_block"], **body(1, zero, R)), evaluate(p["body_block"], **body(2, R, zero))
     surface = {"sign": sp.Integer(1), "R": R, "mu": symbol("mu_1"), "dy": symbol("d_1"), "td": zero}
     found: dict[tuple[str, int], dict[str, sp.Expr]] = {
         ("frame", 0): ground_motion(),

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from msfp_gen.specification import contract
+
 from .program import AXIAL, POLAR, Block, BlockBuilder, Maker
 from .top_blocks import top_blocks
 
@@ -16,7 +18,6 @@ from .top_blocks import top_blocks
 class Blocks:
     """All blocks of one model."""
 
-    dimensions: Block
     body_parameters: Block
     surface_parameters: Block
     top_parameters: Block
@@ -53,7 +54,6 @@ class Blocks:
     linear: Block
     angular: Block
     balances: Block
-    arms: Block
     points: Block
     base_motion: Block
     energy: Block
@@ -65,6 +65,8 @@ class Blocks:
     restraint: Block
     top_power: Block
     lock: Block
+    unilateral_energy: Block
+    works: Block
     power: Block
     turn: Block
     rotation_angles: Block
@@ -74,20 +76,8 @@ class Blocks:
 
 
 def _parameters(new: Maker, uplift: bool) -> dict[str, Block]:
-    """Parameters: dimensions, masses, surfaces."""
+    """Parameters of bodies and surfaces."""
     return {
-        "dimensions": new("dimensions")
-        .scalar("height", "m", "l, height of the body")
-        .scalar("centroid", "m", "z, from the bottom (lower surface concave up, 3.6) or from the top (3.10)")
-        .scalar("sign_lower", "-", "+1: the surface below is concave up, -1: down")
-        .scalar("sign_upper", "-", "+1: the surface above is concave up, -1: down")
-        .scalar("radius_lower", "m", "R of the surface below; 0 under the base")
-        .scalar("radius_upper", "m", "R of the surface above; 0 on the top plate")
-        .build(),
-        "arms": new("arms")
-        .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
-        .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
-        .build(),
         "body_parameters": new("body_parameters")
         .scalar("c", "m", "from the sphere centre below to the centre of mass, along t3")
         .scalar("e", "m", "from the sphere centre below to the sphere centre above (top plate: to r_nn), along t3")
@@ -327,9 +317,24 @@ def _powers(new: Maker, uplift: bool) -> dict[str, Block]:
         .scalar("support", "W", "power of a rotating support, and of the spring against spin")
         .scalar("damped", "W", "power dissipated by the dampers")
         .build(),
+        "unilateral_energy": new("unilateral_energy")
+        .scalar("stored", "J", "elastic energy of the unilateral contacts")
+        .scalar("lost", "W", "power dissipated there")
+        .build(),
+        "works": _works(new),
         "lock": new("lock").scalar("moment", "N m", "axial moment that locks the spin").build(),
         "power": new("power").scalar("power", "W", "power").build(),
     }
+
+
+def _works(new: Maker) -> Block:
+    """The integrands of the works (`contract.WORKS`), and two parts of that of the input."""
+    builder = new("works")
+    for word in contract.WORKS:
+        builder.scalar(word.name, "W", f"power: {word.meaning}")
+    builder.scalar("prescribed", "W", "power of all that moves as prescribed")
+    builder.scalar("load", "W", "power of the load, relative to the moving base")
+    return builder.build()
 
 
 def _ends(new: Maker, uplift: bool) -> dict[str, Block]:

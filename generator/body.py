@@ -11,25 +11,11 @@ from typing import Any
 import sympy as sp
 
 from .blocks import Blocks
+from .parameters import ValueBlocks, places
 from .program import Program, Vector
 from .vectors import add, combine, cross, dot, project, scale, subtract
 
 Symbols = dict[str, Any]
-
-
-def arms(b: Blocks) -> Program:
-    """Distances along t3, from the positions (3.4)-(3.11)."""
-    p = Program("arms", "distances along t3 of one body, from (3.4)-(3.11)")
-    d: Symbols = p.read(b.dimensions, "d", active=False)
-    up = (1 + d["sign_lower"]) / 2
-    bottom = -d["sign_lower"] * d["radius_lower"]  # (3.5), (3.9)
-    centroid = up * d["centroid"] + (1 - up) * (d["height"] - d["centroid"])  # (3.6), (3.10)
-    p.write(
-        b.arms,
-        {"c": bottom + centroid, "e": bottom + d["height"] + d["sign_upper"] * d["radius_upper"]},
-        tangents=False,
-    )  # (3.4), (3.8)
-    return p
 
 
 def sines(p: Program, x: Symbols) -> Symbols:
@@ -107,19 +93,16 @@ def forward(b: Blocks) -> Program:
     return p
 
 
-def named_points(b: Blocks) -> Program:
+def named_points(b: Blocks, values: ValueBlocks) -> Program:
     """All named points of one body (3.4)-(3.11) with velocity and acceleration."""
     p = Program("named_points", "named points of body k: (3.4)-(3.11) with velocity and acceleration")
-    d: Symbols = p.read(b.dimensions, "d", active=False)
+    v: Symbols = p.read(values.body_values, "l", active=False)
+    s: Symbols = p.read(values.sides, "s", active=False)
     up: Symbols = p.read(b.body, "u", active=False)
     x: Symbols = p.read(b.coordinates, "x", active=False)
     t3 = turn(p, up, x)["t3"]
     centre = centre_below(p, up, x)
-    concave_up = (1 + d["sign_lower"]) / 2
-    bottom = p.let(-d["sign_lower"] * d["radius_lower"])
-    centroid = p.let(bottom + concave_up * d["centroid"] + (1 - concave_up) * (d["height"] - d["centroid"]))
-    top = p.let(bottom + d["height"])
-    distances = {"lo": bottom, "cm": centroid, "up": top, "sc": p.let(top + d["sign_upper"] * d["radius_upper"])}
+    distances = {name: p.let(distance) for name, distance in places(v, s).items()}
     out: Symbols = {}
     for name, distance in distances.items():
         out[f"r_{name}"], out[f"v_{name}"], out[f"a_{name}"] = point(p, centre, distance, t3)

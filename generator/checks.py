@@ -50,7 +50,7 @@ def checks_context(spec: ModelSpec) -> dict[str, Any]:
 
 
 def _index(kind: str, value: Value) -> str:
-    return f"MSFP_{kind}_VALUE_{value.name}".upper()
+    return f"MSFP_{kind}_VALUES_{value.name}".upper()
 
 
 def _place(value: Value) -> str:

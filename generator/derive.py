@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, rotation, seat, slip, top
+from . import body, columns, contact, energy, laws, parameters, rotation, seat, slip, top
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -19,11 +19,13 @@ class Equations:
         spec: layout and effects.
         blocks: records that the programs exchange.
         programs: straight-line programs of one body, one surface and the top plate.
+        value_blocks: the values from which their parameters are made.
     """
 
     spec: ModelSpec
     blocks: Blocks
     programs: tuple[Program, ...]
+    value_blocks: parameters.ValueBlocks
     column_blocks: columns.Columns | None = None
     """Blocks of the tangent where an unknown moves all bodies above as one rigid body; None with uplift."""
 
@@ -51,13 +53,14 @@ def derive(spec: ModelSpec) -> Equations:
     """Derive the programs of one model. An effect that is off contributes neither fields nor statements."""
     effects = spec.effects
     blocks = laws.add_law_fields(make_blocks(planar=effects.dimension == "planar", uplift=effects.uplift), effects.law)
+    values = parameters.value_blocks(effects, blocks.surface_parameters)
     patch = effects.spin == "patch" and effects.dimension == "spatial"
     law = contact.FrictionModel(effects.bouc_wen, patch, effects.law)
     massless = effects.sliders == "massless"
     programs = [
-        body.arms(blocks),
+        *parameters.programs(blocks, values, effects),
         body.forward(blocks),
-        body.named_points(blocks),
+        body.named_points(blocks, values),
         body.to_local(blocks, effects.uplift, effects.rims),
         contact.contact(blocks, law),
         body.slip_rotation(blocks),
@@ -77,7 +80,7 @@ def derive(spec: ModelSpec) -> Equations:
         top.foot(blocks),
         top.top_energy(blocks),
         contact.gap(blocks),
-        *energy.programs(blocks, effects.rims, effects.top_rotation),
+        *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
         rotation.rotation_angles(blocks),
     ]
     if effects.top_rotation:
@@ -88,7 +91,7 @@ def derive(spec: ModelSpec) -> Equations:
         programs += [contact.rim_coordinates(blocks), contact.rim(blocks)]
     if effects.uplift:
         programs += seat.programs(blocks, effects.rims)
-        return Equations(spec, blocks, tuple(programs))
+        return Equations(spec, blocks, tuple(programs), values)
     column_blocks = columns.column_blocks(blocks, effects.dimension == "planar", unknowns(spec))
     programs += columns.programs(blocks, column_blocks, massless, unknowns(spec))
-    return Equations(spec, blocks, tuple(programs), column_blocks)
+    return Equations(spec, blocks, tuple(programs), values, column_blocks)

@@ -26,6 +26,7 @@ from .schedule import (
     calls_of,
     check,
     condensed,
+    energies,
     index_of,
     list_of,
     momentum_balances,
@@ -53,8 +54,8 @@ def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
 
 
 def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
-    """Directional derivatives of the programs of the condensed equations."""
-    called = _called(condensed(equations.spec.effects))
+    """Directional derivatives of the programs of the condensed equations and of the energies."""
+    called = _called(condensed(equations.spec.effects)) | _called(energies(equations.spec.effects))
     return tuple(
         lower(directional(program, _at_hand(called[program.name])))
         for program in equations.programs
@@ -62,19 +63,18 @@ def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
     )
 
 
-def schedule_context(equations: Equations) -> dict[str, Any]:
-    """What the templates of the schedules need."""
-    programs = {program.name: program for program in equations.programs}
-    balances, equations_of_motion = momentum_balances(equations.spec.effects), condensed(equations.spec.effects)
-    moving = set[str]()
-    for schedule in (balances, equations_of_motion):
-        moving |= check(passes_of(schedule), programs, equations.blocks)
-    directed = _lists(equations_of_motion)
-    used = directed | _lists(balances)
-    read = {place.partition("[")[0] for call in _emitted(equations_of_motion) for place in call.reads}
+def schedule_context(equations: Equations, directional: Iterable[Kernel]) -> dict[str, Any]:
+    """What the templates of the schedules need. directional: the kernels of a model with gradients."""
+    effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
+    balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
+    moving = check(passes_of(balances), programs, equations.blocks)
+    moving |= check(passes_of(with_directions), programs, equations.blocks)
+    directed = _lists(with_directions)
+    used = {name: None for name in LISTS if name in directed or name in _lists(balances)}
+    read = _read_values(with_directions, {kernel.program.name: kernel for kernel in directional})
     return {
-        "parts": [_part(name, passes, programs, read) for name, passes in {**balances, **equations_of_motion}.items()],
-        "directed": list(equations_of_motion),
+        "parts": [_part(name, passes, programs, read) for name, passes in {**balances, **with_directions}.items()],
+        "directed": list(with_directions),
         "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
         "block_tangents": [
             _declared(LISTS[name], equations) for name in used if name in moving and not LISTS[name].tangents
@@ -109,9 +109,24 @@ def _lists(schedule: Schedule) -> dict[str, None]:
     return {name: None for name in LISTS if name in used}
 
 
+def _read_values(schedule: Schedule, kernels: Mapping[str, Kernel]) -> set[str]:
+    """The lists whose values the directional derivatives of a schedule contain."""
+    read = set[str]()
+    for call in _emitted(schedule):
+        for kernel in (kernels[f"{name}_direction"] for name in call.programs if f"{name}_direction" in kernels):
+            symbols = {
+                s.name for statement in (*kernel.values, *kernel.partials) for s in statement.expression.free_symbols
+            }
+            symbols |= {s.name for t in kernel.tangents for partial, _ in t.terms for s in partial.free_symbols}
+            for place, use in zip(call.reads, kernel.program.inputs, strict=False):
+                if any(f"{use.alias}_{field.name}" in symbols for field in use.block.fields):
+                    read.add(place.partition("[")[0])
+    return read
+
+
 def _at_hand(call: Call) -> bool:
     """Whether the work area holds the results of a call while it is differentiated."""
-    return call.by is None and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
+    return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
 
 
 def _part(name: str, passes: Iterable[Pass], programs: Programs, read: set[str]) -> dict[str, Any]:
@@ -121,8 +136,11 @@ def _part(name: str, passes: Iterable[Pass], programs: Programs, read: set[str])
         form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
         for form, of in forms.items()
     }
+    added = dict.fromkeys(place for call in calls if call.adds for place in call.writes)
     return {
         "name": name,
+        "added": {form: [getattr(list_of(place), f"{form}_in_c") for place in added] for form in forms},
+        "constant": not any(list_of(place).kept is Kept.WORK for call in calls for place in call.writes),
         "fails": any(isinstance(call.by, InC) and call.by.fails for call in calls),
         "unused": {form: _unused(line for _, many in written for line in many) for form, written in lines.items()},
         "passes": {
@@ -170,6 +188,10 @@ def _values(call: Call, programs: Programs) -> Iterator[str]:
         yield f"const int status = {call.by.values};"
         yield "if (status)"
         yield "    return status;"
+    elif isinstance(call.by, Decision) and call.by.itself:
+        writes = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
+        many = ((name, list(_evaluated(call, programs[name]))) for name in call.programs)
+        yield from _chosen(call, writes, many)
     elif isinstance(call.by, Decision | InC):
         if call.by.values:
             yield f"{call.by.values};"
@@ -180,13 +202,22 @@ def _values(call: Call, programs: Programs) -> Iterator[str]:
 def _evaluated(call: Call, program: Program) -> Iterator[str]:
     reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
     writes = [_in_c(list_of(place).values_in_c, place) for place in call.writes]
-    if len(writes) == 1:
-        yield f"msfp_{program.name}({', '.join([*reads, *writes])});"
+    yield from _written(call, f"msfp_{program.name}", reads, writes, _size(program))
+
+
+def _written(call: Call, function: str, arguments: list[str], writes: list[str], size: str) -> Iterator[str]:
+    """Statements that call a function and put its result into one block, into several, or add it to one."""
+    if len(writes) == 1 and not call.adds:
+        yield f"{function}({', '.join([*arguments, *writes])});"
         return
     yield "{"
-    yield f"    double out[{_size(program)}];"
-    yield f"    msfp_{program.name}({', '.join([*reads, 'out'])});"
-    yield from _copies(writes)
+    yield f"    double out[{size}];"
+    yield f"    {function}({', '.join([*arguments, 'out'])});"
+    if call.adds:
+        yield f"    for (int i = 0; i < {size}; ++i)"
+        yield f"        {writes[0]}[i] += out[i];"
+    else:
+        yield from _copies(writes)
     yield "}"
 
 
@@ -196,13 +227,13 @@ def _tangents(call: Call, programs: Programs) -> Iterator[str]:
         if call.by.tangents:
             yield f"{call.by.tangents};"
         return
+    if not any(programs[name].tangents for name in call.programs):
+        return
     writes = [_in_c(list_of(place).tangents_in_c, place) for place in call.writes]
     yield from _chosen(call, writes, ((name, list(_tangent(call, programs[name], writes))) for name in call.programs))
 
 
 def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[str]:
-    if not program.tangents:
-        return
     reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
     places = [place for place, use in zip(call.reads, program.inputs, strict=True) if use.moving]
     moving = [_in_c(list_of(place).tangents_in_c, place) for place in places]
@@ -239,15 +270,8 @@ def _direction(call: Call, program: Program, writes: list[str], with_values: boo
     reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
     values = [_in_c(list_of(place).values_in_c, place) for place in call.writes] if _at_hand(call) else []
     moving = [_in_c(list_of(place).directions_in_c, place) for place in call.reads]
-    name = f"msfp_{program.name}_direction"
-    if len(writes) == 1:
-        yield f"{name}({', '.join([*reads, *values, *moving, *writes])});"
-        return
-    yield "{"
-    yield f"    double out[{_size(program)} * MSFP_COLUMNS];"
-    yield f"    {name}({', '.join([*reads, *moving, 'out'])});"
-    yield from _copies(writes)
-    yield "}"
+    size = f"{_size(program)} * MSFP_COLUMNS"
+    yield from _written(call, f"msfp_{program.name}_direction", [*reads, *values, *moving], writes, size)
 
 
 def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[str]]]) -> Iterator[str]:
@@ -261,6 +285,9 @@ def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[st
         yield f"{start}if ({call.by.acts[name]}) {{"
         yield from (f"    {statement}" for statement in statements)
         start = "} else "
+    if call.adds:
+        yield "}"
+        return
     yield "} else"
     yield f"    memset({writes[0]}, 0, sizeof {writes[0]});"
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import sympy as sp
 
 from msfp_gen.specification import contract, rows
-from msfp_gen.specification.layout import Effects, ModelSpec
+from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
 from .checks import checks_context
@@ -200,26 +200,6 @@ def lanes(surfaces: int) -> int:
     return surfaces if surfaces < 2 else 2 if surfaces == 2 else -(-surfaces // 4) * 4
 
 
-def value_enums(effects: Effects) -> list[tuple[str, str, str, str, list[tuple[str, str]]]]:
-    """Enumerations of the values of a body, a surface and the top: type, prefix, meaning, count, entries."""
-    surface = contract.SURFACE + (contract.SURFACE_UPLIFT if effects.uplift else ())
-    law = [(name, "of the friction law") for name in effects.law.columns] if effects.law is not None else []
-    return [
-        (
-            f"{kind}_value",
-            f"MSFP_{kind.upper()}_VALUE_",
-            meaning,
-            f"MSFP_{kind.upper()}_VALUES",
-            [(v.name, f"[{v.unit}] {v.meaning}") for v in values] + more,
-        )
-        for kind, meaning, values, more in (
-            ("body", "Values of a body in order; the base comes first", contract.BODY, []),
-            ("surface", "Values of a surface in order, the lowest surface first", surface, law),
-            ("top", "Values of the top in order", contract.TOP, []),
-        )
-    ]
-
-
 def description(spec: ModelSpec) -> str:
     """What the wrapper states about a model, as JSON. The wrapper itself is the same text for every model."""
     shape = shape_of(spec)
@@ -238,7 +218,8 @@ def description(spec: ModelSpec) -> str:
 def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:
     """Render all generated files: {file name: text}. directional: kernels of a model with gradients."""
     spec = equations.spec
-    groups = [group for group in (equations.blocks, equations.column_blocks) if group is not None]
+    every = (equations.blocks, equations.value_blocks, equations.column_blocks)
+    groups = [group for group in every if group is not None]
     blocks = [b for group in groups for f in fields(group) if (b := getattr(group, f.name)) is not None]
     law = spec.effects.law
     context = {
@@ -261,7 +242,6 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "law": law,
         "flows": spec.effects.permits_quasistatic_steps,
         "heat": HEAT_KERNEL,
-        "values": value_enums(spec.effects),
         "words": word_enums(),
         "row": rows.row(spec.effects),
         "extremes": rows.extremes(spec.effects),
@@ -271,7 +251,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         **interface_context(spec, shape_of(spec)),
         "checks": checks_context(spec),
         "scheduled": [function(k) for k in scheduled_kernels(equations)],
-        "schedule": schedule_context(equations),
+        "schedule": schedule_context(equations, directional),
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}

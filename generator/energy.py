@@ -79,7 +79,7 @@ def restraint(b: Blocks, rotating_support: bool) -> Program:
     tilted = subtract(body["t3"], support["e"])
     lean = p.let(dot(tilted, tilted) / 2)  # 1 - t_3 . e, without cancellation at small tilt
     stored = par["k"] * (x**2 + y**2) / 2 + par["kr"] * lean + par["kv"] * settlement**2 / 2
-    p.write(b.restraint, {"stored": stored, "settlement": settlement}, tangents=False)
+    p.write(b.restraint, {"stored": stored, "settlement": par["sr"] * settlement}, tangents=False)
     return p
 
 
@@ -140,11 +140,58 @@ def lock_power(b: Blocks) -> Program:
     return p
 
 
-def programs(b: Blocks, rims: bool, rotating_support: bool) -> list[Program]:
+def closed_rim(b: Blocks) -> Program:
+    """Gap of a rim and its rate, whether it pushes or not."""
+    p = Program("closed_rim", "gap of a rim and its rate")
+    rim: Symbols = p.read(b.rim, "rim", active=False)
+    p.write(b.closed_rim, {"g": rim["g"], "dg": rim["dg"]}, tangents=False)
+    return p
+
+
+def unilateral_energy(b: Blocks) -> Program:
+    """Elastic energy of a unilateral contact, and power that it dissipates."""
+    p = Program("unilateral_energy", "energy of a unilateral contact, and power dissipated there")
+    contact: Symbols = p.read(b.unilateral, "c", active=False)
+    p.write(b.unilateral_energy, {"stored": contact["stored"], "lost": contact["lost"]}, tangents=False)
+    return p
+
+
+def works(b: Blocks, rims: bool, uplift: bool) -> Program:
+    """The powers whose integrals are the works of a run, from those of bodies, surfaces and top."""
+    p = Program("works", "powers whose integrals are the works of a run")
+    energy: Symbols = p.read(b.energy, "e", active=False)
+    top: Symbols = p.read(b.top_power, "t", active=False)
+    base: Symbols = p.read(b.power, "base", active=False)
+    lock: Symbols = p.read(b.power, "lock", active=False)
+    friction: Symbols = p.read(b.friction_power, "f", active=False)
+    rim: Symbols = p.read(b.rim_energy, "rim", active=False) if rims else {"lost": sp.Integer(0)}
+    seat: Symbols = p.read(b.unilateral_energy, "seat", active=False) if uplift else {"lost": sp.Integer(0)}
+    prescribed = p.let(top["prescribed"] + base["power"])
+    p.write(
+        b.works,
+        {
+            "input": p.let(energy["power"] + top["load"]) + top["support"] + prescribed + lock["power"],
+            "friction_stored": friction["stored"],
+            "friction_dissipated": friction["lost"],
+            "contact_dissipated": friction["damped"],
+            "rim_dissipated": rim["lost"],
+            "top_dissipated": top["damped"],
+            "seat_dissipated": seat["lost"],
+            "prescribed": prescribed,
+            "load": top["load"],
+        },
+        tangents=False,
+    )
+    return p
+
+
+def programs(b: Blocks, rims: bool, uplift: bool, rotating_support: bool) -> list[Program]:
     """All programs of the energy balance but the energies of masses."""
     return [
         friction_power(b),
-        *([rim_energy(b)] if rims else []),
+        *([closed_rim(b), rim_energy(b)] if rims else []),
+        *([unilateral_energy(b)] if uplift else []),
+        works(b, rims, uplift),
         restraint(b, rotating_support),
         top_power(b, rotating_support),
         base_power(b),

@@ -22,19 +22,14 @@ CONTACT_INPUTS = ("par", "h", "loc", "g", "c")
 """Inputs of `contact`: parameters, stage formula, force and slip rotation; and what its local equations determine,
 friction and the coefficient of a friction law."""
 DIFFERENTIATED = {
-    "body_energy": False,
+    "body_block": False,
+    "surface_block": False,
+    "top_block": False,
     "upright": False,
     "spring_stage": False,
     "resting_foot": False,
     "foot": True,
-    "top_energy": False,
     "gap": True,
-    "friction_power": False,
-    "rim_energy": False,
-    "restraint": False,
-    "top_power": False,
-    "base_power": False,
-    "lock_power": False,
     "slid_friction": False,
     "slip_work": False,
 }

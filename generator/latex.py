@@ -17,15 +17,13 @@ from .program import AXES, Block, Program, Statement, Use
 
 # Kind of record -> quantity -> LaTeX symbol: @ stands for the number of the body or surface, # for the component.
 SYMBOLS: dict[str, dict[str, str]] = {
-    "dimensions": {
-        "height": r"\ell_{@}",
-        "centroid": r"z_{@}",
+    "body_values": {"height": r"\ell_{@}", "centroid": r"z_{@}"},
+    "sides": {
         "sign_lower": r"\sigma_{@-1}",
         "sign_upper": r"\sigma_{@}",
         "radius_lower": r"R_{@-1}",
         "radius_upper": r"R_{@}",
     },
-    "arms": {"c": r"c_{@}", "e": r"e_{@}"},
     "body_parameters": {
         "c": r"c_{@}",
         "e": r"e_{@}",
@@ -114,6 +112,7 @@ SYMBOLS: dict[str, dict[str, str]] = {
     },
     "report_contact": {"p": r"p_{@,#}", "M": r"M_{@,#}", "dY": r"\dot{Y}_{@}", "dZ": r"\dot{Z}_{@}"},
     "top_parameters": {
+        "sr": r"\eta_{V}",
         "k": "k_{T}",
         "c": "c_{T}",
         "kr": "k_{R}",
@@ -159,7 +158,7 @@ LOCAL_KINDS = {"local", "relative", "local_moment", "contact", "report_contact",
 
 # Program -> alias of an argument -> number of its body or surface.
 PLACES: dict[str, dict[str, str]] = {
-    "arms": {"d": "k", "out": "k"},
+    "body_block": {"b": "k", "s": "k", "out": "k"},
     "forward": {"par": "k", "u": "k-1", "x": "k", "out": "k"},
     "gap": {"par": r"\gamma", "a": r"\gamma+1", "out": r"\gamma"},
     "rim": {"par": r"\gamma", "x": r"\gamma+1", "out": r"\gamma"},

@@ -8,7 +8,7 @@ import sympy as sp
 from sympy.printing.c import C99CodePrinter
 
 # Functions of `runtime/msfp_math.h`, which give the same numbers on every system.
-FUNCTIONS = {name: f"msfp_{name}" for name in ("sin", "cos", "exp", "log", "tanh")}
+FUNCTIONS = {name: f"msfp_{name}" for name in ("sin", "cos", "asin", "exp", "log", "tanh")}
 
 
 class Printer(C99CodePrinter):  # type: ignore[misc]
@@ -32,6 +32,9 @@ class Printer(C99CodePrinter):  # type: ignore[misc]
         if exponent == -1:
             return str(super()._print_Pow(expr))
         return f"msfp_pow({self._print(base)}, {self._print(exponent)})"
+
+    def _print_atan(self, expr: sp.Function) -> str:
+        return f"msfp_atan2({self._print(expr.args[0])}, 1.0)"
 
     def _print_Step(self, expr: sp.Function) -> str:
         return f"msfp_heaviside({self._print(expr.args[0])})"

@@ -44,10 +44,12 @@ class Decision:
         values: statement that evaluates it, and sets what it writes to zero where it does not act. Empty: the program
             that the next decision needs is evaluated there, and only its derivatives are formed here.
         acts: program -> the condition in C under which it acts. Where none does, the derivatives are zero.
+        itself: whether the program is evaluated where it acts, and what it writes is zero elsewhere, without `values`.
     """
 
     values: str
     acts: Mapping[str, str]
+    itself: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,8 @@ class Call:
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     by: Decision | InC | None = None
+    adds: bool = False
+    """Whether what it writes is added to a block, which is zero at the start of the part."""
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -185,6 +189,18 @@ LISTS: Mapping[str, List] = {
     "excess": List("linear", "excess", length=SURFACES),
     "joint_moment": List("moment", "joint_moment", length=SURFACES),
     "below": List("moment", "below", Kept.WORK, BODIES),
+    "base_motion": List("base_motion", "base_motion"),
+    "energy": List("energy", "energy"),
+    "closed_rim": List("closed_rim", "closed_rim", length=SURFACES),
+    "lock": List("lock", "lock", Kept.WORK, SURFACES, directions=True),
+    "restraint": List("restraint", "restraint"),
+    "rim_energy": List("rim_energy", "rim_energy"),
+    "unilateral_energy": List("unilateral_energy", "unilateral_energy"),
+    "top_power": List("top_power", "top_power"),
+    "base_power": List("power", "base_power"),
+    "lock_power": List("power", "lock_power"),
+    "friction_power": List("friction_power", "friction_power"),
+    "works": List("works", "works"),
 }
 """All lists of blocks."""
 
@@ -378,6 +394,62 @@ def condensed(effects: Effects) -> Schedule:
 def schedules(effects: Effects) -> tuple[Schedule, Schedule]:
     """All schedules of a model: the momentum balances and the condensed equations."""
     return momentum_balances(effects), condensed(effects)
+
+
+def energies(effects: Effects) -> Schedule:
+    """Energies of masses and springs, and the powers whose integrals are the works of a run, after an evaluation."""
+    upright = ("upright",) if effects.top_rotation else ()
+    at_rim = (
+        Call(
+            "closed_rim",
+            ("rim[j]",),
+            ("closed_rim[j]",),
+            InC(
+                "msfp_gap_of_rim(w, j, s->closed_rim[j])",
+                "",
+                "msfp_closed_rim_columns(p, dp, w, d, j, s->closed_rim[j], ds->closed_rim[j])",
+            ),
+        ),
+        Call(
+            "rim_energy",
+            ("surface_parameters[j]", "closed_rim[j]"),
+            ("rim_energy",),
+            Decision("", {"rim_energy": "w->rim_gap[j] < 0.0"}, itself=True),
+            adds=True,
+        ),
+    )
+    contacts = (
+        *(at_rim if effects.rims else ()),
+        *(
+            (Call("unilateral_energy", ("unilateral[j]",), ("unilateral_energy",), adds=True),)
+            if effects.uplift
+            else ()
+        ),
+    )
+    bodies = Call("body_energy", ("body_parameters[k]", "body[k]", "base_motion"), ("energy",), adds=True)
+    top = Call("top_energy", ("top_parameters", "body[top]", "base_motion", "foot"), ("energy",), adds=True)
+    restraint = Call("restraint", ("top_parameters", "body[top]", "foot", *upright), ("restraint",))
+    at_top = ("top_parameters", "body[top]", "foot", *upright, "x[top]", "base_motion", "load_force", "load_moment")
+    friction = (
+        Call("lock_power", ("body[j+1]", "lock[j]"), ("lock_power",), adds=True),
+        Call("friction_power", ("surface_parameters[j]", "contact[j]"), ("friction_power",), adds=True),
+    )
+    terms = ["energy", "top_power", "base_power", "lock_power", "friction_power"]
+    terms += ["rim_energy"] * effects.rims + ["unilateral_energy"] * effects.uplift
+    springs = (Pass(Over.SURFACES, contacts),) if contacts else ()
+    return {
+        "mechanical": (Pass(Over.BODIES, (bodies,)), Pass(Over.TOP, (top,))),
+        "springs": (Pass(Over.TOP, (restraint,)), *springs),
+        "powers": (
+            Pass(Over.TOP, (Call("top_power", at_top, ("top_power",)),)),
+            Pass(
+                Over.BASE,
+                (Call("base_power", ("body[base]", "base_motion", "force[base]", "moment[base]"), ("base_power",)),),
+            ),
+            Pass(Over.SURFACES, (*friction, *contacts)),
+            Pass(Over.TOP, (Call("works", tuple(terms), ("works",)),)),
+        ),
+    }
 
 
 def list_of(place: str) -> List:

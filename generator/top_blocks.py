@@ -21,6 +21,7 @@ def top_blocks(new: Maker) -> dict[str, Block]:
         .scalar("mz", "kg", "supported mass that follows the top plate vertically; 0 on a vertical spring")
         .scalar("kv", "N/m", "vertical stiffness between top plate and foot")
         .scalar("cv", "N s/m", "vertical damping between top plate and foot")
+        .scalar("sr", "-", "compliance of vertical spring and unilateral contacts over that of the spring alone")
         .vector("x0", "m", "anchor of the rig springs (r_nn at the start when centred)", POLAR)
         .build(),
         "top_wrench": new("top_wrench")

@@ -100,12 +100,12 @@ static double fastest(int (*what)(void), int count)
 
 int main(int argc, char **argv)
 {
-    static double bodies[NB + 1][MSFP_BODY_VALUES], surfaces[NB][MSFP_SURFACE_VALUES], top[MSFP_TOP_VALUES], head[2], state[3][NB][3];
+    static double bodies[NB + 1][MSFP_BODY_VALUES_SIZE], surfaces[NB][MSFP_SURFACE_VALUES_SIZE], top[MSFP_TOP_VALUES_SIZE], head[2], state[3][NB][3];
     const int count = argc > 1 ? atoi(argv[1]) : 4000;
     numbers(head, 2);
     numbers(&bodies[0][0], sizeof bodies / sizeof(double));
     numbers(&surfaces[0][0], sizeof surfaces / sizeof(double));
-    numbers(top, MSFP_TOP_VALUES);
+    numbers(top, MSFP_TOP_VALUES_SIZE);
     msfp_set_parameters(&parameters, head[1], &bodies[0][0], &surfaces[0][0], top);
     numbers(&at.base[0][0], 18);
     numbers(at.load, 6);

@@ -72,19 +72,19 @@ enum {
 /* Blocks of parameters: msfp_model.h names their entries and units. */
 typedef struct {
     double gravity; /* [m/s^2] */
-    double dimensions[MSFP_NB + 1][MSFP_DIMENSIONS_SIZE];
+    double body_values[MSFP_NB + 1][MSFP_BODY_VALUES_SIZE], surface_values[MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
+    double top_values[MSFP_TOP_VALUES_SIZE], sides[MSFP_NB + 1][MSFP_SIDES_SIZE], around[MSFP_AROUND_SIZE];
     double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE];
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
     double lanes[MSFP_SURFACE_PARAMETERS_SIZE][MSFP_LANES]; /* the parameters of the surfaces, [parameter][surface] */
     double top[MSFP_TOP_PARAMETERS_SIZE];
     double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met; 2: it holds the slider */
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
-    double settlement_ratio;    /* compliance of spring and unilateral contacts over that of the spring alone */
     double weight;              /* of the moving bodies and the supported mass [N] */
 } msfp_parameters;
 
-/* Fill `p`. gravity [m/s^2]; bodies [MSFP_NB + 1][MSFP_BODY_VALUES]; surfaces [MSFP_NB][MSFP_SURFACE_VALUES];
- * top [MSFP_TOP_VALUES]. */
+/* Fill `p`. gravity [m/s^2]; bodies [MSFP_NB + 1][MSFP_BODY_VALUES_SIZE]; surfaces [MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
+ * top [MSFP_TOP_VALUES_SIZE]. */
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies, const double *surfaces,
                          const double *top);
 
@@ -145,7 +145,7 @@ typedef struct {
     double coefficient[MSFP_NB]
                       [MSFP_COEFFICIENT_SIZE]; /* mu on entry is the first guess of Newton's method; 0 will do */
 #endif
-    double lock[MSFP_NB]; /* axial moment that holds phi'' = 0 where spin is locked [N m] */
+    double lock[MSFP_NB][MSFP_LOCK_SIZE]; /* axial moment that holds phi'' = 0 where spin is locked [N m] */
     double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
     double reference;     /* weight and load, the scale of forces where no normal force is known [N] */
 #if MSFP_UPLIFT

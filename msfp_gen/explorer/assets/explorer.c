@@ -31,9 +31,9 @@ EXPORTED(begin) void begin(const double *input)
     const double *number = take(&at, 12);
     const double *count = take(&at, 5);
     const int pieces = (int)count[0], loads = (int)count[1], jumps = (int)count[2], stops = (int)count[3];
-    const double *bodies = take(&at, (MSFP_NB + 1) * MSFP_BODY_VALUES);
-    const double *surfaces = take(&at, MSFP_NB * MSFP_SURFACE_VALUES);
-    const double *top = take(&at, MSFP_TOP_VALUES);
+    const double *bodies = take(&at, (MSFP_NB + 1) * MSFP_BODY_VALUES_SIZE);
+    const double *surfaces = take(&at, MSFP_NB * MSFP_SURFACE_VALUES_SIZE);
+    const double *top = take(&at, MSFP_TOP_VALUES_SIZE);
     const double *q = take(&at, MSFP_NB * MSFP_NQ), *v = take(&at, MSFP_NB * MSFP_NQ), *f = take(&at, MSFP_NB * 2);
     msfp_history motion, load;
     msfp_options options;

@@ -74,7 +74,7 @@ static int first(int status, int other) { return status ? status : other; }
 int msfp_api_bearing_new(double gravity, const double *bodies, const double *surfaces, const double *top,
                          msfp_bearing **bearing, const char **message)
 {
-    static const double none[MSFP_TOP_VALUES] = { 0.0 };
+    static const double none[MSFP_TOP_VALUES_SIZE] = { 0.0 };
     if (!bearing)
         return msfp_refuse(message, "bearing: give the address of a handle");
     *bearing = NULL;

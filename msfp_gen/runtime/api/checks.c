@@ -44,7 +44,7 @@ static int check_ranges(const msfp_range *ranges, size_t count, const double *va
 static int check_bodies(const double *bodies, const char **message)
 {
     for (int k = 0; k <= NB; ++k) {
-        const double *body = bodies + k * MSFP_BODY_VALUES;
+        const double *body = bodies + k * MSFP_BODY_VALUES_SIZE;
         const int status = check_ranges(msfp_body_ranges, COUNT(msfp_body_ranges), body, k == 0, message);
         if (status)
             return status;
@@ -57,11 +57,11 @@ static int check_bodies(const double *bodies, const char **message)
 static int check_surfaces(const double *surfaces, const double *bodies, const char **message)
 {
     for (int j = 0; j < NB; ++j) {
-        const double *surface = surfaces + j * MSFP_SURFACE_VALUES;
+        const double *surface = surfaces + j * MSFP_SURFACE_VALUES_SIZE;
         const int status = CHECK(msfp_surface_ranges, surface);
         if (status)
             return status;
-        const char *excess = msfp_excess_of_surface(surface, bodies + (signs[j] > 0 ? j + 1 : j) * MSFP_BODY_VALUES);
+        const char *excess = msfp_excess_of_surface(surface, bodies + (signs[j] > 0 ? j + 1 : j) * MSFP_BODY_VALUES_SIZE);
         REQUIRE(!excess, excess);
     }
     return MSFP_OK;
@@ -70,9 +70,9 @@ static int check_surfaces(const double *surfaces, const double *bodies, const ch
 static int check_top(const double *top, const char **message)
 {
     const int status = CHECK(msfp_top_ranges, top);
-    if (status || top[MSFP_TOP_VALUE_MASS] == 0.0)
+    if (status || top[MSFP_TOP_VALUES_MASS] == 0.0)
         return status;
-    REQUIRE(top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS] > 0.0 || top[MSFP_TOP_VALUE_VERTICAL_DAMPING] == 0.0,
+    REQUIRE(top[MSFP_TOP_VALUES_VERTICAL_STIFFNESS] > 0.0 || top[MSFP_TOP_VALUES_VERTICAL_DAMPING] == 0.0,
             "top: vertical_damping: a damper alone carries no mass; give vertical_stiffness as well");
     return CHECK(msfp_top_mass_ranges, top);
 }
@@ -83,8 +83,8 @@ static int check_contacts(const double *surfaces, const double *top, const char 
 #if MSFP_UPLIFT
     double compliance = 0.0;
     for (int j = 0; j < NB; ++j)
-        compliance += 1.0 / surfaces[(size_t)j * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_SEAT_STIFFNESS];
-    REQUIRE(compliance * fmax(top[MSFP_TOP_VALUE_STIFFNESS], top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS]) < 1.0,
+        compliance += 1.0 / surfaces[(size_t)j * MSFP_SURFACE_VALUES_SIZE + MSFP_SURFACE_VALUES_SEAT_STIFFNESS];
+    REQUIRE(compliance * fmax(top[MSFP_TOP_VALUES_STIFFNESS], top[MSFP_TOP_VALUES_VERTICAL_STIFFNESS]) < 1.0,
             "surfaces: seat_stiffness: the unilateral contacts of all surfaces in series must be stiffer than the top, "
             "whose stiffness and vertical_stiffness contain them; give more [N/m]");
 #else
@@ -300,9 +300,9 @@ uint64_t msfp_port_identity(const msfp_scene *s, double axial_load, int loaded)
 
 static int check_interface(const double *top, const char **message)
 {
-    const double values[MSFP_TOP_VALUES] = { [MSFP_TOP_VALUE_STIFFNESS] = top[MSFP_TOP_PARAMETERS_K],
-                                             [MSFP_TOP_VALUE_VERTICAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KV],
-                                             [MSFP_TOP_VALUE_ROTATIONAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KR] };
+    const double values[MSFP_TOP_VALUES_SIZE] = { [MSFP_TOP_VALUES_STIFFNESS] = top[MSFP_TOP_PARAMETERS_K],
+                                             [MSFP_TOP_VALUES_VERTICAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KV],
+                                             [MSFP_TOP_VALUES_ROTATIONAL_STIFFNESS] = top[MSFP_TOP_PARAMETERS_KR] };
     REQUIRE(top[MSFP_TOP_PARAMETERS_M] == 0.0, "bearing: top: a two-port supports no mass; give mass = 0");
 #if !MSFP_PLANAR /* others were refused */
     REQUIRE(top[MSFP_TOP_PARAMETERS_X0X] == 0.0 && top[MSFP_TOP_PARAMETERS_X0Y] == 0.0,
@@ -392,8 +392,8 @@ int msfp_check_gradients(const msfp_run *run, const msfp_gradient_inputs *in)
     const struct {
         const double *values;
         size_t of_each;
-    } arrays[] = { { in->gravity, 1 },    { in->bodies, (NB + 1) * MSFP_BODY_VALUES }, { in->surfaces, NB * MSFP_SURFACE_VALUES },
-                   { in->top, MSFP_TOP_VALUES }, { in->q, NB * MSFP_NQ }, { in->v, NB * MSFP_NQ }, { in->f, NB * 2 },
+    } arrays[] = { { in->gravity, 1 },    { in->bodies, (NB + 1) * MSFP_BODY_VALUES_SIZE }, { in->surfaces, NB * MSFP_SURFACE_VALUES_SIZE },
+                   { in->top, MSFP_TOP_VALUES_SIZE }, { in->q, NB * MSFP_NQ }, { in->v, NB * MSFP_NQ }, { in->f, NB * 2 },
                    { in->motion, 1 },     { in->load, 1 } };
     for (size_t i = 0; in->count && i < COUNT(arrays); ++i)
         if (!arrays[i].values || !msfp_all_finite(arrays[i].values, arrays[i].of_each * (size_t)in->count))

@@ -32,7 +32,7 @@ MSFP_WIDE int msfp_condensed(const msfp_parameters *p, const msfp_point *at, con
 #if MSFP_UPLIFT
         memcpy(residual + j * ND + NA, s.excess[j], MSFP_SPACE * sizeof *residual);
 #endif
-        w->lock[j] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : s.angular[j + 1][MSFP_ANGULAR_SIZE - 1];
+        w->lock[j][MSFP_LOCK_MOMENT] = MSFP_PLANAR || !MSFP_SPIN_LOCKED ? 0.0 : s.angular[j + 1][MSFP_ANGULAR_SIZE - 1];
     }
     if (tangent)
         msfp_tangent(p, at, seed, w, tangent);

@@ -52,6 +52,13 @@ typedef struct msfp_block_tangents msfp_block_tangents;
 
 /* ---- kinematics.c ---- */
 
+/* The body that slides in surface j: its face is the footprint, its edge meets the rim. */
+static inline int msfp_slider(int j)
+{
+    static const int signs[MSFP_NB] = MSFP_SIGNS;
+    return signs[j] > 0 ? j + 1 : j;
+}
+
 /* What an evaluation is given: coordinates, motion of the base unless it is the same as in `w`, loads, friction and
  * temperatures. seed: NULL outside of a step. */
 void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
@@ -87,12 +94,6 @@ void msfp_end_turns(const double rotation[2][3], double turns[3][3], double deri
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j);
 #if MSFP_UPLIFT
 enum { MSFP_OPEN, MSFP_ON_FACE, MSFP_ON_EDGE }; /* how a slider stands on its footprint */
-/* The body whose face is the footprint of surface j. */
-static inline int msfp_slider(int j)
-{
-    static const int signs[MSFP_NB] = MSFP_SIGNS;
-    return signs[j] > 0 ? j + 1 : j;
-}
 /* Unilateral contact of surface j, zero where it is open or its damping would pull. */
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j);
 #endif
@@ -141,10 +142,12 @@ void msfp_load_tangent(const msfp_parameters *p, msfp_work *w, const double *dfo
 
 /* ---- observe.c ---- */
 
+/* What energies and powers are given beside the evaluation: motion of the base, load, axis of a rotating support. */
+void msfp_set_observed(const msfp_point *at, msfp_blocks *s);
 /* Motion of the base as the block `base_motion`. */
 void msfp_base_motion(const msfp_point *at, double *base);
-/* Rim of surface j, whose gap is closed, as the block `closed_rim`. */
-void msfp_closed_rim(const msfp_work *w, int j, double *rim);
+/* Gap of the rim of surface j and its rate, as the block `closed_rim`. */
+void msfp_gap_of_rim(const msfp_work *w, int j, double *rim);
 /* Power that plastic slip and the drilling moment dissipate at surface j [W]. */
 double msfp_heating(const msfp_parameters *p, const msfp_work *w, int j);
 /* Kinetic and potential energy and that of all springs but friction [J]. */

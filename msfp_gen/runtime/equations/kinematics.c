@@ -7,99 +7,46 @@
 
 static const int signs[NB] = MSFP_SIGNS;
 
-#if MSFP_UPLIFT
-/* Stiffness and damping of a spring of the top, less the compliance of the unilateral contacts, which the given stiffness
- * contains. The damper loses as much in slow motion as the given one. Returns the share of the spring in the
- * compliance. */
-static double less_contacts(const msfp_parameters *p, double *stiffness, double *damping)
+/* What the parameters of body k are made of beside its own values. */
+static void set_sides(msfp_parameters *p, int k)
 {
-    double share = 1.0;
-    for (int j = 0; j < NB; ++j)
-        share -= *stiffness / p->surface[j][MSFP_SURFACE_PARAMETERS_KS];
-    *stiffness /= share;
-    *damping /= share * share;
-    return share;
+    double *sides = p->sides[k];
+    sides[MSFP_SIDES_SIGN_LOWER] = k > 0 ? signs[k - 1] : 1.0;
+    sides[MSFP_SIDES_SIGN_UPPER] = k < NB ? signs[k] : 1.0;
+    sides[MSFP_SIDES_RADIUS_LOWER] = k > 0 ? p->surface_values[k - 1][MSFP_SURFACE_VALUES_RADIUS] : 0.0;
+    sides[MSFP_SIDES_RADIUS_UPPER] = k < NB ? p->surface_values[k][MSFP_SURFACE_VALUES_RADIUS] : 0.0;
+    sides[MSFP_SIDES_GRAVITY] = p->gravity;
 }
-#endif
 
 void msfp_set_parameters(msfp_parameters *p, double gravity, const double *bodies, const double *surfaces,
                          const double *top)
 {
     memset(p, 0, sizeof *p);
-    p->gravity = gravity;
+    p->gravity = p->around[MSFP_AROUND_GRAVITY] = gravity;
+    memcpy(p->body_values, bodies, sizeof p->body_values);
+    memcpy(p->surface_values, surfaces, sizeof p->surface_values);
+    memcpy(p->top_values, top, sizeof p->top_values);
     for (int k = 0; k <= NB; ++k) {
-        const double *b = bodies + k * MSFP_BODY_VALUES;
-        double *d = p->dimensions[k], *out = p->body[k], arms[MSFP_ARMS_SIZE];
-        d[MSFP_DIMENSIONS_HEIGHT] = b[MSFP_BODY_VALUE_HEIGHT];
-        d[MSFP_DIMENSIONS_CENTROID] = b[MSFP_BODY_VALUE_CENTROID];
-        d[MSFP_DIMENSIONS_SIGN_LOWER] = k > 0 ? signs[k - 1] : 1.0;
-        d[MSFP_DIMENSIONS_SIGN_UPPER] = k < NB ? signs[k] : 1.0;
-        d[MSFP_DIMENSIONS_RADIUS_LOWER] =
-            k > 0 ? surfaces[(k - 1) * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_RADIUS] : 0.0;
-        d[MSFP_DIMENSIONS_RADIUS_UPPER] = k < NB ? surfaces[k * MSFP_SURFACE_VALUES + MSFP_SURFACE_VALUE_RADIUS] : 0.0;
-        msfp_arms(d, arms);
-        out[MSFP_BODY_PARAMETERS_C] = arms[MSFP_ARMS_C];
-        out[MSFP_BODY_PARAMETERS_E] = arms[MSFP_ARMS_E];
-        out[MSFP_BODY_PARAMETERS_M] = b[MSFP_BODY_VALUE_MASS];
-        out[MSFP_BODY_PARAMETERS_JT] = b[MSFP_BODY_VALUE_INERTIA_TRANSVERSE];
-        out[MSFP_BODY_PARAMETERS_JA] = b[MSFP_BODY_VALUE_INERTIA_AXIAL];
-        out[MSFP_BODY_PARAMETERS_G] = gravity;
+        set_sides(p, k);
+        msfp_body_block(p->body_values[k], p->sides[k], p->body[k]);
     }
     for (int j = 0; j < NB; ++j) {
-        const double *s = surfaces + j * MSFP_SURFACE_VALUES;
-        const double radius = s[MSFP_SURFACE_VALUE_RADIUS], tilt = s[MSFP_SURFACE_VALUE_CAPACITY] / radius;
-        const double *slider = bodies + (signs[j] > 0 ? j + 1 : j) * MSFP_BODY_VALUES;
-        double *out = p->surface[j];
-        out[MSFP_SURFACE_PARAMETERS_SIGN] = signs[j];
-        out[MSFP_SURFACE_PARAMETERS_R] = radius;
-        out[MSFP_SURFACE_PARAMETERS_SC] = s[MSFP_SURFACE_VALUE_CAPACITY];
-        out[MSFP_SURFACE_PARAMETERS_MU] = s[MSFP_SURFACE_VALUE_FRICTION];
-        out[MSFP_SURFACE_PARAMETERS_DY] = s[MSFP_SURFACE_VALUE_YIELD_DISPLACEMENT];
-        out[MSFP_SURFACE_PARAMETERS_TD] = s[MSFP_SURFACE_VALUE_CONTACT_DAMPING];
-        out[MSFP_SURFACE_PARAMETERS_KC] = s[MSFP_SURFACE_VALUE_RIM_STIFFNESS];
-        out[MSFP_SURFACE_PARAMETERS_CC] = s[MSFP_SURFACE_VALUE_RIM_DAMPING];
-        out[MSFP_SURFACE_PARAMETERS_RS] = slider[MSFP_BODY_VALUE_RIM_RADIUS];
-        out[MSFP_SURFACE_PARAMETERS_PR] = slider[MSFP_BODY_VALUE_RIM_OFFSET];
-#if MSFP_UPLIFT
-        out[MSFP_SURFACE_PARAMETERS_KS] = s[MSFP_SURFACE_VALUE_SEAT_STIFFNESS];
-        out[MSFP_SURFACE_PARAMETERS_CS] = s[MSFP_SURFACE_VALUE_SEAT_DAMPING];
-#endif
-        /* The footprint bounds the contact position; friction inclines the resultant further by its angle. */
-        const double footprint = fmin(
-            msfp_asin(fmin(slider[MSFP_BODY_VALUE_RIM_RADIUS] / radius, 1.0)) + msfp_atan2(s[MSFP_SURFACE_VALUE_FRICTION], 1.0), 1.5);
-        out[MSFP_SURFACE_PARAMETERS_CA] = msfp_cos(footprint);
-        out[MSFP_SURFACE_PARAMETERS_SA] = msfp_sin(footprint);
-        for (int i = 0; i < MSFP_LAW_VALUES; ++i) /* the numbers of a friction law come last in both */
-            out[MSFP_SURFACE_PARAMETERS_SIZE - MSFP_LAW_VALUES + i] = s[MSFP_SURFACE_VALUES - MSFP_LAW_VALUES + i];
+        const double sign = signs[j], *values = p->surface_values[j];
+        const double radius = values[MSFP_SURFACE_VALUES_RADIUS], tilt = values[MSFP_SURFACE_VALUES_CAPACITY] / radius;
+        msfp_surface_block(values, p->body_values[msfp_slider(j)], &sign, p->surface[j]);
         p->rim_cosine[j] = msfp_cos(tilt);
         p->rim_slope[j] = radius / msfp_sin(tilt);
+#if MSFP_UPLIFT
+        p->around[MSFP_AROUND_COMPLIANCE] += 1.0 / values[MSFP_SURFACE_VALUES_SEAT_STIFFNESS];
+#endif
     }
     for (int i = 0; i < MSFP_SURFACE_PARAMETERS_SIZE; ++i)
         for (int lane = 0; lane < MSFP_LANES; ++lane)
             p->lanes[i][lane] = p->surface[lane < NB ? lane : NB - 1][i];
-    double *t = p->top;
-    t[MSFP_TOP_PARAMETERS_K] = top[MSFP_TOP_VALUE_STIFFNESS];
-    t[MSFP_TOP_PARAMETERS_C] = top[MSFP_TOP_VALUE_DAMPING];
-    t[MSFP_TOP_PARAMETERS_KR] = top[MSFP_TOP_VALUE_ROTATIONAL_STIFFNESS];
-    t[MSFP_TOP_PARAMETERS_CR] = top[MSFP_TOP_VALUE_ROTATIONAL_DAMPING];
-    t[MSFP_TOP_PARAMETERS_M] = top[MSFP_TOP_VALUE_MASS];
-    t[MSFP_TOP_PARAMETERS_JT] = top[MSFP_TOP_VALUE_INERTIA_TRANSVERSE];
-    t[MSFP_TOP_PARAMETERS_JA] = top[MSFP_TOP_VALUE_INERTIA_AXIAL];
-    t[MSFP_TOP_PARAMETERS_H] = top[MSFP_TOP_VALUE_HEIGHT];
-    t[MSFP_TOP_PARAMETERS_G] = gravity;
-    t[MSFP_TOP_PARAMETERS_KV] = top[MSFP_TOP_VALUE_VERTICAL_STIFFNESS];
-    t[MSFP_TOP_PARAMETERS_CV] = top[MSFP_TOP_VALUE_VERTICAL_DAMPING];
-    p->settlement_ratio = 1.0;
-#if MSFP_UPLIFT
-    less_contacts(p, &t[MSFP_TOP_PARAMETERS_K], &t[MSFP_TOP_PARAMETERS_C]);
-    p->settlement_ratio = 1.0 / less_contacts(p, &t[MSFP_TOP_PARAMETERS_KV], &t[MSFP_TOP_PARAMETERS_CV]);
-#endif
-    t[MSFP_TOP_PARAMETERS_MZ] = msfp_top_is_sprung(p) ? 0.0 : t[MSFP_TOP_PARAMETERS_M];
-    const double anchor[3] = { top[MSFP_TOP_VALUE_ANCHOR_X], top[MSFP_TOP_VALUE_ANCHOR_Y], 0.0 };
-    msfp_top_parameters_x0_put(t, anchor);
-    p->weight = top[MSFP_TOP_VALUE_MASS] * gravity;
+    msfp_top_block(p->top_values, p->around, p->top);
+    p->weight = top[MSFP_TOP_VALUES_MASS] * gravity;
     for (int k = 1; k <= NB; ++k)
-        p->weight += bodies[k * MSFP_BODY_VALUES + MSFP_BODY_VALUE_MASS] * gravity;
+        p->weight += p->body_values[k][MSFP_BODY_VALUES_MASS] * gravity;
 }
 
 /* The block of coordinates from q, v, a of a body; separated: with the separation, which the base has not. */
@@ -286,7 +233,7 @@ void msfp_named_vectors(const msfp_parameters *p, const msfp_point *at, double *
     double block[MSFP_POINTS_SIZE];
     kinematics(p, at, &w, &s);
     for (int k = 0; k <= NB; ++k) {
-        msfp_named_points(p->dimensions[k], k ? w.body[k - 1] : s.frame, w.x[k], block);
+        msfp_named_points(p->body_values[k], p->sides[k], k ? w.body[k - 1] : s.frame, w.x[k], block);
         points_of(block, points + k * 36);
         msfp_body_w_get(w.body[k], rotations + k * 12);
         msfp_body_wp_get(w.body[k], rotations + k * 12 + 3);

@@ -6,6 +6,8 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
+#include "msfp_gradient_kernels.h"
+
 /* Column c of a block of `count` numbers. */
 static void put_column(double *block, const double *values, int count, int c)
 {
@@ -13,24 +15,46 @@ static void put_column(double *block, const double *values, int count, int c)
         block[i * C + c] = values[i];
 }
 
-/* Parameters of column c. The blocks that msfp_set_parameters fills are linear in the values, so that it makes their
- * derivatives from those of the values; whether the top is sprung is that of the run. */
-static void parameters(const msfp_run *run, const msfp_gradient_inputs *in, int index, int c,
-                       msfp_parameter_columns *to)
+/* Columns of the values of a scene. */
+typedef struct {
+    double body[NB + 1][MSFP_BODY_VALUES_SIZE * C], surface[NB][MSFP_SURFACE_VALUES_SIZE * C];
+    double top[MSFP_TOP_VALUES_SIZE * C], gravity[C];
+} value_columns;
+
+/* Column c of them, that of parameter `index`. */
+static void read_values(const msfp_gradient_inputs *in, int index, int c, value_columns *d)
 {
-    msfp_parameters one;
-    msfp_set_parameters(&one, in->gravity[index], in->bodies + (size_t)index * (NB + 1) * MSFP_BODY_VALUES,
-                        in->surfaces + (size_t)index * NB * MSFP_SURFACE_VALUES,
-                        in->top + (size_t)index * MSFP_TOP_VALUES);
-    one.top[MSFP_TOP_PARAMETERS_MZ] = msfp_top_is_sprung(&run->parameters) ? 0.0 : one.top[MSFP_TOP_PARAMETERS_M];
-    for (int j = 0; j < NB; ++j)
-        one.surface[j][MSFP_SURFACE_PARAMETERS_SIGN] = one.surface[j][MSFP_SURFACE_PARAMETERS_CA] =
-            one.surface[j][MSFP_SURFACE_PARAMETERS_SA] = 0.0;
+    const size_t i = index;
+    d->gravity[c] = in->gravity[i];
+    put_column(d->top, in->top + i * MSFP_TOP_VALUES_SIZE, MSFP_TOP_VALUES_SIZE, c);
     for (int k = 0; k <= NB; ++k)
-        put_column(to->body[k], one.body[k], MSFP_BODY_PARAMETERS_SIZE, c);
+        put_column(d->body[k], in->bodies + (i * (NB + 1) + k) * MSFP_BODY_VALUES_SIZE, MSFP_BODY_VALUES_SIZE, c);
     for (int j = 0; j < NB; ++j)
-        put_column(to->surface[j], one.surface[j], MSFP_SURFACE_PARAMETERS_SIZE, c);
-    put_column(to->top, one.top, MSFP_TOP_PARAMETERS_SIZE, c);
+        put_column(d->surface[j], in->surfaces + (i * NB + j) * MSFP_SURFACE_VALUES_SIZE, MSFP_SURFACE_VALUES_SIZE, c);
+}
+
+/* The parameters from the values, as msfp_set_parameters makes them. */
+static void parameters(const msfp_parameters *p, const value_columns *d, msfp_parameter_columns *to)
+{
+    const double dsign[C] = { 0.0 };
+    double around[MSFP_AROUND_SIZE * C] = { 0.0 };
+    memcpy(around + MSFP_AROUND_GRAVITY * C, d->gravity, sizeof d->gravity);
+    for (int k = 0; k <= NB; ++k) {
+        double sides[MSFP_SIDES_SIZE * C] = { 0.0 };
+        if (k > 0)
+            memcpy(sides + MSFP_SIDES_RADIUS_LOWER * C, d->surface[k - 1] + MSFP_SURFACE_VALUES_RADIUS * C, C * sizeof *sides);
+        if (k < NB)
+            memcpy(sides + MSFP_SIDES_RADIUS_UPPER * C, d->surface[k] + MSFP_SURFACE_VALUES_RADIUS * C, C * sizeof *sides);
+        memcpy(sides + MSFP_SIDES_GRAVITY * C, d->gravity, sizeof d->gravity);
+        msfp_body_block_direction(p->body_values[k], p->sides[k], d->body[k], sides, to->body[k]);
+    }
+    for (int j = 0; j < NB; ++j) {
+        const int slider = msfp_slider(j);
+        const double *values = p->surface_values[j], *sign = p->surface[j] + MSFP_SURFACE_PARAMETERS_SIGN;
+        msfp_surface_block_direction(values, p->body_values[slider], sign, d->surface[j], d->body[slider], dsign,
+                                     to->surface[j]);
+    }
+    msfp_top_block_direction(p->top_values, p->around, d->top, around, to->top);
 }
 
 /* A history with other coefficients on the knots of `of`; none where index < 0. */
@@ -48,15 +72,17 @@ static msfp_history history(const msfp_history *of, const double *coefficients, 
 
 static void fill_group(const msfp_run *run, const msfp_gradient_inputs *in, int first, msfp_group *group)
 {
+    value_columns values = { .gravity = { 0.0 } };
     for (int c = 0; c < C && first + c < in->count; ++c) {
         const int i = first + c;
-        parameters(run, in, i, c, &group->parameters);
+        read_values(in, i, c, &values);
         group->motion[c] = history(&run->motion, in->motions, (int)in->motion[i]);
         group->load[c] = history(&run->load, in->loads, (int)in->load[i]);
         put_column(group->now.q[0][0], in->q + (size_t)i * NB * NQ, NB * NQ, c);
         put_column(group->now.v[0][0], in->v + (size_t)i * NB * NQ, NB * NQ, c);
         put_column(group->now.f[0][0], in->f + (size_t)i * NB * 2, NB * 2, c);
     }
+    parameters(&run->parameters, &values, &group->parameters);
 }
 
 int msfp_gradients_start(msfp_run *run, const msfp_gradient_inputs *in)

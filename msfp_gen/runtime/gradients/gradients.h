@@ -43,7 +43,8 @@ typedef struct {
     double force[MSFP_NB + 1][MSFP_FORCE_SIZE * MSFP_COLUMNS], moment[MSFP_NB + 1][MSFP_MOMENT_SIZE * MSFP_COLUMNS];
     double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
-    msfp_columns residual[MSFP_DOF], lock[MSFP_NB];
+    double lock[MSFP_NB][MSFP_LOCK_SIZE * MSFP_COLUMNS];
+    msfp_columns residual[MSFP_DOF];
     int base_moves; /* whether those of body 0 may differ from zero; 0 in a new work, which is zero */
 } msfp_work_columns;
 
@@ -95,10 +96,9 @@ void msfp_contact_columns(const msfp_parameters *p, const msfp_parameter_columns
 void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
                          msfp_columns *row);
-/* Columns of the energies of all masses and of the power of the base acceleration [MSFP_ENERGY_SIZE]. */
-void msfp_mechanical_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
-                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                             msfp_columns *energy);
+/* The block `closed_rim` of surface j; where its gap is closed with columns. */
+void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                             const msfp_work_columns *d, int j, double *closed, double *dclosed);
 /* Sliding displacements and gaps at given coordinates, and their columns. */
 void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
                        msfp_columns dq[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE],
@@ -108,7 +108,7 @@ void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *d
 
 typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
 
-/* Columns of the powers of one evaluation [W]; prescribed, load: parts of the input. */
+/* Columns of the powers of one evaluation [W], the block `works`; prescribed, load: parts of the input. */
 typedef struct {
     msfp_columns of[MSFP_WORKS], prescribed, load;
 } msfp_power_columns;
@@ -309,13 +309,8 @@ void msfp_heat_columns_point(const msfp_state_columns *ds, msfp_point_columns *d
 #define msfp_heat_columns_point(ds, dat) ((void)0)
 #endif
 
-/* ---- power_columns.c, work_columns.c: works of the energy balance, where they are asked for ---- */
+/* ---- observation.c, work_columns.c: works of the energy balance, where they are asked for ---- */
 
-/* Columns of the block `base_motion`. */
-void msfp_base_motion_columns(const msfp_point_columns *dat, double *dbase);
-/* Columns of energy and power of the rim of surface j [MSFP_RIM_ENERGY_SIZE][MSFP_COLUMNS]. */
-void msfp_rim_energy_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
-                             const msfp_work_columns *d, int j, double *energy);
 /* Columns of the powers at the evaluation in `w`, with all results of its contacts. */
 void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,

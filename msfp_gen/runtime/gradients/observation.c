@@ -1,4 +1,5 @@
-/* observation.c: directional derivatives of what a run records. */
+/* observation.c: directional derivatives of what a run records, and of the powers whose integrals are its works. Where a
+ * damper or a contact switches they are those of the branch taken. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("O3") /* vectorises loops over columns */
 #endif
@@ -7,7 +8,9 @@
 #include "gradients.h"
 
 #if MSFP_GRADIENTS
-#include "msfp_gradient_kernels.h"
+#include "msfp_directions.h"
+
+MSFP_STATIC_ASSERT(!MSFP_UPLIFT, gradients_of_energies); /* ModelSpec refuses it */
 
 /* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
  * centre, where its columns are zero. */
@@ -49,22 +52,53 @@ MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_para
     }
 }
 
-MSFP_COLUMNWISE void msfp_mechanical_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
-                                             const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
-                                             const msfp_work_columns *d, msfp_columns *energy)
+void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                             const msfp_work_columns *d, int j, double *closed, double *dclosed)
 {
-    double base[MSFP_BASE_MOTION_SIZE], dbase[MSFP_BASE_MOTION_SIZE * C];
-    msfp_columns one[MSFP_ENERGY_SIZE];
-    msfp_base_motion(at, base);
-    msfp_base_motion_columns(dat, dbase);
-    memset(energy, 0, MSFP_ENERGY_SIZE * sizeof *energy);
-    for (int k = 1; k <= NB + 1; ++k) {
-        if (k <= NB)
-            msfp_body_energy_direction(p->body[k], w->body[k], base, dp->body[k], d->body[k], dbase, one[0]);
-        else
-            msfp_top_energy_direction(p->top, w->body[NB], base, w->foot, dp->top, d->body[NB], dbase, d->foot, one[0]);
-        msfp_add_columns(energy, (const msfp_columns *)one, 1.0, MSFP_ENERGY_SIZE);
+    msfp_gap_of_rim(w, j, closed);
+#if MSFP_RIMS
+    double own[MSFP_RIM_SIZE * C];
+    const double *rim = d->rim[j];
+    if (w->rim_gap[j] >= 0.0)
+        return;
+    if (!w->rim_active[j]) {
+        msfp_rim_columns(p, dp, w, j, d, own);
+        rim = own;
     }
+    memcpy(dclosed + MSFP_CLOSED_RIM_G * C, rim + MSFP_RIM_G * C, C * sizeof *dclosed);
+    memcpy(dclosed + MSFP_CLOSED_RIM_DG * C, rim + MSFP_RIM_DG * C, C * sizeof *dclosed);
+#else
+    (void)p;
+    (void)dp;
+    (void)d;
+    (void)dclosed;
+#endif
+}
+
+/* What energies and powers are given beside the evaluation, and its columns. */
+static void set_observed(const msfp_point *at, const msfp_point_columns *dat, msfp_blocks *s, msfp_block_directions *ds)
+{
+    static const int first[3] = { MSFP_BASE_MOTION_OX, MSFP_BASE_MOTION_UX, MSFP_BASE_MOTION_BX };
+    msfp_set_observed(at, s);
+    for (int order = 0; order < 3; ++order)
+        msfp_put_polar(ds->base_motion + first[order] * C, dat->base[order]);
+    msfp_put_polar(ds->load_force, dat->load);
+    msfp_put_axial(ds->load_moment, dat->load + 3);
+#if MSFP_TOP_ROTATION
+    msfp_support_columns(at, dat, ds->upright);
+#endif
+}
+
+MSFP_COLUMNWISE void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp,
+                                            const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
+                                            const msfp_work_columns *d, msfp_power_columns *power)
+{
+    msfp_blocks s;
+    msfp_block_directions ds;
+    set_observed(at, dat, &s, &ds);
+    msfp_mechanical_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
+    msfp_powers_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
+    memcpy(power, ds.works, sizeof *power);
 }
 
 /* Quantities of surface j. */
@@ -73,7 +107,7 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
 {
     const double *contact = w->contact[j], *dcontact = d->contact[j];
     msfp_columns gap[MSFP_GAP_SIZE], *angles = row + MSFP_ROW_ANGLES + 2 * j, *slip = row + MSFP_ROW_SLIP + 2 * j;
-    double sliding[MSFP_GAP_SIZE], rim[MSFP_RIM_ENERGY_SIZE * C];
+    double sliding[MSFP_GAP_SIZE];
     memcpy(row[MSFP_ROW_NORMAL + j], dcontact + MSFP_CONTACT_N * C, sizeof *row);
     memset(angles[0], 0, sizeof *angles);
     memset(slip[1], 0, sizeof *slip);
@@ -99,16 +133,17 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
     msfp_get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
-    msfp_rim_energy_columns(p, dp, w, d, j, rim);
-    msfp_add_columns(&row[MSFP_ROW_RIM_STORED], (const msfp_columns *)rim + MSFP_RIM_ENERGY_STORED, 1.0, 1);
 }
 
 MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                          const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
                                          const msfp_work_columns *d, msfp_columns *row)
 {
-    msfp_columns energy[MSFP_ENERGY_SIZE], stored[MSFP_RESTRAINT_SIZE];
-    memset(row[MSFP_ROW_RIM_STORED], 0, sizeof *row); /* a sum; fields that the model lacks are zero from the start */
+    msfp_blocks s;
+    msfp_block_directions ds;
+    set_observed(at, dat, &s, &ds);
+    msfp_mechanical_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
+    msfp_springs_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
     memcpy(row + MSFP_ROW_Q, dat->q, sizeof dat->q);
     memcpy(row + MSFP_ROW_V, dat->v, sizeof dat->v);
     memcpy(row + MSFP_ROW_A, dat->a, sizeof dat->a);
@@ -126,17 +161,12 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
     msfp_get_polar(d->force[NB], row + MSFP_ROW_TOP_FORCE);
     for (int i = 0; i < MSFP_MOMENT_SIZE; ++i)
         memcpy(row[MSFP_ROW_TOP_MOMENT + (MSFP_PLANAR ? 1 : i)], d->moment[NB] + i * C, sizeof *row);
-#if MSFP_TOP_ROTATION
-    double upright[MSFP_UPRIGHT_SIZE], dupright[MSFP_UPRIGHT_SIZE * C];
-    msfp_support_axis(at, upright);
-    msfp_support_columns(at, dat, dupright);
+    memcpy(row[MSFP_ROW_RESTRAINT], ds.restraint + MSFP_RESTRAINT_STORED * C, sizeof *row);
+    memcpy(row[MSFP_ROW_TOP_SETTLEMENT], ds.restraint + MSFP_RESTRAINT_SETTLEMENT * C, sizeof *row);
+#if MSFP_RIMS
+    memcpy(row[MSFP_ROW_RIM_STORED], ds.rim_energy + MSFP_RIM_ENERGY_STORED * C, sizeof *row);
 #endif
-    msfp_restraint_direction(p->top, w->body[NB], w->foot MSFP_IF_TOP_ROTATION(upright), dp->top, d->body[NB],
-                             d->foot MSFP_IF_TOP_ROTATION(dupright), stored[0]);
-    memcpy(row[MSFP_ROW_RESTRAINT], stored[MSFP_RESTRAINT_STORED], sizeof *row);
-    memcpy(row[MSFP_ROW_TOP_SETTLEMENT], stored[MSFP_RESTRAINT_SETTLEMENT], sizeof *row);
-    msfp_mechanical_columns(p, dp, at, dat, w, d, energy);
-    memcpy(row[MSFP_ROW_KINETIC], energy[MSFP_ENERGY_KINETIC], sizeof *row);
-    memcpy(row[MSFP_ROW_POTENTIAL], energy[MSFP_ENERGY_POTENTIAL], sizeof *row);
+    memcpy(row[MSFP_ROW_KINETIC], ds.energy + MSFP_ENERGY_KINETIC * C, sizeof *row);
+    memcpy(row[MSFP_ROW_POTENTIAL], ds.energy + MSFP_ENERGY_POTENTIAL * C, sizeof *row);
 }
 #endif

@@ -218,7 +218,7 @@ static void moment_from_below(const msfp_work *w, double moment[3])
     for (int k = 1; k <= NB; ++k) {
         msfp_body_t3_get(w->body[k], axis);
         for (int i = 0; i < 3; ++i)
-            moment[i] += w->lock[k - 1] * axis[i];
+            moment[i] += w->lock[k - 1][MSFP_LOCK_MOMENT] * axis[i];
     }
 }
 

@@ -10,7 +10,7 @@
 #define PIECES 64
 #define LOAD 112e3
 
-static const double bodies[MSFP_NB + 1][MSFP_BODY_VALUES] = {
+static const double bodies[MSFP_NB + 1][MSFP_BODY_VALUES_SIZE] = {
     /* l, z, m, J transverse, J axial, r, p */
     { 0.013, 0.0065, 0.0, 0.0, 0.0, 0.0, 0.0 },
     { 0.015, 0.0075, 0.45, 3.01e-4, 5.85e-4, 0.051, 0.0028 },
@@ -18,7 +18,7 @@ static const double bodies[MSFP_NB + 1][MSFP_BODY_VALUES] = {
     { 0.015, 0.0075, 0.45, 3.01e-4, 5.85e-4, 0.051, 0.0028 },
     { 0.013, 0.0065, 8.0, 3.14e-2, 6.25e-2, 0.0, 0.0 },
 };
-static const double surfaces[MSFP_NB][MSFP_SURFACE_VALUES] = {
+static const double surfaces[MSFP_NB][MSFP_SURFACE_VALUES_SIZE] = {
     /* R, s_c, mu, d_y, k_c, c_c, T */
     { 0.473, 0.065, 0.03, 5e-5 / 0.473, 1e7, 5.0, 0.0 },
     { 0.076, 0.0215, 0.017, 5e-5 / 0.076, 1e7, 5.0, 0.0 },
@@ -26,7 +26,7 @@ static const double surfaces[MSFP_NB][MSFP_SURFACE_VALUES] = {
     { 0.473, 0.065, 0.107, 5e-5 / 0.473, 1e7, 5.0, 0.0 },
 };
 /* k, c, k_rot, c_rot; no mass, no anchor */
-static const double top[MSFP_TOP_VALUES] = { 1e8, 5.0, 1e6, 5.0 };
+static const double top[MSFP_TOP_VALUES_SIZE] = { 1e8, 5.0, 1e6, 5.0 };
 
 static void print(const char *name, const double *values, int count)
 {

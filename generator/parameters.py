@@ -1,0 +1,163 @@
+"""The parameters of bodies, surfaces and top, from the values of a scene as they cross to C (`contract.py`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from msfp_gen.specification import contract
+from msfp_gen.specification.layout import Effects
+from msfp_gen.specification.values import Value
+
+from .blocks import Blocks
+from .functions import Select
+from .program import Block, Field, Program
+
+Symbols = dict[str, Any]
+WIDEST = sp.Float("1.5")
+"""Largest half-angle of a footprint [rad]."""
+
+
+def _block(name: str, fields: Iterable[Field]) -> Block:
+    fields = tuple(fields)
+    return Block(name, fields, {field.name: (field.name,) for field in fields})
+
+
+def _values(kind: str, values: Iterable[Value], more: Iterable[Field] = ()) -> Block:
+    return _block(f"{kind}_values", (*(Field(v.name, v.unit, v.meaning) for v in values), *more))
+
+
+@dataclass(frozen=True)
+class ValueBlocks:
+    """The values of a scene as C receives them, and what bodies, surfaces and top take from their surroundings."""
+
+    body_values: Block
+    surface_values: Block
+    top_values: Block
+    sides: Block
+    side: Block
+    around: Block
+
+
+def value_blocks(effects: Effects, surface_parameters: Block) -> ValueBlocks:
+    """The values of a model; those of a surface end with the numbers of its friction law."""
+    law = () if effects.law is None else surface_parameters.fields[-len(effects.law.columns) :]
+    surface = contract.SURFACE + (contract.SURFACE_UPLIFT if effects.uplift else ())
+    gravity = Field("gravity", "m/s^2", "gravitational acceleration")
+    sides = (
+        Field("sign_lower", "-", "+1: the surface below is concave up, -1: concave down; 1 under the base"),
+        Field("sign_upper", "-", "of the surface above likewise; 1 on the top plate"),
+        Field("radius_lower", "m", "R of the surface below; 0 under the base"),
+        Field("radius_upper", "m", "R of the surface above; 0 on the top plate"),
+        gravity,
+    )
+    compliance = Field("compliance", "m/N", "of all unilateral contacts in series; 0 without uplift")
+    return ValueBlocks(
+        body_values=_values("body", contract.BODY),
+        surface_values=_values("surface", surface, law),
+        top_values=_values("top", contract.TOP),
+        sides=_block("sides", sides),
+        side=_block("side", (Field("sign", "-", "+1 concave up, -1 concave down"),)),
+        around=_block("around", (gravity, compliance)),
+    )
+
+
+def places(v: Symbols, s: Symbols) -> Symbols:
+    """Distances along t3 from the sphere centre below to the points of a body (3.4)-(3.11)."""
+    up = (1 + s["sign_lower"]) / 2
+    bottom = -s["sign_lower"] * s["radius_lower"]  # (3.5), (3.9)
+    centroid = up * v["centroid"] + (1 - up) * (v["height"] - v["centroid"])  # (3.6), (3.10)
+    top = bottom + v["height"]
+    return {"lo": bottom, "cm": bottom + centroid, "up": top, "sc": top + s["sign_upper"] * s["radius_upper"]}
+
+
+def body_block(b: Blocks, values: ValueBlocks) -> Program:
+    """Parameters of a body: distances along t3 from the positions (3.4)-(3.11), mass and moments of inertia."""
+    p = Program("body_block", "parameters of a body, from (3.4)-(3.11)")
+    v: Symbols = p.read(values.body_values, "b", active=False)
+    s: Symbols = p.read(values.sides, "s", active=False)
+    points = places(v, s)
+    p.write(
+        b.body_parameters,
+        {
+            "c": points["cm"],
+            "e": points["sc"],
+            "m": v["mass"],
+            "jt": v["inertia_transverse"],
+            "ja": v["inertia_axial"],
+            "g": s["gravity"],
+        },
+        tangents=False,
+    )
+    return p
+
+
+def surface_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
+    """Parameters of a surface, of which its slider gives the edge that meets the rim."""
+    p = Program("surface_block", "parameters of a surface; with uplift the half-angle of its footprint")
+    v: Symbols = p.read(given.surface_values, "v", active=False)
+    slider: Symbols = p.read(given.body_values, "s", active=False)
+    side: Symbols = p.read(given.side, "side", active=False)
+    values = {
+        "sign": side["sign"],
+        "R": v["radius"],
+        "sc": v["capacity"],
+        "mu": v["friction"],
+        "dy": v["yield_displacement"],
+        "td": v["contact_damping"],
+        "kc": v["rim_stiffness"],
+        "cc": v["rim_damping"],
+        "rs": slider["rim_radius"],
+        "pr": slider["rim_offset"],
+        **dict.fromkeys(("ks", "cs", "ca", "sa"), sp.Integer(0)),
+    }
+    if effects.uplift:
+        # The footprint bounds the contact position; friction inclines the resultant further by its angle.
+        friction = p.let(sp.atan(v["friction"]))
+        half = p.let(sp.asin(p.let(slider["rim_radius"] / v["radius"])) + friction)
+        half = p.let(Select(WIDEST - half, half, WIDEST))
+        values |= {"ks": v["seat_stiffness"], "cs": v["seat_damping"], "ca": sp.cos(half), "sa": sp.sin(half)}
+    law = effects.law
+    values |= {} if law is None else {name: v[name] for name in law.columns}
+    p.write(b.surface_parameters, values, tangents=False)
+    return p
+
+
+def top_block(b: Blocks, given: ValueBlocks, effects: Effects) -> Program:
+    """Parameters of the top. With uplift its given springs contain the unilateral contacts, in series (docs/uplift.md).
+
+    The damper loses as much in slow motion as the given one.
+    """
+    p = Program("top_block", "parameters of the top; with uplift its springs less the compliance of the contacts")
+    v: Symbols = p.read(given.top_values, "v", active=False)
+    around: Symbols = p.read(given.around, "a", active=False)
+    sprung = p.let(Select(v["vertical_stiffness"], 1, Select(v["vertical_damping"], 1, 0)))
+    anchor = (v["anchor_x"], v["anchor_y"], sp.Integer(0))
+    parts = b.top_parameters.quantities["x0"]
+    results = {
+        "kr": v["rotational_stiffness"],
+        "cr": v["rotational_damping"],
+        "m": v["mass"],
+        "jt": v["inertia_transverse"],
+        "ja": v["inertia_axial"],
+        "h": v["height"],
+        "g": around["gravity"],
+        "mz": Select(sprung, 0, v["mass"]),
+        "x0": tuple(x if isinstance(part, str) else part for x, part in zip(anchor, parts, strict=True)),
+    }
+    share = sp.Integer(1)
+    for prefix, names in (("", ("k", "c")), ("vertical_", ("kv", "cv"))):
+        stiffness, damping = v[f"{prefix}stiffness"], v[f"{prefix}damping"]
+        if effects.uplift:
+            share = p.let(1 - stiffness * around["compliance"])
+        results |= dict(zip(names, (stiffness / share, damping / share**2), strict=True))
+    p.write(b.top_parameters, {**results, "sr": 1 / share}, tangents=False)
+    return p
+
+
+def programs(b: Blocks, given: ValueBlocks, effects: Effects) -> list[Program]:
+    """The programs that make the parameters of a stack from the values of a scene."""
+    return [body_block(b, given), surface_block(b, given, effects), top_block(b, given, effects)]
