@@ -16,7 +16,7 @@ from .checks import checks_context
 from .derive import Equations
 from .drivers import schedule_context, scheduled_kernels
 from .gradients import COLUMNS, contact_lists
-from .header import environment, word_enums
+from .header import environment, public_header, word_enums
 from .heat import HEAT_KERNEL
 from .interface import interface_context, model_name
 from .lower import Kernel, jacobian_column, ordered_active_inputs
@@ -248,7 +248,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "columns": {"body": contract.names(contract.BODY), "top": contract.names(contract.TOP)},
         "names": {kind: tuple(name for name, *_ in entries) for kind, *_, entries in word_enums()},
         "rim_inputs": len(equations.blocks.rim_coordinates.fields),
-        **interface_context(spec, shape_of(spec)),
+        **interface_context(spec, shape_of(spec), public_header()),
         "checks": checks_context(spec),
         "scheduled": [function(k) for k in scheduled_kernels(equations)],
         "schedule": schedule_context(equations, directional),

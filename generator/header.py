@@ -55,6 +55,7 @@ def environment() -> Environment:
     )
 
 
+@cache
 def public_header() -> str:
     """Text of `msfp.h`, the same for every model."""
     context = {

@@ -11,6 +11,8 @@ from msfp_gen.specification import contract, rows
 from msfp_gen.specification.friction_laws import NUMBERS
 from msfp_gen.specification.values import Value
 
+from . import declarations
+
 if TYPE_CHECKING:
     from importlib.abc import Traversable  # in Python 3.14 importlib.resources.abc alone
 
@@ -67,8 +69,9 @@ def text_in_c(status: contract.Status) -> str:
     return text
 
 
-def interface_context(spec: ModelSpec, shape: Any) -> dict[str, Any]:
-    """What the templates of the public interface need; shape: of a quantity, in numbers."""
+def interface_context(spec: ModelSpec, shape: Any, header: str) -> dict[str, Any]:
+    """What the templates of the public interface need; shape: of a quantity, in numbers; header: text of `msfp.h`."""
+    symbols = runtime_symbols()
     lists = {"row": rows.row(spec.effects), "extremes": rows.extremes(spec.effects)}
     meanings = {"row": "One row of output", "extremes": "Extremes of a run over all of its accepted steps"}
     values = {
@@ -80,13 +83,27 @@ def interface_context(spec: ModelSpec, shape: Any) -> dict[str, Any]:
         "name": model_name(spec),
         "abi": ABI_VERSION,
         "errors": CALL_ERRORS,
-        "symbols": runtime_symbols(),
+        "symbols": symbols,
+        "api_functions": list(_api_functions(spec, set(symbols), header)),
+        "cython_declarations": declarations.cython(header),
         "effects_text": effects_text(spec),
         "coordinates": 6 if spec.effects.uplift else 3,
         "value_lists": [(kind, text, entries) for kind, (text, entries) in values.items()],
         "quantity_lists": [(kind, meanings[kind], [(q, shape(q)) for q in fields]) for kind, fields in lists.items()],
         "status_texts": [text_in_c(status) for status in contract.STATUSES if status.compiled],
     }
+
+
+def _api_functions(spec: ModelSpec, symbols: set[str], header: str) -> Iterator[tuple[str, str]]:
+    """The functions of the table of a model and those of the runtime behind them; of gradients where it has them."""
+    for name in declarations.functions(header):
+        own = [symbol for symbol in (f"msfp_api_{name}", f"msfp_{name}") if symbol in symbols]
+        if own and (spec.gradients or not name.startswith("gradient")):
+            yield name, own[0]
+        elif name.startswith("status"):
+            yield name, name  # of table.c
+        elif not own:
+            raise AssertionError(f"no header of the runtime declares msfp_api_{name} or msfp_{name}")
 
 
 def _files(folder: Traversable, suffix: str) -> Iterator[Traversable]:

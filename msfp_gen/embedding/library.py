@@ -102,7 +102,8 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform,
 
 def _content(models: dict[str, ModelSpec], platform: Platform, target: str | None) -> dict[str, Any]:
     """What the templates need."""
-    from msfp_gen.generator.header import word_enums  # it imports SymPy
+    from msfp_gen.generator import declarations
+    from msfp_gen.generator.header import public_header, word_enums  # it imports SymPy
 
     modules = [
         {
@@ -124,6 +125,7 @@ def _content(models: dict[str, ModelSpec], platform: Platform, target: str | Non
         "body": contract.names(contract.BODY),
         "top": contract.names(contract.TOP),
         "words": word_enums(),
+        "types": declarations.fortran(public_header()),
         "errors": CALL_ERRORS,
         "static": STATIC,
         "platform": platform,

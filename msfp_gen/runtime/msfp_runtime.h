@@ -72,8 +72,6 @@ enum {
 /* Blocks of parameters: msfp_model.h names their entries and units. */
 typedef struct {
     double gravity; /* [m/s^2] */
-    double body_values[MSFP_NB + 1][MSFP_BODY_VALUES_SIZE], surface_values[MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
-    double top_values[MSFP_TOP_VALUES_SIZE], sides[MSFP_NB + 1][MSFP_SIDES_SIZE], around[MSFP_AROUND_SIZE];
     double body[MSFP_NB + 1][MSFP_BODY_PARAMETERS_SIZE];
     double surface[MSFP_NB][MSFP_SURFACE_PARAMETERS_SIZE];
     double lanes[MSFP_SURFACE_PARAMETERS_SIZE][MSFP_LANES]; /* the parameters of the surfaces, [parameter][surface] */
@@ -81,6 +79,9 @@ typedef struct {
     double rim_cosine[MSFP_NB]; /* cos(s_c/R), the cosine of the tilt at which the rim is met; 2: it holds the slider */
     double rim_slope[MSFP_NB];  /* d gap/d cosine at that tilt [m] */
     double weight;              /* of the moving bodies and the supported mass [N] */
+    /* The values that these are made of, some of which are not used; they come last. */
+    double body_values[MSFP_NB + 1][MSFP_BODY_VALUES_SIZE], surface_values[MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
+    double top_values[MSFP_TOP_VALUES_SIZE], sides[MSFP_NB + 1][MSFP_SIDES_SIZE], around[MSFP_AROUND_SIZE];
 } msfp_parameters;
 
 /* Fill `p`. gravity [m/s^2]; bodies [MSFP_NB + 1][MSFP_BODY_VALUES_SIZE]; surfaces [MSFP_NB][MSFP_SURFACE_VALUES_SIZE];
@@ -430,7 +431,7 @@ void msfp_snapshot_write(const msfp_run *run, long rows, void *snapshot);
  * other bytes; `run` is then unchanged. */
 int msfp_snapshot_read(msfp_run *run, const void *snapshot, size_t size);
 /* Forget all rows but the last, which the caller has stored elsewhere. */
-void msfp_drop_rows(msfp_run *run);
+void msfp_run_drop_rows(msfp_run *run);
 /* Record the present state unless it is the last row. Returns MSFP_OK or MSFP_E_MEMORY. */
 int msfp_write_now(msfp_run *run);
 /* Release rows and events. */

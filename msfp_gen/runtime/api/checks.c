@@ -273,7 +273,7 @@ uint64_t msfp_identity(const msfp_scene *s)
 {
     static const char model[] = MSFP_VERSION " " MSFP_SPEC;
     uint64_t sum = msfp_hash(MSFP_HASH_START, model, sizeof model);
-    sum = msfp_hash(sum, &s->bearing->parameters, sizeof s->bearing->parameters); /* numbers alone */
+    sum = msfp_hash(sum, &s->bearing->parameters, offsetof(msfp_parameters, body_values)); /* numbers alone */
     for (size_t i = 0; i < COUNT(msfp_scene_ranges); ++i)
         sum = hash_number(sum, number_at(s, msfp_scene_ranges[i].at));
     for (size_t i = 0; i < COUNT(switches); ++i)

@@ -127,7 +127,7 @@ static int deliver(msfp_run *run)
     if (begin < count)
         ended = run->callback(run->user, (const double *)(run->rows + begin), count - begin);
     run->rows_taken = run->rows_before + count;
-    msfp_drop_rows(run);
+    msfp_run_drop_rows(run);
     return ended;
 }
 

@@ -99,7 +99,7 @@ double msfp_next_output(const msfp_run *run)
     return step * (floor(run->options.start_time / step + 1e-9) + (double)(run->rows_before + run->row_count));
 }
 
-void msfp_drop_rows(msfp_run *run)
+void msfp_run_drop_rows(msfp_run *run)
 {
     if (run->row_count < 2)
         return;

@@ -292,7 +292,7 @@ def structs_of_fortran(text: str) -> dict[str, list[tuple[str, str]]]:
         members = []
         for line in filter(None, (part.strip() for part in body.splitlines())):
             kind, _, declared = line.partition(" :: ")
-            plain = re.sub(r"\([\d, ]+\)|= *\w+", "", declared)
+            plain = re.sub(r"\([\d, ]+\)|= *[\w.]+", "", declared)
             members += [(member.strip(), kind) for member in plain.split(",")]
         found[name] = members
     return found
