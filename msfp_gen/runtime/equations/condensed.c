@@ -1,5 +1,8 @@
 /* condensed.c: the condensed equations: angular balances with interface forces summed from the top down. How they are
  * evaluated is emitted from generator/schedule.py. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* unrolls the loops over bodies and surfaces */
+#endif
 #include <math.h>
 #include <string.h>
 #include "equations.h"

@@ -5,6 +5,9 @@
  * g, and mu from its law: two or three local unknowns, from which f follows. They are eliminated from the tangent of
  * the moment and of N by their consistent tangent.
  */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* unrolls the loops over surfaces */
+#endif
 #include <math.h>
 #include <string.h>
 #include "equations.h"
