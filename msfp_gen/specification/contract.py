@@ -232,7 +232,7 @@ STATUSES = (
         "newton",
         "Newton's method did not converge at the smallest step; the bearing may have jammed",
         "Newton's method did not converge at the smallest step: the bearing may have jammed (docs/model.md); "
-        "lower the friction or the motion",
+        "lower the friction or the motion, or give a larger solver.rtol where it is small",
         "Newton's method found no accelerations; the state may be beyond what the bearing can carry",
         quantity="residual",
         motion=True,

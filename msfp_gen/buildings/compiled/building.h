@@ -24,6 +24,7 @@ typedef struct {
     int status;
     double wrench[2 * MSFP_WRENCH], derivative[MSFP_WRENCH * MSFP_WRENCH], rest[MSFP_WRENCH];
     double ends[2 * 3 * MSFP_WRENCH];
+    double previous[MSFP_WRENCH]; /* of its upper end, before the last iteration */
     double error, share; /* of the step */
     double *row;         /* of its model, at the end of the last step */
 } member;

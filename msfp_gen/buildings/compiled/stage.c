@@ -108,6 +108,7 @@ static void solve_bearing(msfp_building *b, int bearing)
     const msfp_part *part = &b->scene.parts[bearing];
     const int r = b->scene.attachments;
     set_ends(b, bearing, b->scratch, b->x, b->scratch + r);
+    memcpy(m->previous, m->wrench + MSFP_WRENCH, sizeof m->previous);
     m->status = part->api->port_stage(part->port, b->solving, m->ends, m->wrench);
 }
 
@@ -133,6 +134,24 @@ int first_failure(msfp_building *b)
         }
     b->bearing = 0;
     return MSFP_OK;
+}
+
+/* The bearing, from 1, whose force has changed most in the last iteration. */
+static int most_unsettled(const msfp_building *b)
+{
+    double most = -1.0;
+    int bearing = 0;
+    for (int j = 0; j < b->scene.bearings; ++j) {
+        const member *m = &b->members[j];
+        double size = 0.0;
+        for (int k = 0; k < 3; ++k)
+            size += fabs(m->wrench[MSFP_WRENCH + k] - m->previous[k]);
+        if (size > most) {
+            most = size;
+            bearing = j + 1;
+        }
+    }
+    return bearing;
 }
 
 /* ---- Newton's method ---- */
@@ -236,8 +255,10 @@ static int newton(msfp_building *b, double beta)
     for (int i = 0; size > goal; ++i) {
         if (!(size < INFINITY))
             return b->bearing ? b->members[b->bearing - 1].status : MSFP_E_FINITE;
-        if (i >= MOST_ITERATIONS)
+        if (i >= MOST_ITERATIONS) {
+            b->bearing = most_unsettled(b);
             return MSFP_E_NEWTON;
+        }
         fresh |= b->tangent_beta == 0.0;
         if (fresh)
             status = differentiate(b, beta);

@@ -143,6 +143,12 @@ def test_equal_motions_of_the_supports_are_the_common_motion():
     assert moved.axial_force.min() > 0.5 * LOAD
 
 
+def test_where_the_building_does_not_converge_a_bearing_is_named():
+    """All bearings follow, but their forces do not settle within a tolerance below the rounding of their equations."""
+    with pytest.raises(RunError, match=r"^bearing [1-4].*Newton's method did not converge .* larger solver\.rtol"):
+        simulate(replace(EVENTFUL, solver=replace(EVENTFUL.solver, rtol=1e-13)))
+
+
 def test_a_run_that_fails_before_its_first_row_has_no_result(monkeypatch):
     """A result without rows would have no summary and no figure."""
 

@@ -57,8 +57,9 @@ def test_header_lays_out_values_and_rows_in_order(effects: dict[str, object]) ->
         ("surface", contract.surface_values(given)),
         ("top", names(contract.TOP)),
     ):
-        expected = [f"MSFP_{kind}_VALUE_{name}".upper() for name in columns]
-        assert enum(header, f"{kind}_value") == [*expected, f"MSFP_{kind.upper()}_VALUES"]
+        (block,) = re.findall(rf"^/\* {kind}_values \*/\nenum \{{\n(.*?)^\}};", header, re.DOTALL | re.MULTILINE)
+        expected = [(f"MSFP_{kind}_VALUES_{name}".upper(), str(i)) for i, name in enumerate((*columns, "size"))]
+        assert re.findall(r"^    (\w+) = (\d+)", block, re.MULTILINE) == expected
     row = [quantity.name for quantity in rows.row(given)]
     assert enum(header, "row_field") == [*(f"MSFP_ROW_{name.upper()}" for name in row), "MSFP_ROW_SIZE"]
     asserted = re.findall(r"^MSFP_STATIC_ASSERT\(offsetof\(msfp_row, (\w+)\)", header, flags=re.MULTILINE)
