@@ -62,6 +62,7 @@ MEANINGS = {
     "solver": "Settings of the integration: `[solver]`.",
     "initial_state": "State at the start: `[initial_state]`; without it centred and at rest.",
     "stop": "Conditions that end the run early: `[stop]`.",
+    "fidelity": "A cheaper model of this scene ([fidelity.md](fidelity.md)).",
     "limits": "Limits of the device, with which the verdict of a run compares: `[limits]` ([limits.md](limits.md)).",
     "scene.duration": "Length of the run; without it that of the motion.",
     "output_step": "Distance of the rows of results; without it every step of the solver.",

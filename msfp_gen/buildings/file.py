@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msfp_gen.buildings.building import Building
+from msfp_gen.buildings.fidelity import building_at_fidelity
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
 from msfp_gen.buildings.soil import Soil
 from msfp_gen.buildings.storey import BaseSlab, Storey
@@ -22,6 +23,7 @@ from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table
 from msfp_gen.scene.file.motion_tables import KINDS, Paths, located, paths_in, resolved
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.limits import Limits
+from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
@@ -104,8 +106,11 @@ COMMON = ("interface", "soil", "effects")  # tables of [building] for all bearin
 
 def building_from_table(
     table: Mapping[str, Any], folder: Path | None = None, motion: Motion | None = None
-) -> BuildingScene:
-    """The building of a plain table, as in a file; folder, motion: as in `scene_from_table`. Raises InputError."""
+) -> BuildingScene | Scene:
+    """The building of a plain table, as in a file; folder, motion: as in `scene_from_table`. Raises InputError.
+
+    A `Scene` where the table has fidelity = "equivalent".
+    """
     still = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
     given = validate(_SCENE, table if motion is None else {**table, "motion": still}, TABLES)
     frame, named = given.pop("building"), given.pop("bearings", {})
@@ -117,7 +122,8 @@ def building_from_table(
     parts["bearings"] = [
         _bearing({**common, **row}, f"building.bearing[{index}]", named, folder) for index, row in rows
     ]
-    return BuildingScene(**given, **parts)
+    word = given.pop("fidelity", "exact")
+    return building_at_fidelity(BuildingScene(**given, **parts), word)
 
 
 def _building(given: Table, folder: Path | None) -> Building:

@@ -9,6 +9,7 @@ from msfp_gen.buildings.plausibility import building_doubts
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
 from msfp_gen.results.note import RISING, Note
 from msfp_gen.scene.effect_selection import doubtful_values
+from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import unsteady
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
@@ -32,6 +33,7 @@ def notes_of(scene: BuildingScene, monitored: Sequence[Note], error: float, time
     notes = [*values, *_gathered(monitored)]
     labelled = [replace(note, text=f"{scene.label(note.bearing - 1)}: {note.text}") for note in notes]
     whole = [Note(0.0, "value", *doubt) for doubt in building_doubts(scene)]
+    whole += [Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity])] if scene.fidelity in UNSEEN else []
     return tuple(sorted([*labelled, *whole, *_energy(error, time)], key=lambda note: note.time))
 
 

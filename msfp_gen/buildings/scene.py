@@ -20,6 +20,7 @@ from msfp_gen.scene.bearing import Bearing
 from msfp_gen.scene.effect_selection import GIVEN, EffectSelection, Reason
 from msfp_gen.scene.friction_parameters import select_friction
 from msfp_gen.scene.limits import Limits
+from msfp_gen.scene.scene_fields import Fidelity
 from msfp_gen.scene.seats import check_seats
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.standing import check_standing, needed_rotational_stiffness
@@ -96,8 +97,8 @@ class BuildingScene:
     building; bearings: at least one, of any layouts. motion: of the ground, from rest, in translation; displacements
     count from the start. solver: of steps that the building and all bearings take together. duration [s]; None: that of
     the motion. output_step: between rows, at which steps end [s]; None: 10 ms. limits: of its bearings, for the verdict
-    of the run; None: those of `Limits()`. Raises InputError: inconsistent parts, or weights that the bearings do not
-    balance.
+    of the run; None: those of `Limits()`. fidelity: the level at which it was made, for its notes. Raises InputError:
+    inconsistent parts, or weights that the bearings do not balance.
     """
 
     building: Building
@@ -108,6 +109,7 @@ class BuildingScene:
     name: str = ""
     output_step: Annotated[float | None, Quantity("s", above=0.0)] = None
     limits: Limits | None = field(default=None, metadata=NO_NUMBERS)
+    fidelity: Fidelity = field(default="exact", metadata=NO_NUMBERS)
 
     def __post_init__(self) -> None:
         require_type(self.building, Building, "scene.building")

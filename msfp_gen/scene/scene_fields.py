@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any
 
-from msfp_gen.common.fields import Quantity, check_fields
+from msfp_gen.common.fields import Choice, Quantity, check_fields
 from msfp_gen.common.identity import NO_NUMBERS
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
@@ -23,6 +23,14 @@ from msfp_gen.specification.layout import Auto, Effects
 from msfp_gen.specification.values import rules
 
 _RUN = rules((*contract.RUN, *contract.ARRAYS))
+FIDELITIES = {
+    "exact": "the scene as it is given",
+    "loose": "a loose tolerance",
+    "massless": "sliders without inertia, at a loose tolerance",
+    "equivalent": "one pendulum with the main regime of the published backbone",
+    "rigid": "of a building: one rigid body on massless bearings",
+}
+Fidelity = Annotated[str, Choice(FIDELITIES)]
 Triples = tuple[tuple[float, float, float], ...]
 Pairs = tuple[tuple[float, float], ...]
 
@@ -81,6 +89,7 @@ class SceneFields:
     top_rotation: Rotation | None = None
     name: str = ""
     limits: Limits | None = field(default=None, metadata=NO_NUMBERS)
+    fidelity: Fidelity = field(default="exact", metadata=NO_NUMBERS)
     motion_table: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from msfp_gen.results.geometry.shape import contact_offsets
 from msfp_gen.results.note import Note
 from msfp_gen.results.sliding import intervals, sliding_surfaces
 from msfp_gen.scene.effect_selection import rigid_mass_limit, scene_doubts
+from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.specification.hysteresis import is_plastic
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ TEXTS = {
 
 def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
     """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
-    doubts = tuple(Note(0.0, "value", *doubt) for doubt in scene_doubts(scene))
+    unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
+    doubted = () if scene.fidelity == "equivalent" else scene_doubts(scene)
+    doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in doubted)
     physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
     physics += peak_notes(scene, effects, history)
     numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)

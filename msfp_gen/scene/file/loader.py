@@ -15,6 +15,7 @@ from msfp_gen.common.inputs import Kept, is_input, read_input
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file import catalogue, schema
 from msfp_gen.scene.file.motion_tables import KINDS, Pieces, located
 from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
@@ -106,7 +107,9 @@ def scene_from_table(
     parts["bearing"] = _bearing(valid["bearing"])
     parts["top"] = _TOPS[top.pop("kind")](**top)
     parts["motion"] = _motion(motion_keys) if motion is None else motion
-    return Scene(**{**valid, **parts, "motion_table": motion_keys if motion is None else motion_table})
+    word = valid.pop("fidelity", "exact")
+    scene = Scene(**{**valid, **parts, "motion_table": motion_keys if motion is None else motion_table})
+    return at_fidelity(scene, word)
 
 
 def bearing_from_table(table: Mapping[str, Any]) -> Bearing:

@@ -11,9 +11,9 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.scene.backbone import Link, series_links
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.specification.layout import Layout
-from msfp_gen.studies.accuracy.series import Link, Series
 from msfp_gen.studies.accuracy.timed_run import OK, Trial, comparison_times, require_base_motion_only
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _links(scene: Scene) -> tuple[Link, Link, Link]:
         raise InputError("bearing.layout: TripleFrictionPendulum has four surfaces, (5, 2, 2)")
     if not _load(scene):
         raise InputError("top: TripleFrictionPendulum needs a rig, or a mass with weight, for its axial load; give one")
-    links = {link.surface: link for link in Series(scene.bearing, rims=True).links}
+    links = {link.surface: link for link in series_links(scene.bearing, rims=True, arms=False)}
     if links[1].friction != links[2].friction or abs(links[1].effective / links[2].effective - 1) > 1e-9:
         raise InputError("bearing.surfaces: TripleFrictionPendulum needs equal inner surfaces")
     return links[0], links[3], links[1]

@@ -10,7 +10,6 @@ analysis programs use the same model.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from math import hypot
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
+from msfp_gen.scene.backbone import Link, series_links
 from msfp_gen.scene.top import MassTop, PrescribedTop, RigTop
 from msfp_gen.studies.accuracy.timed_run import OK, ROWS, Trial, comparison_times, require_base_motion_only
 
@@ -30,41 +30,14 @@ ROUNDING = 1e-4  # radius over which the corner at the onset of sliding is round
 RESIDUAL_TOLERANCE = 1e-9  # [m]
 
 
-@dataclass(frozen=True)
-class Link:
-    """One surface of the series. Horizontal vectors are complex numbers.
-
-    Attributes:
-        outside: index of the next link outwards; None at a plate.
-        surface: index of the surface, from 0.
-        radius: radius of the surface [m].
-        effective: effective radius, from the sphere centre to the pivot [m].
-        share: effective radius less that of the next link inwards [m].
-        friction: friction coefficient [-].
-        limit: largest tilt relative to the next link outwards, at rim contact [rad].
-        yielding: yield displacement [m].
-        rim: rim stiffness [N/m].
-    """
-
-    outside: int | None
-    surface: int
-    radius: float
-    effective: float
-    share: float
-    friction: float
-    limit: float
-    yielding: float
-    rim: float
-
-
 class Series:
     """A linearised bearing and its current tilts, outermost links first.
 
-    rims: whether capacity limits the tilts. arms: whether friction acts at the radius of its surface (`_links`).
+    rims: whether capacity limits the tilts. arms: whether friction acts at the radius of its surface (`series_links`).
     """
 
     def __init__(self, bearing: Bearing, rims: bool, arms: bool = False) -> None:
-        self.links = _links(bearing, rims, arms)
+        self.links = series_links(bearing, rims, arms)
         self.tilts = [0j] * len(self.links)
 
     def displacement(self, force: complex, load: float) -> tuple[complex, list[complex]]:
@@ -152,49 +125,8 @@ def _newton_step(column_x: complex, column_y: complex, value: complex) -> comple
     return complex(x, y)
 
 
-def _links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
-    """Links of both chains, from the plates inwards. The pivot is the middle of the innermost slider.
-
-    arms: friction acts at the radius of its surface, not at the effective radius (docs/devices.md), so a surface slides
-    from F = (mu R - mu' R')/(R_eff - R_eff') on, with ' for the next surface inwards.
-    """
-    layout, surfaces = bearing.layout, bearing.surfaces
-    tops = np.cumsum([bearing.base_height, *(body.height for body in bearing.bodies)])
-    centres = [tops[k] + sign * surfaces[k].radius for k, sign in enumerate(layout.signs)]
-    if layout.m and layout.p:
-        pivot = tops[layout.m] - bearing.bodies[layout.m - 1].height / 2
-    else:  # one chain: the pivot is the top of the stack, or its bottom
-        pivot = tops[-1] if layout.m else 0.0
-    links: list[Link] = []
-    for chain in (range(layout.m), range(layout.surfaces - 1, layout.m - 1, -1)):
-        effective = [float(abs(centres[k] - pivot)) for k in chain]
-        for place, k in enumerate(chain):
-            surface = surfaces[k]
-            limit = surface.capacity / surface.radius if rims else float("inf")
-            inner_radius, inner_moment = 0.0, 0.0  # effective radius, and mu R, of the next surface inwards
-            if place + 1 < len(effective):
-                inner = surfaces[chain[place + 1]]
-                inner_radius, inner_moment = effective[place + 1], inner.friction * inner.radius
-            share = effective[place] - inner_radius
-            friction = (surface.friction * surface.radius - inner_moment) / share if arms else surface.friction
-            links.append(
-                Link(
-                    len(links) - 1 if place else None,
-                    k,
-                    surface.radius,
-                    effective[place],
-                    share,
-                    friction,
-                    limit,
-                    surface.yield_displacement,
-                    surface.rim_stiffness,
-                )
-            )
-    return links
-
-
 def run_series(scene: Scene, steps: int, arms: bool = False) -> Trial:
-    """Run `scene` by the linearised bearing in `steps` equal steps; `arms` as in `_links`.
+    """Run `scene` by the linearised bearing in `steps` equal steps; `arms` as in `series_links`.
 
     Raises InputError for a prescribed load, or a rig without axial load or stiffness.
     """

@@ -1,0 +1,123 @@
+"""Cheaper models of a scene: its backbone, its equivalent pendulum, and what their runs say they cannot see."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from msfp_gen import InitialState, InputError, changed_scene, load_scene, simulate
+from msfp_gen.buildings.fidelity import building_at_fidelity
+from msfp_gen.scene.backbone import Backbone
+from msfp_gen.scene.fidelity import LOOSE, at_fidelity, equivalent_pendulum, main_regime
+from msfp_gen.scene.file.loader import bearing_from_table
+
+PRESETS = ("fenz-tfp", "single-fp", "single-articulated-fp", "double-fp", "double-articulated-fp", "quintuple-fp")
+
+
+def bearing(name):
+    return bearing_from_table({"preset": name})
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_backbone_inverts_the_sum_of_its_tilts(name):
+    backbone = Backbone.of(bearing(name))
+    u, force = backbone.points
+    assert (np.diff(u) > 0).all() and (np.diff(force) > 0).all() and u[0] == 0
+    assert [backbone.displacement(f) for f in force] == pytest.approx(u, abs=1e-15)
+    middle = (u[1:] + u[:-1]) / 2
+    assert [backbone.displacement(f) for f in backbone.force(middle)] == pytest.approx(middle, rel=1e-12)
+
+
+def test_the_backbone_is_the_published_formula_of_the_triple_pendulum():
+    """Fenz and Constantinou (2008): the regime in which both outer surfaces slide has the slope of their radii."""
+    tfp = bearing("fenz-tfp")
+    friction, radius, _ = main_regime(Backbone.of(tfp))
+    outer = tfp.surfaces[0].radius - tfp.bodies[0].height - tfp.bodies[1].height / 2
+    assert radius == pytest.approx(2 * outer, rel=1e-12)
+    moment = sum(surface.friction * surface.radius for surface in (tfp.surfaces[0], tfp.surfaces[3]))
+    assert friction == pytest.approx(moment / (2 * outer), rel=1e-12)
+
+
+def test_sliding_of_every_surface_ends_at_its_capacity():
+    tfp = bearing("fenz-tfp")
+    backbone = Backbone.of(tfp)
+    assert backbone.sliding(backbone.capacity) == pytest.approx([surface.capacity for surface in tfp.surfaces])
+    assert backbone.sliding(0.0) == [0.0] * 4
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_equivalent_pendulum_of_a_pendulum_keeps_the_line(name):
+    """The main regime of the pendulum that is made is that of the stack; so it is its own equivalent."""
+    stack = bearing(name)
+    one = equivalent_pendulum([stack], [1.0])
+    given, made = main_regime(Backbone.of(stack)), main_regime(Backbone.of(one))
+    assert made[:2] == pytest.approx(given[:2], rel=2e-3)
+    two = equivalent_pendulum([stack, stack], [0.5, 0.5])
+    assert two.surfaces[0].friction == pytest.approx(one.surfaces[0].friction)
+    assert two.surfaces[0].rim_stiffness == 2 * one.surfaces[0].rim_stiffness
+
+
+@pytest.mark.parametrize("word", ["loose", "massless", "equivalent"])
+def test_each_level_runs_alone_and_says_what_it_cannot_see(word):
+    scene = changed_scene("fenz-test2", {"fidelity": word})
+    exact = simulate(load_scene("fenz-test2"))
+    run = simulate(scene)
+    notes = [note.text for note in run.notes if note.kind == "fidelity"]
+    assert run.status == "ok" and len(notes) == 1 and f"fidelity = '{word}'" in notes[0]
+    assert scene.solver.rtol == LOOSE
+    for name, within in (("peak_displacement", 5e-3), ("peak_force", 0.08)):
+        assert run.summary[name]["radial"] == pytest.approx(exact.summary[name]["radial"], rel=within)
+
+
+def test_a_reduced_scene_is_written_and_read_as_it_is(tmp_path):
+    run = simulate(changed_scene("fenz-test2", {"fidelity": "equivalent"}))
+    path = run.to_netcdf(tmp_path / "run.nc")
+    again = type(run).from_netcdf(path)
+    assert again.scene.bearing == run.scene.bearing and again.notes == run.notes
+
+
+BAD = {
+    "unknown": ({"fidelity": "cheap"}, "fidelity = 'cheap'"),
+    "loose already": ({"fidelity": "loose", "solver.rtol": 0.05}, "solver.rtol = 0.05 already"),
+    "rigid": ({"fidelity": "rigid"}, "one bearing has no such model"),
+    "prescribed": (
+        {"fidelity": "equivalent", "top": {"kind": "prescribed", "force": [0.0, 0.0, -1e5]}},
+        "it needs a top of kind 'rig' or 'mass'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_levels_are_one_line(case):
+    changes, text = BAD[case]
+    with pytest.raises(InputError, match=text) as error:
+        changed_scene("fenz-test2", changes)
+    assert "\n" not in str(error.value)
+
+
+def test_an_initial_state_has_no_equivalent():
+    scene = load_scene("fenz-test2")
+    state = {"q": [[0.0] * 3] * 4, "v": [[0.0] * 3] * 4, "h": [[0.0] * 2] * 4}
+    scene = replace(scene, initial_state=InitialState(**state))
+    with pytest.raises(InputError, match="leave initial_state out"):
+        at_fidelity(scene, "equivalent")
+
+
+def test_a_rigid_building_keeps_mass_weight_and_loads():
+    scene = load_scene("hospital-clc")
+    rigid = building_at_fidelity(scene, "rigid")
+    assert rigid.building.mass.shape == (6, 6) and not rigid.building.stiffness.any()
+    assert rigid.weight == pytest.approx(scene.weight, rel=1e-9)
+    assert rigid.axial_loads.sum() == pytest.approx(scene.axial_loads.sum(), rel=1e-9)
+    one = building_at_fidelity(scene, "equivalent")
+    assert one.top.mass * scene.gravity == pytest.approx(scene.weight, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["rigid", "equivalent", "massless"])
+def test_levels_of_a_building(word):
+    changes = {"motion.duration": 6.0, "motion.scale": 0.5}
+    exact = simulate(changed_scene("hospital-clc", changes))
+    run = simulate(changed_scene("hospital-clc", {**changes, "fidelity": word}))
+    assert run.status == "ok" and "fidelity" in [note.kind for note in run.notes]
+    assert run.summary["peak_force"]["radial"] == pytest.approx(exact.summary["peak_force"]["radial"], rel=0.3)
