@@ -287,9 +287,9 @@ def _rims(new: Maker, uplift: bool) -> dict[str, Block]:
         "unilateral": new("unilateral")
         .vector("F", "N", "force on the body above, along E1, E2, E3", POLAR)
         .vector("T", "N m", "moment on the slider about its sphere centre, while it stands on its edge", AXIAL)
-        .scalar("grip", "-", "1 + damping share of the force; where it is not positive the contact is open")
         .scalar("stored", "J", "elastic energy")
         .scalar("lost", "W", "power dissipated; where the contact lets go, what its spring releases")
+        .scalar("penetration", "m", "of the slider, positive")
         .build(),
     }
 

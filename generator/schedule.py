@@ -183,7 +183,7 @@ LISTS: Mapping[str, List] = {
     "shear": List("shear", "shear", length=SURFACES),
     "contact": List("contact", "contact", Kept.WORK, SURFACES, directions=True),
     "local_moment": List("moment", "local_moment", length=SURFACES),
-    "unilateral": List("unilateral", "unilateral", Kept.WORK, SURFACES),
+    "unilateral": List("unilateral", "unilateral", Kept.WORK, SURFACES, directions=True),
     "rim_wrench": List("rim_wrench", "rim_wrench", Kept.WORK, SURFACES),
     "carried": List("vector", "carried", length=BODIES),
     "excess": List("linear", "excess", length=SURFACES),

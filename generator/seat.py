@@ -20,6 +20,8 @@ from .program import Program, Vector
 from .vectors import add, combine, cross, dot, scale, subtract
 
 Symbols = dict[str, Any]
+CENTRE = sp.Float("1e-60")
+"""Added to a squared length [m^2]: where the length is zero, its derivative is zero, and no value changes."""
 
 
 def _compression(x: Symbols) -> Vector:
@@ -36,7 +38,7 @@ def _at_edge(p: Program, par: Symbols, axis: Vector, s: Vector) -> tuple[sp.Expr
     """Penetration at the edge of the footprint; part of s across the axis, its size, and the part along the axis."""
     along = p.let(dot(s, axis))
     across = p.let_vector(add(s, scale(-along, axis)), "across")
-    size = p.let(sp.sqrt(dot(across, across)))
+    size = p.let(sp.sqrt(dot(across, across) + CENTRE))
     return par["ca"] * along + par["sa"] * size, across, size, along
 
 
@@ -54,16 +56,17 @@ def _write_force(p: Program, b: Blocks, par: Symbols, depth: sp.Expr, normal: Ve
     """Force ks depth (1 + cs d depth/dt) along `normal` (Hunt and Crossley 1975) with its moment and energies."""
     rate = p.rate(depth)
     grip = p.let(1 + par["cs"] * rate)
+    pushing = p.let(Step(grip) * grip)  # its damping does not pull
     elastic = p.let(par["ks"] * depth)
-    force = p.let_vector(scale(p.let(elastic * grip), normal), "F")
+    force = p.let_vector(scale(p.let(elastic * pushing), normal), "F")
     p.write(
         b.unilateral,
         {
             "F": force,
             "T": cross(s, force),
-            "grip": grip,
             "stored": elastic * depth / 2,
-            "lost": p.let(elastic * rate) * (Step(grip) * grip - 1),
+            "lost": p.let(elastic * rate) * (pushing - 1),
+            "penetration": depth,
         },
         tangents=("F", "T"),
     )

@@ -13,7 +13,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import gradients_of
 from msfp_gen.results.extremes import Extremes, by_axis
-from msfp_gen.results.gradient import ENERGIES, Gradients, gradients_of_extremes
+from msfp_gen.results.gradient import Gradients, gradients_of_extremes
 from msfp_gen.results.history import LABELS, Event, History
 from msfp_gen.results.sliding import merged, open_times
 
@@ -234,7 +234,7 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
         if name in slopes:
             gradient[name] = slopes[name].tolist()
     energy = {name.removeprefix("energy_"): v for name, v in gradients.arrays.items() if name.startswith("energy_")}
-    if set(energy) > set(ENERGIES):
+    if "input" in energy:
         gradient["energy"] = {name: float(values[index, -1]) for name, values in energy.items()}
     return gradient
 

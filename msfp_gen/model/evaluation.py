@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -118,10 +118,18 @@ def separations_at_rest(bearing: Bearing, top: Top | None, added_load: float = 0
     mass = top.mass if isinstance(top, MassTop) else 0.0
     masses = np.array([body.mass for body in bearing.bodies])
     masses[-1] += mass
-    carried = load + bearing.gravity * np.cumsum(masses[::-1])[::-1]
     out = np.zeros((len(masses), 3))
-    out[:, 2] = -carried / seat_stiffness(bearing, top)
+    out[:, 2] = -settlements(load, bearing.gravity, masses, seat_stiffness(bearing, top))
     return out
+
+
+def settlements(load: complex, gravity: complex, masses: ArrayLike, stiffness: ArrayLike) -> Any:
+    """Compression of the contacts of all surfaces at rest, ndarray, shape (n-1,) [m].
+
+    load: on the top plate, downward positive [N]. masses: of bodies 2..n with what they carry, shape (n-1,) [kg].
+    stiffness: of the contacts, shape (n-1,) [N/m]. Complex where it is differentiated.
+    """
+    return (load + gravity * np.cumsum(np.asarray(masses)[::-1])[::-1]) / np.asarray(stiffness)
 
 
 FAILURES = {status.name: status.evaluation for status in STATUSES if status.evaluation is not None}

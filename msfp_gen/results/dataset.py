@@ -13,7 +13,7 @@ import numpy as np
 from msfp_gen.errors import InputError
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.gradient import ENERGIES, ERROR, EVENTS, SERIES, WITH_INTEGRALS, Gradients
+from msfp_gen.results.gradient import ERROR, EVENTS, SERIES, Gradients, energy_terms
 from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
 from msfp_gen.results.run_data import RunData
 from msfp_gen.results.stored_group import Attribute, StoredGroup
@@ -146,7 +146,8 @@ def _gradients(
     sizes = {**sizes, PARAMETER: len(parameters)}
     about |= {f"{GRADIENT}/{name}": value for name, value in attributes.items()}
     quantity = {name for name, variable in ROWS.items() if variable.field in quantities()} - {"time"}
-    energies = [f"energy_{name}" for name in (WITH_INTEGRALS if "energy_input" in group else ENERGIES)]
+    terms = energy_terms("energy_input" in group, "energy_seat_stored" in group)
+    energies = [f"energy_{name}" for name in terms]
 
     def gradients(suffix: str = "", error: Gradients | None = None) -> Gradients:
         extremes = tuple(Extremes.of_table(table) for table in json.loads(str(attributes[f"extremes{suffix}"])))

@@ -19,12 +19,20 @@ if TYPE_CHECKING:
     from msfp_gen.results.history import History
     from msfp_gen.scene.parameters import Parameter
 
-CONSTANT = ("time", "lift", "separation", "temperature", "energy")  # fields of `History` that are treated apart
-ENERGIES = ("kinetic", "potential", "restraint", "rim_stored")  # terms of the state; the others are integrals
-WITH_INTEGRALS = tuple(name for name in ENERGY if not name.startswith("seat_"))  # which only models with uplift have
+ENERGIES = ("kinetic", "potential", "restraint", "rim_stored", "seat_stored")  # of the state; the others are integrals
 ERROR = "_error"  # ends the name of the variable with the error of a derivative
 EVENTS = ("event_time", "event_displacement", "event_top_force")  # fields
 EVENT = 7  # numbers of an event: time, displacement, top force
+
+
+def energy_terms(integrals: bool, uplift: bool) -> tuple[str, ...]:
+    """The terms of the energy that are differentiated.
+
+    integrals: also those that are integrals over the run. uplift: also those of unilateral contacts.
+    """
+    return tuple(
+        name for name in ENERGY if (integrals or name in ENERGIES) and (uplift or not name.startswith("seat_"))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +66,16 @@ class Gradients:
     ) -> Gradients:
         """The derivatives of a compiled run that has ended. count: number of its rows that are kept.
 
-        energies: `ENERGIES` or `WITH_INTEGRALS`.
+        energies: of `energy_terms`.
         """
         rows, events = run.gradient_rows(len(parameters))[:count], run.gradient_events(len(parameters))
         found = [unpacked(model, rows[:, i], azimuth, sprung) for i in range(len(parameters))]
-        names = [name for name, values in found[0].items() if name not in CONSTANT and values is not None]
+        constant = {"time", "energy"} | (set() if model.effects.uplift else {"lift", "separation"})
+        names = [name for name, values in found[0].items() if name not in constant and values is not None]
+        if model.effects.uplift:
+            is_open = model.unpack(run.rows[:count])["compression"] < 0
+            for each, slopes in zip(found, np.moveaxis(rows, 1, 0), strict=True):
+                each["lift"] = np.where(is_open, -model.unpack(slopes)["compression"], 0.0)
         vectors = (out_of_plane(events[:, :, 1 + 3 * i : 4 + 3 * i], azimuth, "vector") for i in range(2))
         displacement, force = (np.moveaxis(vector, 1, 0) for vector in vectors)
         arrays = {name: np.array([each[name] for each in found]) for name in names}
@@ -93,6 +106,7 @@ SERIES = {
     "slip_speed": ("slip_velocity", "length"),
     "least_normal": ("normal_force", ""),
     "most_normal": ("normal_force", ""),
+    "temperature": ("temperature", ""),
     "least_friction": ("friction_coefficient", ""),
     "most_friction": ("friction_coefficient", ""),
 }

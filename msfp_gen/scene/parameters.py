@@ -19,6 +19,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.friction_parameters import law_parameters
 from msfp_gen.scene.scene_fields import InitialState
+from msfp_gen.scene.seats import seat_stiffness
 
 if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
@@ -58,8 +59,6 @@ _STATE = {"q": ("rad", 3), "v": ("rad/s", 3), "h": ("", 2)}
 # Numbers that a run does not depend on smoothly, or not at all: path -> why.
 _WITHOUT = {
     "bearing.base_centroid": "a run does not depend on it",
-    "surfaces.seat_stiffness": "it acts in models with uplift only, whose runs have no gradients",
-    "surfaces.seat_damping": "it acts in models with uplift only, whose runs have no gradients",
 }
 _MOTION_FIELDS = {"amplitude": "m", "acceleration": "m/s^2"}  # fields to which the motion is proportional
 _ANALYTIC = ("harmonic", "circle", "figure-eight", "ramp")
@@ -213,7 +212,11 @@ def _parameter(scene: Scene, part: str, field: str, index: tuple[int, ...]) -> P
         owner, component = getattr(scene.bearing, part)[index[0]], index[1:]
         path = f"bearing.{part}[{index[0]}].{field}"
     rule, value = _quantities(type(owner))[field], getattr(owner, field)
-    if value is None and part == "surfaces":
+    if field.startswith("seat_") and not scene.modelled.uplift:
+        raise InputError("this scene has no uplift, and its surfaces stay closed; leave it out, or give uplift = true")
+    if value is None and field == "seat_stiffness":
+        value = float(seat_stiffness(scene.bearing, scene.top)[index[0]])
+    elif value is None and part == "surfaces":
         value = _law_value(scene, field, index[0])
     if part == "top" and field.startswith("vertical_") and not getattr(scene.top, "vertical_stiffness", None):
         raise InputError("this top has no vertical spring, and a run changes abruptly with the first; give it one")

@@ -46,6 +46,14 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
     return stiffness
 
 
+def stiffness_slopes(bearing: Bearing, top: Top, spring: str) -> Array:
+    """Derivatives of `seat_stiffness` with respect to a spring of the top, ndarray, shape (n-1,) [-]."""
+    values = [surface.seat_stiffness for surface in bearing.surfaces]
+    stiffest = max(getattr(top, name, None) or 0.0 for name in SPRINGS)
+    follows = getattr(top, spring) == stiffest and len(values) * stiffest / SHARE > LEAST
+    return np.array([len(values) / SHARE if follows and value is None else 0.0 for value in values])
+
+
 def check_seats(bearing: Bearing, top: Top, effects: Effects | Auto | None) -> None:
     """Raise InputError as `seat_stiffness` does, where a run may model uplift."""
     if effects is None or effects.uplift is not False:

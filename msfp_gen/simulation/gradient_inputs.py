@@ -9,10 +9,13 @@ import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
+from msfp_gen.model.evaluation import bodies_and_surfaces, settlements, top_values
 from msfp_gen.model.plane import motion_in_plane, wrench_in_plane
 from msfp_gen.motions.time_grid import snapped
 from msfp_gen.scene.friction_parameters import derived_slopes, law_parameters
-from msfp_gen.simulation.segment import Frame, state_in_plane, time_grid, wrench_pieces
+from msfp_gen.scene.seats import SPRINGS, stiffness_slopes
+from msfp_gen.scene.top import load_values
+from msfp_gen.simulation.segment import Frame, first_load, state_in_plane, time_grid, wrench_pieces
 from msfp_gen.specification import contract
 
 if TYPE_CHECKING:
@@ -64,6 +67,7 @@ class _Inputs:
         self.scene, self.model, self.parameter = scene, model, parameter
         self.bodies, self.surfaces = contract.names(contract.BODY), contract.surface_values(model.effects)
         self.top = contract.names(contract.TOP)
+        self.seat = self.surfaces.index("seat_stiffness") if model.effects.uplift else None
         count = model.layout.surfaces
         self.frame = Frame.of(scene, model, wrench_pieces(scene)[1])
         self.arrays: dict[str, Any] = {
@@ -78,6 +82,8 @@ class _Inputs:
             "load": None,
         }
         getattr(self, f"_{parameter.part}")()
+        if model.effects.uplift:
+            self._separations()
 
     def _bearing(self) -> None:
         name = self.parameter.field
@@ -126,6 +132,8 @@ class _Inputs:
             self._wrench(np.zeros_like(wrench_pieces(self.scene)[1]), wrench)
         else:
             self.arrays["top"][self.top.index(_MOMENTS[component[0]] if component else name)] = 1.0
+        if name in SPRINGS and self.seat is not None:
+            self.arrays["surfaces"][:, self.seat] = stiffness_slopes(self.scene.bearing, self.scene.top, name)
 
     def _load(self) -> None:
         load = self.scene.load
@@ -166,6 +174,21 @@ class _Inputs:
             except InputError:
                 raise self._leaves_plane() from None
             self.arrays |= dict(zip(_STATE, values, strict=True))
+
+    def _separations(self) -> None:
+        """The separations at rest, with which a run starts, by a complex step."""
+        bearing, top, step = self.scene.bearing, self.scene.top, 1e-100
+        bodies, surfaces = bodies_and_surfaces(bearing, self.model.effects, top)
+        mass, on_top, arrays = self.bodies.index("mass"), self.top.index("mass"), self.arrays
+        masses = bodies[1:, mass] + 1j * step * arrays["bodies"][1:, mass]
+        masses[-1] += top_values(top)[on_top] + 1j * step * arrays["top"][on_top]
+        load = first_load(self.scene) - load_values(top)[2]
+        load -= 0.0 if arrays["load"] is None else 1j * step * arrays["load"][0, 2, 0]
+        stiffness = surfaces[:, self.seat] + 1j * step * arrays["surfaces"][:, self.seat]
+        found = np.zeros_like(arrays["q"])
+        gravity = bearing.gravity + 1j * step * arrays["gravity"]
+        found[:, 2] = -settlements(load, gravity, masses, stiffness).imag / step
+        arrays["q"], arrays["v"] = np.hstack([arrays["q"], found]), np.hstack([arrays["v"], np.zeros_like(found)])
 
     def _leaves_plane(self) -> InputError:
         return InputError(

@@ -12,13 +12,12 @@ import numpy as np
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.gradient import ENERGIES, EVENTS, WITH_INTEGRALS, Gradients, gradients_of_extremes
+from msfp_gen.results.gradient import EVENTS, Gradients, energy_terms, gradients_of_extremes
 from msfp_gen.results.note import Note
 from msfp_gen.scene.effect_selection import quasistatic, slider_period
 from msfp_gen.scene.parameters import Parameter, parameters_of
 from msfp_gen.scene.top import is_sprung
 from msfp_gen.simulation.settling import needs_settling
-from msfp_gen.specification.layout import ModelSpec
 
 if TYPE_CHECKING:
     from msfp_gen.result import Result
@@ -42,10 +41,11 @@ RINGS_AT_RIM = (
     "solver.rtol falls; give contact_damping = {advised:.2g}"
 )
 
+INEXACT = {"rim_contact": "met its rim", "lift_off": "lifted off"}  # events after which derivatives are less exact
 LARGEST_ERROR = 0.05  # without a note
 PEAKS = ("displacement", "top_force", "sliding")
 LARGE_ERROR = (
-    "surface {surface} met its rim, and derivatives of peaks with respect to {path} have errors of up to {share:.0%}: "
+    "surface {surface} {what}, and derivatives of peaks with respect to {path} have errors of up to {share:.0%}: "
     "gradient_summary[path]['error'] and the variables ..._error of the gradient state them; a smaller solver.rtol "
     "reduces them"
 )
@@ -94,7 +94,6 @@ def gradient_parameters(
         raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")
     if stream is not None:
         raise InputError(f"stream = {str(stream)!r}: gradients are kept in memory; leave out one of them")
-    ModelSpec(scene.bearing.layout, scene.modelled, gradients=True)  # checks the effects
     return parameters
 
 
@@ -119,7 +118,7 @@ def run_gradients(sequence: RunParts, rows: int, events: Sequence[Event]) -> Gra
     azimuth, sprung = segment.azimuth, is_sprung(scene.top)
     if sequence.energies and events and quasistatic(scene, segment.model.effects):
         raise InputError(CONTACT_IN_LONG_STEP.format(time=events[0].time, surface=events[0].surface))
-    energies = WITH_INTEGRALS if sequence.energies else ENERGIES
+    energies = energy_terms(sequence.energies, segment.model.effects.uplift)
     found = Gradients.of_run(sequence.parameters, energies, segment.model, segment.run, rows, azimuth, sprung)
     steps, undamped = segment.run.counts["steps"], undamped_surfaces(scene, segment.model.effects)
     resolved = undamped and segment.run.time < steps * RESOLVED_SHARE * slider_period(scene)
@@ -138,17 +137,17 @@ def with_gradient_errors(result: Result, run: Callable[[Scene], Result]) -> Resu
     assert gradients is not None
     solver, atol = scene.solver, scene.solver.atol_angle
     tenth = replace(solver, rtol=solver.rtol / 10, atol_angle=None if atol is None else atol / 10)
-    contact = next(event for event in result.events if event.kind == "rim_contact")
+    event = next(event for event in result.events if event.kind in INEXACT)
     try:
         error = measured_errors(result, run(replace(scene, solver=tenth)))
     except (InputError, RunError) as failure:
         if isinstance(failure, RunError) and failure.status == "interrupted":
             raise
-        note = Note(contact.time, "gradient", contact.surface, 0.0, NOT_MEASURED.format(failure=failure))
+        note = Note(event.time, "gradient", event.surface, 0.0, NOT_MEASURED.format(failure=failure))
         return replace(result, notes=(*result.notes, note))
     largest, path = max((_of_peaks(error, gradients, i), p.path) for i, p in enumerate(gradients.parameters))
-    text = LARGE_ERROR.format(surface=contact.surface, path=path, share=largest)
-    notes = (Note(contact.time, "gradient", contact.surface, largest, text),) if largest > LARGEST_ERROR else ()
+    text = LARGE_ERROR.format(surface=event.surface, what=INEXACT[event.kind], path=path, share=largest)
+    notes = (Note(event.time, "gradient", event.surface, largest, text),) if largest > LARGEST_ERROR else ()
     return replace(result, gradients=replace(gradients, error=error), notes=(*result.notes, *notes))
 
 

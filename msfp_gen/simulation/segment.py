@@ -105,7 +105,7 @@ def start_run(
         options["support_knots"], options["support_coefficients"] = support
     if at is not None:
         becomes_spatial = at.planar and not model.planar
-        origin, options["foot"] = transferred_heights(scene.bearing, scene.top, model, at, _first_load(scene))
+        origin, options["foot"] = transferred_heights(scene.bearing, scene.top, model, at, first_load(scene))
         origin = out_of_plane(origin, at.azimuth, "vector") if becomes_spatial else origin
         options |= {"origin": np.ascontiguousarray(origin), "monitor_heat": at.monitor_heat, "start_time": at.time}
         if model.effects.law is not None and model.effects.law.depends_on_temperature:
@@ -188,12 +188,12 @@ def _initial_state(scene: Scene, model: Model, azimuth: float) -> tuple[Array, A
     if model.planar:
         q, v, f = state_in_plane(q, v, f, azimuth)
     if model.effects.uplift:
-        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, _first_load(scene))])
+        q = np.hstack([q, separations_at_rest(scene.bearing, scene.top, first_load(scene))])
         v = np.hstack([v, np.zeros((count, 3))])
     return q, v, f
 
 
-def _first_load(scene: Scene) -> float:
+def first_load(scene: Scene) -> float:
     """Load at the start beside that of the top, downward positive [N]."""
     return 0.0 if scene.load is None else -float(scene.load.evaluate(0.0)[2])
 

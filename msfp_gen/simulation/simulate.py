@@ -33,6 +33,7 @@ from msfp_gen.simulation.checkpoint import (
 )
 from msfp_gen.simulation.gradient_inputs import start_gradients
 from msfp_gen.simulation.gradients import (
+    INEXACT,
     gradient_notes,
     gradient_parameters,
     run_gradients,
@@ -99,8 +100,8 @@ def simulate(
     energy_gradients
         Whether the energies that are integrals over the run are differentiated too, at up to four fifths more cost.
     gradient_errors
-        Whether the errors of the derivatives of a run that meets a rim are measured, by another run at a tenth of its
-        tolerance.
+        Whether the errors of the derivatives of a run that meets a rim or lifts off are measured, by another run at a
+        tenth of its tolerance.
 
     Returns
     -------
@@ -135,7 +136,7 @@ def simulate(
     result = sequence.result()
     if not result.succeeded:
         raise RunError(result.message, status=result.status, result=result)
-    if gradient_errors and parameters and any(event.kind == "rim_contact" for event in result.events):
+    if gradient_errors and parameters and any(event.kind in INEXACT for event in result.events):
         again = partial(simulate, progress=progress, strict=strict, gradients=gradients, gradient_errors=False)
         return with_gradient_errors(result, partial(again, energy_gradients=energy_gradients))
     return result

@@ -222,21 +222,11 @@ class ModelSpec:
     Attributes:
         layout, effects: see their classes.
         gradients: whether the model also computes the derivatives of a run with respect to parameters.
-
-    Raises:
-        InputError: gradients of effects that have none.
     """
 
     layout: Layout
     effects: Effects = Effects()
     gradients: bool = False
-
-    def __post_init__(self) -> None:
-        if self.gradients and self.effects.uplift:
-            raise InputError(
-                "effects.uplift = True: gradients are not computed through lift-off and landing; leave out the "
-                "gradients, or give uplift = false where the surfaces stay closed"
-            )
 
     @property
     def key(self) -> str:

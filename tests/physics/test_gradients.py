@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from support import Array, scene_of
-from support.gradients import DAMPED, derivative, double, heated, single, step_of, triple, values_around
+from support.gradients import DAMPED, derivative, double, heated, lifting, single, step_of, triple, values_around
 
 from msfp_gen import Load, Motion, Rotation, Scene, simulate
 from msfp_gen.model.model import Model, build_model
-from msfp_gen.results.gradient import ENERGIES, WITH_INTEGRALS
+from msfp_gen.results.gradient import ENERGIES
+from msfp_gen.results.history import ENERGY
 from msfp_gen.results.row_unpacking import unpacked
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter, changed_parameters, parameters_of
@@ -41,9 +42,9 @@ STATE = ("initial_state.q[0][0]", "initial_state.q[1][1]", "initial_state.v[1][1
 WEAK = ("contact_damping", "mass", "centroid", "gravity", "stiffness", "damping", "rotational_stiffness",
         "rotational_damping")  # fmt: skip
 CHECKED = ("tilt_angles", "tilt_rates", "friction_state", "normal_force", "top_force", "top_moment", "displacement",
-           *WITH_INTEGRALS)  # fmt: skip
+           *ENERGY)  # fmt: skip
 # A term may be small beside the others: the energies of a state, and the closing error, which all of them determine.
-TOGETHER = dict.fromkeys(ENERGIES, ENERGIES) | {"numerical": WITH_INTEGRALS}
+TOGETHER = dict.fromkeys(ENERGIES, ENERGIES) | {"numerical": tuple(ENERGY)}
 ROUNDING = {"top_dissipated": 4e-10}
 """Over the quantity, where it is more than 1e-11: velocities across a stiff spring are differences of larger ones."""
 
@@ -80,13 +81,18 @@ class FrozenSteps:
 
 
 def check_frozen(
-    scene: Scene, paths: Sequence[str], size: float = 1e-4, weak: float = 100.0, steps: Array | None = None
+    scene: Scene,
+    paths: Sequence[str],
+    size: float = 1e-4,
+    weak: float = 100.0,
+    steps: Array | None = None,
+    rounding: float = 1e-11,
 ) -> dict[str, Any]:
     """Every derivative agrees to 1e-6 of its largest value, but for the rounding of the differences; returns the rows.
 
     Newton's method stops at 1e-10 of the friction, and mostly far below; a difference divides that by its step.
     size: of that step, over the parameter; `weak` times that of parameters on which the run depends weakly. steps: of
-    `FrozenSteps`.
+    `FrozenSteps`. rounding: of the runs, over the quantity.
     """
     frozen = FrozenSteps(scene, steps)
     parameters = parameters_of(scene, paths)
@@ -99,9 +105,9 @@ def check_frozen(
         for name in CHECKED:
             together = TOGETHER.get(name, (name,))
             largest, value = (max(np.abs(each[other]).max() for other in together) for each in (found, values))
-            rounding = ROUNDING.get(name, 1e-11) * value / step
+            noise = max(ROUNDING.get(name, 0.0), rounding) * value / step
             error = np.abs(slope[name] - found[name]).max()
-            assert error <= 1e-6 * largest + rounding, (parameter.path, name, error / largest)
+            assert error <= 1e-6 * largest + noise, (parameter.path, name, error / largest)
     return values
 
 
@@ -223,6 +229,83 @@ def test_the_closing_error_of_the_energy_balance_hardly_depends_on_parameters() 
         for index in range(len(found.parameter)):
             largest = np.abs(found.energy_input.values[index]).max()
             assert np.abs(found.energy_numerical.values[index]).max() <= limit * largest
+
+
+STIFF = 1e-9
+"""Rounding of runs with unilateral contacts, over the quantity: Newton's method cannot balance their forces better."""
+UNILATERAL = (
+    "bearing.surfaces[*].friction", "bearing.surfaces[0].radius", "bearing.bodies[0].mass",
+    "bearing.bodies[0].rim_radius", "bearing.gravity", "top.mass", "top.vertical_stiffness", "motion.scale",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effects", [{}, {"rims": True}, {"dimension": "planar"}, {"spin": "free"}])
+def test_differences_with_the_same_steps_of_unilateral_contacts(effects: dict[str, Any]) -> None:
+    """That stay closed. The settlement at the start, stiffness in series and footprint depend on parameters too."""
+    scene = lifting(0.1, 0.12, **effects)
+    result = simulate(scene)
+    assert not result.events
+    seats = [f"bearing.surfaces[{j}].seat_{name}" for j, name in ((0, "stiffness"), (1, "damping"))]
+    check_frozen(scene, UNILATERAL, 1e-5, weak=100.0, rounding=STIFF)
+    check_frozen(scene, seats, 1e-2, rounding=10 * STIFF)
+
+
+@pytest.mark.slow
+def test_differences_with_the_same_steps_through_lift_off_and_landing() -> None:
+    """As exactly as differences know it: landings of light sliders magnify the last digit of the runs."""
+    scene = lifting(0.2, 0.112)
+    assert [event.kind for event in simulate(scene).events] == ["lift_off", "landing"]
+    sizes = dict.fromkeys(UNILATERAL, 1e-8) | {
+        "bearing.surfaces[0].seat_stiffness": 1e-6,
+        "bearing.surfaces[1].seat_damping": 1e-6,
+        "bearing.bodies[0].mass": 1e-7,
+        "bearing.gravity": 1e-9,
+        "motion.scale": 1e-9,
+    }
+    frozen = FrozenSteps(scene)
+    for path, size in sizes.items():
+        for parameter in parameters_of(frozen.scene, [path]):
+            _, (slope,) = frozen.run(frozen.scene, [parameter])
+            step = step_of(parameter, size)
+            changed = (changed_parameters(frozen.scene, {parameter: value}) for value in values_around(parameter, step))
+            runs = [frozen.run(other, ())[0] for other in changed]
+            for name in ("tilt_angles", "tilt_rates", "friction_state", "normal_force", "top_force", "separation"):
+                found, noise = derivative([run[name] for run in runs], step)
+                largest, error = np.abs(found).max(), np.abs(slope[name] - found).max()
+                about = (parameter.path, name, error / largest, noise.max() / largest)
+                assert noise.max() <= 3e-3 * largest, about
+                assert error <= 1e-5 * largest + 2.0 * noise.max(), about
+
+
+@pytest.mark.slow
+def test_a_flight_in_closed_form() -> None:
+    """A mass on closed contacts lifts off where the base falls with the acceleration -g, and then flies freely.
+
+    The contacts are so stiff that their compliance does not count.
+    """
+    heave = 1.0
+    scene = lifting(heave, 0.12, dimension="planar")
+    top = replace(scene.top, vertical_stiffness=0.0, vertical_damping=0.0)
+    bearing, solver = scene.bearing.replace(seat_stiffness=5e11), replace(scene.solver, rtol=1e-7)
+    scene = replace(scene, top=top, bearing=bearing, solver=solver, output_step=5e-4)
+    result = simulate(scene, gradients=["motion.scale", "bearing.gravity"], gradient_errors=False)
+    event = result.events[0]
+    assert event.kind == "lift_off"
+    rate, gravity = 8 * np.pi, scene.bearing.gravity
+    sine = np.sin(rate * event.time)
+    share = 3 * (2 * sine - 3 * sine**3)  # of the amplitude times the squared rate
+    assert heave * share == pytest.approx(-1.0, rel=0.02)
+    jerk = heave * gravity * rate * 3 * (2 - 9 * sine**2) * np.cos(rate * event.time)
+    found = result.gradient.event_time.sel(event=0).values
+    assert found == pytest.approx([gravity / jerk, -1.0 / jerk], rel=0.03)
+    time = result.history.time
+    rows = time > event.time
+    base, at = (heave * gravity / rate**2 * np.sin(rate * t) ** 3 for t in (time[rows], event.time))
+    speed = heave * gravity / rate * 3 * sine**2 * np.cos(rate * event.time)
+    slopes = [at + speed * (time[rows] - event.time) - base, -0.5 * (time[rows] - event.time) ** 2]
+    lift = result.gradient.lift.values.sum(axis=2)[:, rows]
+    assert lift == pytest.approx(np.array(slopes), abs=0.05 * np.abs(slopes[0]).max())
 
 
 def normal_force(load: float, tilt: float, mu: float, arms: float) -> float:

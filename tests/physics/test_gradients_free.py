@@ -12,7 +12,7 @@ from support import Array, scene_of
 from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
 
 from msfp_gen import Effects, Motion, Result, Scene, load_scene, simulate
-from msfp_gen.results.gradient import WITH_INTEGRALS
+from msfp_gen.results.gradient import energy_terms
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 
 COMMON = {
@@ -32,7 +32,7 @@ SPATIAL = {
 RIG = {"top.axial_load": 4e-3, "top.rotational_stiffness": 2e-2, "top.stiffness": 0.1}
 RIMS = {"capacity": 1e-3, "rim_stiffness": 1e-2}
 NAMES = ("top_force", "tilt")
-TERMS = tuple(f"energy_{name}" for name in WITH_INTEGRALS)
+TERMS = tuple(f"energy_{name}" for name in energy_terms(integrals=True, uplift=False))
 LAW = {"bearing.surfaces[1].friction_slow": 1e-2, "bearing.surfaces[1].velocity_rate": 1e-2, "load.scale": 0.1}
 
 

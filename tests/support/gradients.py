@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from msfp_gen import Effects, Load, Motion, Scene, Top, load_scene
 from msfp_gen.scene.effect_selection import quasistatic
 from msfp_gen.scene.parameters import Parameter
@@ -84,3 +86,20 @@ def derivative(values: Sequence[Array], step: float) -> tuple[Array, Array]:
     one, two, four = ((above - below) / (2 * k * step) for k, above, below in pairs)
     fine, coarse = one + (one - two) / 3, two + (two - four) / 3
     return fine + (fine - coarse) / 15, abs(fine - coarse)
+
+
+def lifting(acceleration: float, duration: float = 0.25, **effects: Any) -> Scene:
+    """The double pendulum above a base that heaves at 4 Hz and moves in two directions.
+
+    acceleration: vertical, over that of gravity; surfaces open from about 0.19 on, and land at strong damping.
+    """
+    scene = double()
+    bearing = scene.bearing.replace(friction_slow=None, velocity_rate=None, seat_damping=100.0)
+    time = np.linspace(0.0, duration, round(400 * duration) + 1)
+    heave = acceleration * scene.bearing.gravity / (8 * np.pi) ** 2 * np.sin(8 * np.pi * time) ** 3
+    across = 0.02 * np.sin(2 * np.pi * time), 0.01 * np.sin(1.5 * np.pi * time) ** 2
+    if effects.get("dimension") == "planar":
+        across = 0.0 * time, 0.0 * time
+    motion = Motion.from_arrays(time, np.column_stack([*across, heave]))
+    chosen = Effects(**({"rims": False, "uplift": True} | effects))
+    return replace(scene, bearing=bearing, effects=chosen, motion=motion, load=None, duration=duration)

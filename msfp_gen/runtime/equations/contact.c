@@ -277,11 +277,14 @@ MSFP_WIDE int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_s
 }
 
 #if MSFP_FORWARD_TANGENT
-void msfp_contact_tangents(const msfp_work *w, double dlocal[NB][INPUTS * DOF], double dcontact[NB][MSFP_CONTACT_SIZE * DOF])
+void msfp_contact_tangents(msfp_work *w, double dlocal[NB][INPUTS * DOF], double dcontact[NB][MSFP_CONTACT_SIZE * DOF])
 {
     for (int j = 0; j < NB; ++j)
-        for (int r = 0; r <= MOMENT; ++r) {
+        for (int r = 0; r < MSFP_CONTACT_ROWS; ++r) {
             double *row = dcontact[j] + (r < MOMENT ? r : MSFP_CONTACT_N) * DOF;
+#if MSFP_GRADIENTS
+            row = r > MOMENT ? w->drates[j][r - MOMENT - 1] : row;
+#endif
             memset(row, 0, DOF * sizeof *row);
             for (int k = 0; k < INPUTS; ++k) {
                 const double slope = w->jacobians.contact[(r * INPUTS + k) * LANES + j];

@@ -21,22 +21,17 @@ double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)
 
 void msfp_unilateral_force(const msfp_parameters *p, msfp_work *w, int j)
 {
-    double block[MSFP_UNILATERAL_DEPTH_SIZE], *contact = w->unilateral[j];
+    double block[MSFP_UNILATERAL_DEPTH_SIZE];
     const double *slider = w->body[msfp_slider(j)];
     depth(p, w, j, block);
-    contact[MSFP_UNILATERAL_GRIP] = contact[MSFP_UNILATERAL_STORED] = contact[MSFP_UNILATERAL_LOST] = 0.0;
-    w->standing[j] = MSFP_OPEN;
-    if (block[MSFP_UNILATERAL_DEPTH_DEPTH] > 0.0) { /* at zero the normal is not defined */
-        w->standing[j] = block[MSFP_UNILATERAL_DEPTH_BEYOND] > 0.0 ? MSFP_ON_EDGE : MSFP_ON_FACE;
-        if (w->standing[j] == MSFP_ON_EDGE)
-            msfp_unilateral_edge(p->surface[j], slider, w->x[j + 1], contact);
-        else
-            msfp_unilateral_inside(p->surface[j], slider, w->x[j + 1], contact);
-    }
-    if (contact[MSFP_UNILATERAL_GRIP] > 0.0)
-        return;
-    w->standing[j] = MSFP_OPEN;
-    memset(contact, 0, (FORCE + MOMENT) * sizeof *contact);
+    w->standing[j] = block[MSFP_UNILATERAL_DEPTH_BEYOND] > 0.0 ? MSFP_ON_EDGE : MSFP_ON_FACE;
+    if (!(block[MSFP_UNILATERAL_DEPTH_DEPTH] > 0.0)) { /* at zero the normal is not defined */
+        w->standing[j] = MSFP_OPEN;
+        memset(w->unilateral[j], 0, sizeof w->unilateral[j]);
+    } else if (w->standing[j] == MSFP_ON_EDGE)
+        msfp_unilateral_edge(p->surface[j], slider, w->x[j + 1], w->unilateral[j]);
+    else
+        msfp_unilateral_inside(p->surface[j], slider, w->x[j + 1], w->unilateral[j]);
 }
 #else
 double msfp_compression(const msfp_parameters *p, const msfp_work *w, int j)

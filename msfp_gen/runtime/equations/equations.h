@@ -65,6 +65,8 @@ void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_
                      msfp_blocks *s);
 /* Of these what acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
 void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s);
+/* Motion of all bodies alone, into `w`. */
+void msfp_motion(const msfp_parameters *p, const msfp_point *at, msfp_work *w);
 /* Motion of the foot of the supported mass; without a spring it is fixed to the top plate. */
 void msfp_move_foot(const msfp_parameters *p, const double *stage, msfp_work *w);
 /* Whether a vertical spring or damper acts on the top plate. */
@@ -111,8 +113,9 @@ void msfp_gaps(const msfp_parameters *p, const double q[MSFP_NB][MSFP_NQ], doubl
  * inputs of a surface, with g (and mu) eliminated, lane by lane; or NULL. Returns a status. */
 int msfp_contacts(const msfp_parameters *p, msfp_work *w, const msfp_seed *seed, double g[MSFP_NB][2],
                   double *condensed);
-/* Columns of the moments and of N from those of the inputs of the contacts, by that Jacobian, which is in `w`. */
-void msfp_contact_tangents(const msfp_work *w, double dlocal[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_DOF],
+/* Columns of the moments and of N from those of the inputs of the contacts, by that Jacobian, which is in `w`; in models
+ * with gradients also `drates` of `w`. */
+void msfp_contact_tangents(msfp_work *w, double dlocal[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_DOF],
                            double dcontact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_DOF]);
 #if MSFP_CLOSED_FORM
 /* Y after the body above has turned by `turn` [rad]. par: of the surface. */

@@ -201,11 +201,16 @@ static void kinematics(const msfp_parameters *p, const msfp_point *at, msfp_work
     msfp_bodies_values(p, w, s);
 }
 
+void msfp_motion(const msfp_parameters *p, const msfp_point *at, msfp_work *w)
+{
+    msfp_blocks s;
+    kinematics(p, at, w, &s);
+}
+
 void msfp_foot_at_rest(const msfp_parameters *p, const msfp_point *at, double foot[2])
 {
     msfp_work w;
-    msfp_blocks s;
-    kinematics(p, at, &w, &s);
+    msfp_motion(p, at, &w);
     msfp_resting_foot(p->top, w.body[NB], foot);
 }
 

@@ -33,9 +33,9 @@ void msfp_rim_force(const msfp_parameters *p, msfp_work *w, int j, double *drim)
         msfp_rim(p->surface[j], x, out);
     w->rim_gap[j] = out[MSFP_RIM_G];
     w->rim_rate[j] = out[MSFP_RIM_DG];
-    if (MSFP_UPLIFT && out[MSFP_RIM_G] >= 0.0)
-        return;
     const int held = MSFP_GRADIENTS && p->rim_cosine[j] > 1.0; /* while a step to its release is differentiated */
+    if (MSFP_UPLIFT && out[MSFP_RIM_G] >= 0.0 && !held)
+        return;
     if (out[MSFP_RIM_FC] < 0.0 || held) { /* a rim only pushes: docs/model.md, choice 4 */
         memcpy(w->rim[j], out, sizeof out);
         w->rim_active[j] = 1;

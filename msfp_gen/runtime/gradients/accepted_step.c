@@ -62,29 +62,45 @@ static int ends_at_fixed_time(const msfp_run *run)
            (run->next_jump < run->jump_count && t == run->jumps[run->next_jump]);
 }
 
-/* Gap of surface j at the end of the step [m], and its rate [m/s]. */
-static double gap_at_end(const msfp_run *run, int j, double *rate)
+/* What decides an event of surface j at the end of the step (msfp_event_columns), and its rate [m/s]. */
+static double event_at_end(msfp_run *run, int kind, int j, double *rate)
 {
     static const msfp_parameter_columns constant;
-    msfp_columns rates[NB][MSFP_GAP_SIZE], v[NB][NQ];
-    double sliding[NB][MSFP_GAP_SIZE];
-    memset(v, 0, sizeof v);
+    msfp_columns rates;
+    msfp_point at;
+    msfp_point_columns dat; /* column 0: derivatives with respect to time */
+    memset(&dat, 0, sizeof dat);
+    msfp_to_point(run, &run->next, &at);
+    dat.base_moves = 1;
+    for (int i = 0; i < 6; ++i) {
+        dat.base[0][i][0] = at.base[1][i];
+        dat.base[1][i][0] = at.base[2][i];
+    }
     for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < NQ; ++i)
-            v[k][i][0] = run->next.v[k][i];
-    msfp_gaps_columns(&run->parameters, &constant, run->next.q, v, sliding, rates);
-    *rate = rates[j][MSFP_GAP_G][0];
-    return sliding[j][MSFP_GAP_G];
+        for (int i = 0; i < NQ; ++i) {
+            dat.q[k][i][0] = at.v[k][i];
+            dat.v[k][i][0] = at.a[k][i];
+        }
+    const double value = msfp_event_columns(&run->parameters, &constant, &at, &dat, kind, j, rates);
+    *rate = rates[0];
+    return value;
 }
 
-void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt)
+void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, double *dt)
 {
-    msfp_columns gaps[NB][MSFP_GAP_SIZE];
-    double sliding[NB][MSFP_GAP_SIZE], rate;
-    msfp_gaps_columns(&run->parameters, &group->parameters, run->next.q, group->next.q, sliding, gaps);
-    gap_at_end(run, j, &rate);
+    msfp_columns value;
+    msfp_point at;
+    msfp_point_columns dat;
+    double rate;
+    memset(&dat, 0, sizeof dat);
+    msfp_to_point(run, &run->next, &at);
+    msfp_inputs_columns(run, group, run->next.t, group->next.t, &dat);
+    memcpy(dat.q, group->next.q, sizeof dat.q);
+    memcpy(dat.v, group->next.v, sizeof dat.v);
+    msfp_event_columns(&run->parameters, &group->parameters, &at, &dat, kind, j, value);
+    event_at_end(run, kind, j, &rate);
     for (int c = 0; c < C; ++c)
-        dt[c] = rate != 0.0 ? -gaps[j][MSFP_GAP_G][c] / rate : 0.0;
+        dt[c] = rate != 0.0 ? -value[c] / rate : 0.0;
 }
 
 /* Columns of the state at the end of the step, whose length has the columns group->h. */
@@ -113,7 +129,7 @@ static int accepted_columns(msfp_run *run, int rim, int fixed)
         status = msfp_record_rows_columns(run);
     for (int i = 0; i < g->groups && rim >= 0; ++i) {
         msfp_columns dt;
-        msfp_event_time_columns(run, &g->group[i], rim, dt);
+        msfp_event_time_columns(run, &g->group[i], MSFP_EVENT_RIM_CONTACT, rim, dt);
         msfp_add_columns(&g->group[i].h, (const msfp_columns *)&dt, 1.0, 1);
         step_columns(run, &g->group[i]);
     }
@@ -135,7 +151,7 @@ static int take_step_to_event(msfp_run *run, int j, int meets)
         const int status = msfp_step_implicit(run, h, &error);
         if (status)
             return status;
-        gap = gap_at_end(run, j, &rate);
+        gap = event_at_end(run, MSFP_EVENT_RIM_CONTACT, j, &rate);
         if (meets ? rate >= 0.0 : rate <= 0.0)
             return MSFP_E_STEP;
         h = fmax(0.5 * h, h - gap / rate);

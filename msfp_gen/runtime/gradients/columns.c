@@ -18,6 +18,18 @@ MSFP_INLINE void put_coordinates(double *block, const msfp_columns *q, const msf
                (MSFP_PLANAR ? 1 : 3) * sizeof *q);
 }
 
+#if MSFP_UPLIFT
+MSFP_INLINE void put_separation(double *block, const msfp_columns *q, const msfp_columns *v, const msfp_columns *a)
+{
+    const msfp_columns *const orders[3] = { q, v, a };
+    for (int order = 0; order < 3; ++order)
+        for (int i = 0; i < MSFP_SPACE; ++i)
+            memcpy(block + msfp_separation_field(order, i) * C, orders[order][3 + (MSFP_PLANAR ? 2 * i : i)], sizeof *q);
+}
+#else
+#define put_separation(block, q, v, a) ((void)0)
+#endif
+
 static const double constant[MSFP_BODY_PARAMETERS_SIZE * C]; /* columns of a body that no parameter changes */
 
 MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
@@ -35,9 +47,21 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
     } else if (d->base_moves)
         memset(d->body[0], 0, sizeof d->body[0]);
     d->base_moves = moves;
-    for (int k = 1; k <= NB; ++k)
+    for (int k = 1; k <= NB; ++k) {
         put_coordinates(d->x[k], dat->q[k - 1], dat->v[k - 1], dat->a[k - 1]);
+        put_separation(d->x[k], dat->q[k - 1], dat->v[k - 1], dat->a[k - 1]);
+    }
     msfp_bodies_directions(p, dp, w, d, s, ds);
+}
+
+void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                         const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
+{
+    msfp_blocks s;
+    msfp_block_directions ds;
+    s.at = at;
+    ds.point = dat;
+    kinematics(p, dp, w, &s, &ds, d);
 }
 
 #if MSFP_TOP_ROTATION
@@ -133,6 +157,9 @@ MSFP_COLUMNWISE void msfp_condensed_columns(const msfp_parameters *p, const msfp
     msfp_moments_directions(p, dp, w, d, &s, &ds);
     for (int k = 0; k < NB; ++k) {
         memcpy(d->residual[k * ND], ds.angular[k + 1], NA * sizeof(msfp_columns));
+#if MSFP_UPLIFT
+        memcpy(d->residual[k * ND + NA], ds.excess[k], MSFP_SPACE * sizeof(msfp_columns));
+#endif
         memset(d->lock[k], 0, sizeof d->lock[k]);
         if (!MSFP_PLANAR && MSFP_SPIN_LOCKED)
             memcpy(d->lock[k], ds.angular[k + 1] + (MSFP_ANGULAR_SIZE - 1) * C, sizeof d->lock[k]);

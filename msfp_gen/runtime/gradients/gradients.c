@@ -53,6 +53,12 @@ static void parameters(const msfp_parameters *p, const value_columns *d, msfp_pa
         const double *values = p->surface_values[j], *sign = p->surface[j] + MSFP_SURFACE_PARAMETERS_SIGN;
         msfp_surface_block_direction(values, p->body_values[slider], sign, d->surface[j], d->body[slider], dsign,
                                      to->surface[j]);
+#if MSFP_UPLIFT
+        const double stiffness = values[MSFP_SURFACE_VALUES_SEAT_STIFFNESS];
+        for (int c = 0; c < C; ++c)
+            around[MSFP_AROUND_COMPLIANCE * C + c] -=
+                d->surface[j][MSFP_SURFACE_VALUES_SEAT_STIFFNESS * C + c] / (stiffness * stiffness);
+#endif
     }
     msfp_top_block_direction(p->top_values, p->around, d->top, around, to->top);
 }

@@ -44,6 +44,9 @@ typedef struct {
     double local[MSFP_NB][MSFP_LOCAL_SIZE * MSFP_COLUMNS], stage[MSFP_NB][MSFP_STAGE_SIZE * MSFP_COLUMNS], contact[MSFP_NB][MSFP_CONTACT_SIZE * MSFP_COLUMNS];
     double rim[MSFP_NB][MSFP_RIM_SIZE * MSFP_COLUMNS], foot[MSFP_FOOT_SIZE * MSFP_COLUMNS];
     double lock[MSFP_NB][MSFP_LOCK_SIZE * MSFP_COLUMNS];
+#if MSFP_UPLIFT
+    double unilateral[MSFP_NB][MSFP_UNILATERAL_SIZE * MSFP_COLUMNS];
+#endif
     msfp_columns residual[MSFP_DOF];
     int base_moves; /* whether those of body 0 may differ from zero; 0 in a new work, which is zero */
 } msfp_work_columns;
@@ -65,6 +68,9 @@ typedef struct {
     double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
+/* Columns of the motion of all bodies, of which `w` has the values: blocks `x` and `body`. */
+void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                         const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
 /* Columns of the rim of surface j [MSFP_RIM_SIZE][MSFP_COLUMNS], whether it pushes or not. */
 void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
                       const msfp_work_columns *d, double *columns);
@@ -99,6 +105,10 @@ void msfp_record_columns(const msfp_parameters *p, const msfp_parameter_columns 
 /* The block `closed_rim` of surface j; where its gap is closed with columns. */
 void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
                              const msfp_work_columns *d, int j, double *closed, double *dclosed);
+/* Value of what decides an event of surface j, and its columns: the compression of its contact for lift-off and landing,
+ * otherwise the gap of its rim [m]. kind: of the event. */
+double msfp_event_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                          msfp_point_columns *dat, int kind, int j, double *columns);
 /* Sliding displacements and gaps at given coordinates, and their columns. */
 void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const double q[MSFP_NB][MSFP_NQ],
                        msfp_columns dq[MSFP_NB][MSFP_NQ], double sliding[MSFP_NB][MSFP_GAP_SIZE],
@@ -198,9 +208,9 @@ struct msfp_gradients {
 
 /* ---- accepted_step.c ---- */
 
-/* Columns of the time at which the gap of surface j is zero, from those of the state at the end of the step: minus the
- * columns of the gap before contact, over its rate. Where the gap does not change they are zero. */
-void msfp_event_time_columns(const msfp_run *run, msfp_group *group, int j, double *dt);
+/* Columns of the time from the end of the step to an event there, by those of the state at the end: minus the columns of
+ * what decides the event, over its rate. Where that does not change they are zero. */
+void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, double *dt);
 
 /* ---- initial_columns.c, step_columns.c: states ---- */
 

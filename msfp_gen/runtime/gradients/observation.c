@@ -10,8 +10,6 @@
 #if MSFP_GRADIENTS
 #include "msfp_directions.h"
 
-MSFP_STATIC_ASSERT(!MSFP_UPLIFT, gradients_of_energies); /* ModelSpec refuses it */
-
 /* Columns of sliding displacement and gap from the block of the body above. The sliding displacement has a kink at the
  * centre, where its columns are zero. */
 MSFP_INLINE void gap_columns(const double *par, const double *dpar, const double *above, const double *dabove,
@@ -50,6 +48,53 @@ MSFP_COLUMNWISE void msfp_gaps_columns(const msfp_parameters *p, const msfp_para
         msfp_gap(p->surface[j], body, sliding[j]);
         gap_columns(p->surface[j], dp->surface[j], body, d, sliding[j], gaps[j]);
     }
+}
+
+#if MSFP_UPLIFT
+/* Columns of the compression of surface j. */
+static void compression_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
+                                const msfp_work_columns *d, int j, double *columns)
+{
+    double depth[MSFP_UNILATERAL_DEPTH_SIZE], contact[MSFP_UNILATERAL_SIZE * C];
+    const int slider = msfp_slider(j);
+    msfp_unilateral_depth(p->surface[j], w->body[slider], w->x[j + 1], depth);
+    if (depth[MSFP_UNILATERAL_DEPTH_BEYOND] > 0.0)
+        msfp_unilateral_edge_direction(p->surface[j], w->body[slider], w->x[j + 1], dp->surface[j], d->body[slider],
+                                       d->x[j + 1], contact);
+    else
+        msfp_unilateral_inside_direction(p->surface[j], w->body[slider], w->x[j + 1], dp->surface[j], d->body[slider],
+                                         d->x[j + 1], contact);
+    memcpy(columns, contact + MSFP_UNILATERAL_PENETRATION * C, sizeof(msfp_columns));
+}
+#endif
+
+double msfp_event_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
+                          msfp_point_columns *dat, int kind, int j, double *columns)
+{
+#if MSFP_UPLIFT
+    msfp_work w;
+    msfp_work_columns d;
+    memset(&d, 0, sizeof d);
+    msfp_motion(p, at, &w);
+    msfp_motion_columns(p, dp, at, dat, &w, &d);
+    if (kind == MSFP_EVENT_LIFT_OFF || kind == MSFP_EVENT_LANDING) {
+        compression_columns(p, dp, &w, &d, j, columns);
+        return msfp_compression(p, &w, j);
+    }
+#if MSFP_RIMS
+    double rim[MSFP_RIM_SIZE * C];
+    msfp_rim_force(p, &w, j, NULL);
+    msfp_rim_columns(p, dp, &w, j, &d, rim);
+    memcpy(columns, rim + MSFP_RIM_G * C, sizeof(msfp_columns));
+    return w.rim_gap[j];
+#endif
+#endif
+    msfp_columns gaps[NB][MSFP_GAP_SIZE];
+    double sliding[NB][MSFP_GAP_SIZE];
+    (void)kind;
+    msfp_gaps_columns(p, dp, at->q, dat->q, sliding, gaps);
+    memcpy(columns, gaps[j][MSFP_GAP_G], sizeof(msfp_columns));
+    return sliding[j][MSFP_GAP_G];
 }
 
 void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,
@@ -132,6 +177,14 @@ MSFP_INLINE void surface(const msfp_parameters *p, const msfp_parameter_columns 
     gap_columns(p->surface[j], dp->surface[j], w->body[j + 1], d->body[j + 1], sliding, gap);
     memcpy(row[MSFP_ROW_SLIDING + j], gap[MSFP_GAP_S], sizeof *row);
     memcpy(row[MSFP_ROW_GAP + j], gap[MSFP_GAP_G], sizeof *row);
+#if MSFP_UPLIFT
+    compression_columns(p, dp, w, d, j, row[MSFP_ROW_COMPRESSION + j]);
+#if MSFP_RIMS
+    double rim[MSFP_RIM_SIZE * C]; /* with uplift the gap follows from the separation too */
+    msfp_rim_columns(p, dp, w, j, d, rim);
+    memcpy(row[MSFP_ROW_GAP + j], rim + MSFP_RIM_G * C, sizeof *row);
+#endif
+#endif
     msfp_get_polar(d->force[j], row + MSFP_ROW_FORCE + 3 * j);
 }
 
@@ -165,6 +218,9 @@ MSFP_COLUMNWISE void msfp_record_columns(const msfp_parameters *p, const msfp_pa
     memcpy(row[MSFP_ROW_TOP_SETTLEMENT], ds.restraint + MSFP_RESTRAINT_SETTLEMENT * C, sizeof *row);
 #if MSFP_RIMS
     memcpy(row[MSFP_ROW_RIM_STORED], ds.rim_energy + MSFP_RIM_ENERGY_STORED * C, sizeof *row);
+#endif
+#if MSFP_UPLIFT
+    memcpy(row[MSFP_ROW_SEAT_STORED], ds.unilateral_energy + MSFP_UNILATERAL_ENERGY_STORED * C, sizeof *row);
 #endif
     memcpy(row[MSFP_ROW_KINETIC], ds.energy + MSFP_ENERGY_KINETIC * C, sizeof *row);
     memcpy(row[MSFP_ROW_POTENTIAL], ds.energy + MSFP_ENERGY_POTENTIAL * C, sizeof *row);

@@ -40,17 +40,22 @@ static void store(const struct msfp_gradients *g, double *items, size_t index, i
             to[c * size + i] = d[i][c];
 }
 
-/* Columns of an event at the end of the step. In a quasi-static run the end of a step does not move with the
- * parameters: the state at the event moves along the solution. */
-static void event_columns(msfp_run *run, msfp_group *group, int j, msfp_row_columns d, msfp_columns *event)
+/* Columns of an event at the end of the step. Where a surface lifts off or lands, and in a quasi-static run, the end of
+ * a step does not move with the parameters: the state at the event moves along the solution. */
+static void event_columns(msfp_run *run, msfp_group *group, int kind, int j, msfp_row_columns d, msfp_columns *event)
 {
     const msfp_state *next = &run->next;
     msfp_state_columns at = group->next;
-    if (msfp_is_quasistatic(run)) {
-        msfp_event_time_columns(run, group, j, at.t);
-        msfp_add_scaled(at.q[0], next->v[0], at.t, 1.0, NB * NQ);
-        msfp_add_scaled(at.v[0], next->a[0], at.t, 1.0, NB * NQ);
-        msfp_add_scaled(at.f[0], next->df[0], at.t, 1.0, NB * 2);
+    msfp_columns dt;
+    if (msfp_is_quasistatic(run) || kind == MSFP_EVENT_LIFT_OFF || kind == MSFP_EVENT_LANDING) {
+        msfp_event_time_columns(run, group, kind, j, dt);
+        msfp_add_columns(&at.t, (const msfp_columns *)&dt, 1.0, 1);
+        msfp_add_scaled(at.q[0], next->v[0], dt, 1.0, NB * NQ);
+        msfp_add_scaled(at.v[0], next->a[0], dt, 1.0, NB * NQ);
+        msfp_add_scaled(at.f[0], next->df[0], dt, 1.0, NB * 2);
+        msfp_add_scaled(at.foot, next->foot + 1, dt, 1.0, 2);
+        if (!MSFP_MASSLESS)
+            msfp_add_scaled(at.a[0], run->acceleration_slope[0], dt, 1.0, NB * NQ);
     }
     msfp_observe_columns(run, group, next, &at, d);
     memcpy(event[0], at.t, sizeof *event);
@@ -117,7 +122,7 @@ int msfp_record_extremes_columns(msfp_run *run)
         msfp_group *group = &g->group[i];
         msfp_columns event[EVENT];
         for (size_t e = g->event_count; e < run->event_count; ++e) {
-            event_columns(run, group, run->events[e].surface - 1, g->recording.row, event);
+            event_columns(run, group, run->events[e].kind, run->events[e].surface - 1, g->recording.row, event);
             store(g, g->events, e, i, EVENT, (const msfp_columns *)event);
         }
         g->recording.columns_known = 0;

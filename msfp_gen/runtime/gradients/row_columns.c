@@ -142,14 +142,17 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
         clear(&d[MSFP_ROW_KINETIC], 1);
     if (row->rim_stored < 0.0)
         clear(&d[MSFP_ROW_RIM_STORED], 1);
+    if (row->seat_stored < 0.0)
+        clear(&d[MSFP_ROW_SEAT_STORED], 1);
     for (int j = 0; j < NB; ++j) {
         if (row->normal[j] < 0.0) {
             clear(&d[MSFP_ROW_NORMAL + j], 1);
             clear(&d[MSFP_ROW_FORCE + 3 * j], 3);
         }
         memcpy(d[MSFP_ROW_SLIDING + j], gaps[j][MSFP_GAP_S], sizeof *d);
-        memcpy(d[MSFP_ROW_GAP + j], gaps[j][MSFP_GAP_G], sizeof *d);
-        if (sliding[j][MSFP_GAP_G] > 0.0 || row->rim[j] < 0.0)
+        if (!MSFP_UPLIFT)
+            memcpy(d[MSFP_ROW_GAP + j], gaps[j][MSFP_GAP_G], sizeof *d);
+        if ((MSFP_UPLIFT ? row->gap[j] : sliding[j][MSFP_GAP_G]) > 0.0 || row->rim[j] < 0.0)
             clear(&d[MSFP_ROW_RIM + j], 1);
     }
 }

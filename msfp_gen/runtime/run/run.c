@@ -167,7 +167,7 @@ static double latest_end(msfp_run *run)
 }
 
 /* One step of length h of the method; it is not accepted yet. */
-static int try_step(msfp_run *run, double h, double *error)
+static int try_step(msfp_run *run, double h, int prescribed, double *error)
 {
     run->status_surface = 0;
     run->status_value = 0.0;
@@ -180,7 +180,7 @@ static int try_step(msfp_run *run, double h, double *error)
         return MSFP_E_FINITE;
     if (*error > 1.0)
         return MSFP_OK;
-    return msfp_energy_consistent(run) ? msfp_check_state(run, &run->work, &run->next) : MSFP_E_STEP;
+    return prescribed || msfp_energy_consistent(run) ? msfp_check_state(run, &run->work, &run->next) : MSFP_E_STEP;
 }
 
 /* Factor of the step size after an accepted step. */
@@ -261,7 +261,7 @@ static int one_step(msfp_run *run)
         h = prescribed;
     int relocations = 0;
     for (;; ++relocations) {
-        const int status = try_step(run, h, &error);
+        const int status = try_step(run, h, prescribed > 0.0, &error);
         if (status) {
             run->counts[MSFP_COUNT_NEWTON_FAILURES] += status == MSFP_E_NEWTON;
             run->retry_after_newton |= status == MSFP_E_NEWTON;

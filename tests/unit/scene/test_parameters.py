@@ -50,7 +50,7 @@ def test_short_forms_and_other_parts() -> None:
         ("bearing.friction", r"give bearing.surfaces\[0\].friction, or"),
         ("bearing.surfaces[0].frictio", "did you mean friction"),
         ("bearing.surfaces[0].friction_slow", "effects.friction = 'constant' has no such number"),
-        ("bearing.surfaces[0].seat_stiffness", "it acts in models with uplift only"),
+        ("bearing.surfaces[0].seat_stiffness", "this scene has no uplift, .* give uplift = true"),
         ("bearing.bodies[0].inertia", "this field holds 2 numbers"),
         ("bearing.base_centroid", "a run does not depend on it"),
         ("bearing[0].gravity", "there is one bearing"),

@@ -184,7 +184,6 @@ def planar() -> Scene:
     ("scene", "paths", "part"),
     [
         (scene_of("fenz-test2", solver={"method": "dopri5"}), PATHS, r"solver.method = 'dopri5': .*give 'implicit'"),
-        (scene_of("fenz-test2", {"uplift": True}), PATHS, r"effects.uplift = True: .*give uplift = false"),
         (stopping(), PATHS, "stop: .*give a duration"),
         (tilted(), PATHS, "motion.rotation: .*give an initial_state"),
         (triple(), ["bearing.surfaces[7].friction"], r"gradients = 'bearing.surfaces\[7\].friction'"),
