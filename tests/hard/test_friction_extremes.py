@@ -63,6 +63,7 @@ def test_a_stuck_bearing_on_a_slope_does_not_creep() -> None:
 # ---- turning back ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_reversal_in_every_stage() -> None:
     """The bearing of Table A.1 turned back in each of its five stages, ever wider, rims included."""
     turns = [0.001, -0.001, 0.02, -0.02, 0.06, -0.06, 0.1, -0.1, 0.138, -0.138, 0.0]
@@ -72,7 +73,7 @@ def test_reversal_in_every_stage() -> None:
     assert run.summary["energy"]["closure_error"] < 1e-3
 
 
-@pytest.mark.parametrize("after", thinned([1e-6, 1e-5, 1e-4, 1e-3], lambda after: after in (1e-6, 1e-3)))
+@pytest.mark.parametrize("after", thinned([1e-6, 1e-5, 1e-4, 1e-3], lambda after: after == 1e-6))
 def test_reversal_right_after_the_knee(after: float) -> None:
     """Turned back `after` the knee by so many metres, when Y is nearly 1 and the tangent changes most."""
     bearing = a_stack((3, 1, 1), [1.0, 1.0], yield_displacement=1e-4)

@@ -119,6 +119,7 @@ def test_a_record_with_spikes_is_that_of_the_explicit_method() -> None:
     assert apart(explicit, tight) < 3e-3
 
 
+@pytest.mark.slow
 def test_one_spike_after_a_long_rest_is_not_missed() -> None:
     """Sixty seconds with one spike in their middle, where adaptive solvers step over it: the frictionless slider gets
     the speed a dt that it brings, like a linear oscillator integrated with the spike as a breakpoint."""

@@ -131,6 +131,7 @@ def test_quasi_static_path_leaves_the_full_balances_at_rest(layout: tuple[int, i
         assert here.moment == pytest.approx(-1e5 * here.delta.sum(), rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_small_yield_displacement_tends_to_the_closed_form() -> None:
     d = [0.02, 0.03, 0.06, 0.075, 0.1]
     exact = force_at(Push(fenz(), N, K_THETA), d)
@@ -142,6 +143,7 @@ def test_small_yield_displacement_tends_to_the_closed_form() -> None:
     assert error[1] < 0.2 * error[0] < 1e-3
 
 
+@pytest.mark.slow
 def test_rounded_corners_move_the_transitions_little() -> None:
     """A.1 with the report's R_0 and the weights of all bodies: rims 1 and 4 at 86.5 and 130.9 mm."""
     push = Push(fenz(), N, K_THETA, weights=True)

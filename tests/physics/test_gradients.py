@@ -171,6 +171,7 @@ def test_differences_with_the_same_steps_in_quasi_static_runs(hysteresis: str) -
     check_frozen(single(hysteresis), [*paths, "initial_state.h[0][0]"], weak=10.0)
 
 
+@pytest.mark.slow
 def test_works_where_no_rate_rings() -> None:
     """Third-order weights integrate the works where the error is below the tolerance.
 

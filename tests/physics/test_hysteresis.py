@@ -60,6 +60,7 @@ def test_a_stuck_bearing_does_not_creep_under_small_cycles(d_y: float) -> None:
     assert shaken_off_centre("report", d_y) < -2e-3
 
 
+@pytest.mark.slow
 def test_a_stuck_mass_rings_down_as_its_damping_says() -> None:
     """On the spring mu N/d_y a mass has the damping ratio omega T/2: the logarithmic decrement of its free ringing."""
     T, d_y = 2e-3, 5e-4

@@ -69,6 +69,7 @@ def test_tilt_about_e1_is_tilt_about_e2_seen_from_the_side() -> None:
     np.testing.assert_allclose(two.history.top_force[:, 1], one.history.top_force[:, 0], atol=1e-6 * WEIGHT)
 
 
+@pytest.mark.slow
 def test_a_planar_run_with_turning_plates_is_the_spatial_one() -> None:
     rocking = Rotation.harmonic(theta=0.004, frequency=0.2, cycles=3.75)
     scene = double(motion=PUSH.rocking(Rotation.ramp(theta=0.01, duration=5.0)), top_rotation=rocking)

@@ -243,6 +243,7 @@ def test_data_cannot_end_its_script():
     assert json.loads(Cells(text).data)["states"][1] == "slides"
 
 
+@pytest.mark.slow
 def test_size_of_a_long_record_with_all_figures_is_bounded(monkeypatch):
     monkeypatch.setattr("msfp_gen.report.page.FIGURES", ALL)
     text = report_html(preset_run("ridgecrest-clc"))

@@ -303,6 +303,7 @@ def test_heat_without_numbers_is_noted() -> None:
     assert result.summary["notes"] == [note.line for note in result.notes]
 
 
+@pytest.mark.slow
 def test_the_temperatures_of_the_monitor_are_those_of_the_law() -> None:
     """Of the law of Kumar et al. where heat does not change friction; the run is handed over with them."""
     scene = kumar()

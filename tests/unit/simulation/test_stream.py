@@ -96,6 +96,7 @@ def test_several_models_are_one_file(scene: Any, tmp_path: Path) -> None:
     assert_same_file(whole, tmp_path / "run.nc", tmp_path / "whole.nc")
 
 
+@pytest.mark.slow
 def test_a_long_run_keeps_its_summary_in_few_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(joining, "GROUPS", 64)
     monkeypatch.setattr(joining, "BLOCK", 128)
@@ -224,6 +225,7 @@ def test_rows_of_another_run_are_refused(tmp_path: Path, monkeypatch: pytest.Mon
     assert_same(simulate(scene), Result.from_netcdf(file))
 
 
+@pytest.mark.slow
 def test_a_checkpoint_with_all_rows_continues_in_a_stream(tmp_path: Path) -> None:
     path, scene = tmp_path / "run.ck", SCENES["even rows"]
     interrupted(scene, path, 20.0, every=0.0)

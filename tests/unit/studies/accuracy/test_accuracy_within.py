@@ -152,7 +152,8 @@ def test_slow_ringing_of_stuck_sliders_is_in_the_estimate(mass, amplitude, frequ
     assert largest_error(errors(run_native("implicit", scene, 1e-3, 60.0, repeats=0), exact)) > 0.05
 
 
-@pytest.mark.parametrize("load", [pytest.param("alone", marks=pytest.mark.slow), "summed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("load", ["alone", "summed"])
 def test_a_short_pulse_is_in_the_estimate(load):
     pulse = Load.from_arrays([0, 5, 5.005, 5.01, 10], np.outer([0, 0, 1, 0, 0], [10e3, 0.0, 0.0]))
     sway = Load.harmonic((0.0, 0.0, 40e3), frequency=0.2, cycles=1)
