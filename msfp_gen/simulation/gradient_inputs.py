@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.parameters import Parameter
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.simulation.settling import StartSlopes
 
 _STATE = ("q", "v", "h")
 _MOMENTS = ("inertia_transverse", "inertia_axial")
@@ -39,14 +40,18 @@ def start_gradients(
     parameters: Sequence[Parameter],
     steps: Sequence[float] = (),
     energies: bool = False,
+    start: StartSlopes | None = None,
 ) -> None:
     """Begin the derivatives of a run that has taken no step.
 
     steps: ends of all steps [s], in place of the step control, for differences with the same steps. energies: also of
-    the energies that are integrals over the run. Raises InputError where a parameter leads out of the plane of a planar
-    model.
+    the energies that are integrals over the run. start: derivatives of the initial state; None: it is constant. Raises
+    InputError where a parameter leads out of the plane of a planar model.
     """
-    found = [_Inputs(scene, model, parameter).arrays for parameter in parameters]
+    found = [
+        _Inputs(scene, model, parameter, None if start is None else (start.q[i], start.h[i])).arrays
+        for i, parameter in enumerate(parameters)
+    ]
     histories = {name: [each[name] for each in found if each[name] is not None] for name in ("motion", "load")}
     stacked: dict[str, Any] = {
         name: np.array([each[name] for each in found]) for name in ("gravity", "bodies", "surfaces", "top", *_STATE)
@@ -63,7 +68,9 @@ def start_gradients(
 class _Inputs:
     """The derivatives with respect to one parameter, in `arrays`, by the names of `start_gradients` of a run."""
 
-    def __init__(self, scene: Scene, model: Model, parameter: Parameter) -> None:
+    def __init__(
+        self, scene: Scene, model: Model, parameter: Parameter, start: tuple[Array, Array] | None = None
+    ) -> None:
         self.scene, self.model, self.parameter = scene, model, parameter
         self.bodies, self.surfaces = contract.names(contract.BODY), contract.surface_values(model.effects)
         self.top = contract.names(contract.TOP)
@@ -82,6 +89,9 @@ class _Inputs:
             "load": None,
         }
         getattr(self, f"_{parameter.part}")()
+        if start is not None:
+            self.arrays["q"], self.arrays["h"] = start
+            self._state_in_plane()
         if model.effects.uplift:
             self._separations()
 
@@ -167,6 +177,9 @@ class _Inputs:
 
     def _initial_state(self) -> None:
         self.arrays[self.parameter.field][self.parameter.index] = 1.0
+        self._state_in_plane()
+
+    def _state_in_plane(self) -> None:
         if self.model.planar:
             try:
                 q, v, h = (self.arrays[name] for name in _STATE)

@@ -85,10 +85,9 @@ def gradient_parameters(
         )
     if scene.stop is not None:
         raise InputError(f"stop: gradients need a run of fixed duration; give a duration instead, or {ADVICE}")
-    if needs_settling(scene):
+    if needs_settling(scene) and (given := [p.path for p in parameters if p.part == "initial_state"]):
         raise InputError(
-            "motion.rotation: the initial state of tilted plates depends on the parameters; give an initial_state, or "
-            + ADVICE
+            f"gradients = {given[0]!r}: tilted plates start in the state after a slow tilting; give an initial_state"
         )
     if checkpoint is not None:
         raise InputError(f"checkpoint = {str(checkpoint)!r}: a checkpoint holds no gradients; leave out one of them")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,9 @@ from msfp_gen.scene.solver import Solver
 from msfp_gen.specification.layout import Auto
 
 if TYPE_CHECKING:
+    from msfp_gen.results.gradient import Gradients
+    from msfp_gen.results.history import History
+    from msfp_gen.scene.parameters import Parameter
     from msfp_gen.scene.scene import Scene
 
 TILTING, RESTING = 10.0, 2.0  # duration of the tilting of the plates, and of the rest after it [s]
@@ -63,6 +67,38 @@ def _effects(scene: Scene) -> Auto:
         friction=given.friction,
         friction_law=given.friction_law,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class StartSlopes:
+    """Derivatives of the state after settling with respect to k parameters.
+
+    q: of the angles, shape (k, n-1, 3) [rad/unit]. h: of the friction state, shape (k, n-1, 2).
+    """
+
+    q: Array
+    h: Array
+
+
+def moves_settling(parameter: Parameter) -> bool:
+    """Whether the state after settling may depend on a parameter: not on how the base moves afterwards."""
+    return parameter.part != "motion" and not parameter.field.startswith("seat_")
+
+
+def start_slopes(history: History, gradients: Gradients | None, parameters: Sequence[Parameter]) -> StartSlopes:
+    """The derivatives of the state in which settling ended, of those parameters on which it may depend."""
+    surfaces = history.tilt_angles.shape[1]
+    slopes = StartSlopes(np.zeros((len(parameters), surfaces, 3)), np.zeros((len(parameters), surfaces, 2)))
+    if gradients is None:
+        return slopes
+    moving = [moves_settling(parameter) for parameter in parameters]
+    slopes.q[moving] = gradients.arrays["tilt_angles"][:, -1]
+    h, dh = history.friction_state[-1], gradients.arrays["friction_state"][:, -1]
+    size = np.linalg.norm(h, axis=1, keepdims=True)
+    along = (h * dh).sum(axis=2, keepdims=True) / np.maximum(1.0, size**2)
+    # `state_at_rest` limits the size of h to 1.
+    slopes.h[moving] = np.where(size > 1.0, (dh - h * along) / np.maximum(1.0, size), dh)
+    return slopes
 
 
 def state_at_rest(q: Array, h: Array) -> InitialState:

@@ -45,7 +45,14 @@ from msfp_gen.simulation.notes import history_notes, landing_notes
 from msfp_gen.simulation.outcome import extremes_of, message_of, provenance_of
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
-from msfp_gen.simulation.settling import needs_settling, settling_scene, state_at_rest
+from msfp_gen.simulation.settling import (
+    StartSlopes,
+    moves_settling,
+    needs_settling,
+    settling_scene,
+    start_slopes,
+    state_at_rest,
+)
 from msfp_gen.simulation.streamed_rows import StreamedRows
 
 if TYPE_CHECKING:
@@ -126,7 +133,7 @@ def simulate(
     file = None if stream is None else check_output(stream, DATASET_SUFFIXES, "stream")
     parameters = gradient_parameters(scene, gradients, checkpoint, stream, energy_gradients)
     require_room(scene, file, copies=1 + len(parameters))
-    sequence = replace(RunSequence.of(scene, strict), stream=file, parameters=parameters, energies=energy_gradients)
+    sequence = replace(RunSequence.of(scene, strict, parameters), stream=file, energies=energy_gradients)
     while sequence.effects is not None:
         segments = sequence.segments
         saved = None if checkpoint is None else segment_file(checkpoint, len(segments))
@@ -148,7 +155,8 @@ class RunSequence:
 
     given: the scene of the user. scene: the same with the initial state after settling. effects: of the next segment;
     None: the run has ended. notes: those of the segments that have ended. stream: the file to which all rows go.
-    parameters: of the derivatives; energies: whether these include energies that are integrals over the run.
+    parameters: of the derivatives; energies: whether these include energies that are integrals over the run. start: the
+    derivatives of the state after settling; None: the run starts as the scene says.
     """
 
     given: Scene
@@ -160,12 +168,14 @@ class RunSequence:
     stream: Path | None = None
     parameters: tuple[Parameter, ...] = ()
     energies: bool = False
+    start: StartSlopes | None = None
 
     @classmethod
-    def of(cls, scene: Scene, strict: bool = False) -> RunSequence:
+    def of(cls, scene: Scene, strict: bool = False, parameters: tuple[Parameter, ...] = ()) -> RunSequence:
         """The sequence before its first segment. Raises RunError as `settle`."""
-        settled = settle(scene)
-        return cls(scene, settled, strict, settled.effect_selection.effects, [], [])
+        settled, start = settle(scene, parameters)
+        effects = settled.effect_selection.effects
+        return cls(scene, settled, strict, effects, [], [], parameters=parameters, start=start)
 
     def start_segment(self, model: Model) -> tuple[Run, float]:
         """The compiled run of the next segment before its first step, and the azimuth of its frame [rad]."""
@@ -176,7 +186,7 @@ class RunSequence:
         stops = stopping_monitors(scene, model.effects, self.strict)
         run, azimuth = start_run(scene, model, selection, end, at, stops)
         if self.parameters:
-            start_gradients(run, scene, model, self.parameters, energies=self.energies)
+            start_gradients(run, scene, model, self.parameters, energies=self.energies, start=self.start)
         return run, azimuth
 
     def run_segment(self, progress: Progress | None, options: CheckpointOptions = NO_CHECKPOINT) -> None:
@@ -211,18 +221,21 @@ class RunSequence:
         return _result(self, joined(histories, self.given.output_step, before))
 
 
-def settle(scene: Scene) -> Scene:
+def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, StartSlopes | None]:
     """A scene whose plates are tilted at the start, with the initial state after a slow tilting; others unchanged.
 
-    Raises RunError where that tilting fails.
+    Returns the derivatives of that state too; None: the run starts as the scene says. Raises RunError where the tilting
+    fails.
     """
     if not needs_settling(scene):
-        return scene
+        return scene, None
+    moving = [parameter.path for parameter in parameters if moves_settling(parameter)]
     try:
-        end = simulate(settling_scene(scene)).history
+        end = simulate(settling_scene(scene), gradients=moving, gradient_errors=False)
     except RunError as error:
         raise RunError(f"before the start, while the plates are tilted: {error}", status=error.status) from error
-    return replace(scene, initial_state=state_at_rest(end.tilt_angles[-1], end.friction_state[-1]))
+    state = state_at_rest(end.history.tilt_angles[-1], end.history.friction_state[-1])
+    return replace(scene, initial_state=state), start_slopes(end.history, end.gradients, parameters)
 
 
 def _segment(sequence: RunSequence, progress: Progress | None, options: CheckpointOptions) -> Segment:

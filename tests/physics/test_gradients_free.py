@@ -11,7 +11,7 @@ import pytest
 from support import Array, scene_of
 from support.gradients import DAMPED, derivative, double, single, step_of, triple, values_around
 
-from msfp_gen import Effects, Motion, Result, Scene, load_scene, simulate
+from msfp_gen import Effects, Motion, Result, Rotation, Scene, load_scene, simulate
 from msfp_gen.results.gradient import energy_terms
 from msfp_gen.scene.parameters import changed_parameters, parameters_of
 
@@ -330,3 +330,26 @@ def test_the_gradient_after_a_rim_contact_under_a_sampled_motion_improves_with_t
         error = given.top_force.values[0, rows, 0] - found
         assert np.linalg.norm(error) <= limit * np.linalg.norm(found), (method, rtol)
         assert given.event_time.values[0, 0] == pytest.approx(-0.1653, rel=0.02)
+
+
+@pytest.mark.slow
+def test_plates_that_are_tilted_at_the_start() -> None:
+    """The state after the slow tilting depends on the parameters, and runs of their own compute it for differences."""
+    scene = triple(0.2, rtol=1e-9, method="esdirk4")
+    motion = scene.motion.rocking(Rotation.constant(0.003, 0.006))
+    scene = replace(scene, motion=motion, motion_table=None, output_step=0.02)
+    sizes = dict.fromkeys(
+        ("bearing.surfaces[0].friction", "bearing.bodies[0].height", "top.axial_load", "motion.scale"), 1e-4
+    )
+    gradients = simulate(scene, gradients=list(sizes)).gradients
+    assert gradients is not None
+    for index, parameter in enumerate(parameters_of(scene, list(sizes))):
+        step = step_of(parameter, sizes[parameter.path])
+        values = values_around(parameter, step)
+        runs = [simulate(changed_parameters(scene, {parameter: value})).history for value in values]
+        for name in ("tilt_angles", "friction_state"):
+            found, noise = derivative([getattr(run, name) for run in runs], step)
+            slope = gradients.arrays[name][index]
+            limit = 3e-3 * np.abs(found).max() + noise.max()
+            assert np.abs(slope - found).max() <= limit, (parameter.path, name)
+            assert slope[0].any() == (parameter.part != "motion")

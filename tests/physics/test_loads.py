@@ -102,7 +102,7 @@ def test_plates_are_settled_where_they_are_tilted_at_the_start() -> None:
 @pytest.mark.slow
 def test_a_settled_run_starts_where_the_settling_ended() -> None:
     tilted = double(motion=STILL.rocking(Rotation.constant(theta=0.01)))
-    end, state = simulate(settling_scene(tilted)).history, settle(tilted).initial_state
+    end, state = simulate(settling_scene(tilted)).history, settle(tilted)[0].initial_state
     assert state is not None and (end.tilt_angles[-1] != end.tilt_angles[-2]).any()
     np.testing.assert_array_equal(state.q, end.tilt_angles[-1])
     np.testing.assert_array_equal(state.h, end.friction_state[-1])
