@@ -10,7 +10,7 @@ from msfp_gen.common.output import replacing
 from msfp_gen.generator.assembled import assembled_latex
 from msfp_gen.generator.derive import derive
 from msfp_gen.generator.latex import statements
-from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of
+from msfp_gen.generator.schedule import Decision, Over, Pass, condensed, momentum_balances, passes_of, two_port
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
@@ -90,6 +90,14 @@ BALANCES = r"""### The momentum balances
 The balances (3.26)-(3.29) at given unknowns (2.119), as PEER 2017/07 states them, with the state of `friction` and the
 `unknowns` of the contacts. With locked spin $\ddot\phi_k = 0$ takes the place of the axial balance of a body."""
 
+TWO_PORT = r"""### The ends of a two-port
+
+Where another program moves both ends ([embedding.md](embedding.md#two-moving-ends-the-two-port)): the motion of the
+upper end, `far_end`, and its rotation, `support`, give the load and the axis on which `top_wrench` depends; the lower
+end is `frame` and `x[1]`. After an evaluation follow the wrenches of the ends. `held` sums the moments that lock the
+spin. The programs of the condensed equations and these are differentiated by the motion of the ends too, stage by
+stage."""
+
 OVER = {
     Over.BASE: "base",
     Over.BODIES: "bodies $k = 2, \\dots, n$",
@@ -126,6 +134,10 @@ TITLES = {
     "base_power": "Power of a rotating base",
     "lock_power": "Power of the moment that locks the spin",
     "rotation_angles": "Angles (2.1) of the rotation vector of an end of a two-port, with two derivatives",
+    "interface_load": "Load on the top plate of a two-port, by the moving end of its interface",
+    "locking_moment": "Moment that locks the spin of a body, which the lower end of a two-port exerts",
+    "lower_wrench": "Wrench of the lower end of a two-port, about its position",
+    "upper_wrench": "Wrench of the upper end",
     "slid_friction": "Friction over the slip of a step in closed form: (3.18) integrated, (3.19)",
     "slip_work": "Work of friction over that slip",
 }
@@ -186,6 +198,7 @@ def schedule_section() -> list[str]:
         *(CONDENSED, schedule_table(passes_of(condensed(effects)))),
         *(UPLIFT, schedule_table((*uplift["forces"], *uplift["moments"]))),
         *(BALANCES, schedule_table(passes_of(momentum_balances(effects)))),
+        *(TWO_PORT, schedule_table(passes_of(two_port(Effects(top_rotation=True))))),
     ]
 
 

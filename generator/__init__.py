@@ -42,7 +42,7 @@ def generate(spec: ModelSpec) -> Generated:
         spec: layout and effects.
     """
     from .derive import derive
-    from .drivers import directional_kernels
+    from .drivers import directional_kernels, end_kernels
     from .emit import emit
     from .gradients import directional_programs
     from .lower import lower
@@ -54,10 +54,11 @@ def generate(spec: ModelSpec) -> Generated:
     directional: tuple[Kernel, ...] = ()
     if spec.gradients:
         directional = (*directional_kernels(equations), *map(lower, directional_programs(equations.programs)))
+    by_ends = end_kernels(equations) if spec.effects.permits_moving_ends else ()
     times.append(time.perf_counter())
-    files = emit(equations, kernels, directional)
+    files = emit(equations, kernels, directional, by_ends)
     times.append(time.perf_counter())
     stages = {name: b - a for name, a, b in zip(("derive", "lower", "emit"), times, times[1:], strict=False)}
-    kernels += directional
+    kernels += directional + by_ends
     statements = sum(len(k.values) + len(k.partials) + len(k.tangents) for k in kernels)
     return Generated(files, statements, sum(k.operations + k.tangent_operations for k in kernels), stages)

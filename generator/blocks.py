@@ -70,7 +70,8 @@ class Blocks:
     power: Block
     turn: Block
     rotation_angles: Block
-    axis_turn: Block
+    far_end: Block
+    end_wrench: Block
     coefficient: Block | None = None
     """The friction coefficient as an unknown, where it follows a law."""
 
@@ -338,15 +339,28 @@ def _works(new: Maker) -> Block:
 
 
 def _ends(new: Maker, uplift: bool) -> dict[str, Block]:
-    """Rotation of the end of a two-port, in space also where the model is planar."""
+    """Ends of a two-port: their rotations, in space also where the model is planar, the interface, the wrenches."""
     turn, angles = new("turn"), new("rotation_angles")
     for order, per in enumerate(("", "/s", "/s^2")):
         suffix = str(order or "")
         turn.vector(f"r{suffix}", f"rad{per}", f"rotation vector, derivative {order} in time", (None, None, None))
         for name in ("psi", "theta", "phi"):
             angles.scalar(f"{name}{suffix}", f"rad{per}", f"{name}, derivative {order} in time")
-    axis = new("axis_turn").vector("w", "rad/s", "angular velocity of the axis of the support", (None, None, None))
-    return {"turn": turn.build(), "rotation_angles": angles.build(), "axis_turn": axis.build()}
+    far_end = (
+        new("far_end")
+        .vector("u", "m", "displacement of the far side of the interface", POLAR)
+        .vector("v", "m/s", "its rate", POLAR)
+        .vector("a", "m", "where the springs of the top are fixed: a displacement of the far side", POLAR)
+        .vector("rest", "m", "position of the far side at u = 0: r_nn at rest", POLAR)
+        .scalar("axial", "N", "axial load at rest")
+    )
+    wrench = (
+        new("end_wrench")
+        .vector("F", "N", "force that the end exerts on the bearing", POLAR)
+        .vector("M", "N m", "moment about the present position of the end", AXIAL)
+    )
+    built = {"turn": turn, "rotation_angles": angles, "far_end": far_end, "end_wrench": wrench}
+    return {name: builder.build() for name, builder in built.items()}
 
 
 def _balances(new: Maker, uplift: bool) -> dict[str, Block]:

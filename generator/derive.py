@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from msfp_gen.specification.layout import ModelSpec
 
-from . import body, columns, contact, energy, laws, parameters, rotation, seat, slip, top
+from . import body, columns, contact, energy, laws, parameters, rotation, seat, slip, top, two_port
 from .blocks import Blocks, make_blocks
 from .program import Program
 
@@ -82,9 +82,10 @@ def derive(spec: ModelSpec) -> Equations:
         contact.gap(blocks),
         *energy.programs(blocks, effects.rims, effects.uplift, effects.top_rotation),
         rotation.rotation_angles(blocks),
+        *two_port.programs(blocks),
     ]
     if effects.top_rotation:
-        programs += [top.upright(blocks), rotation.axis_turn(blocks)]
+        programs.append(top.upright(blocks))
     if effects.permits_quasistatic_steps:
         programs += [slip.slid_friction(blocks, effects.bouc_wen), slip.slip_work(blocks, effects.bouc_wen)]
     if effects.rims:

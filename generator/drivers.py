@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
+from . import two_port as ends
 from .derive import Equations
 from .gradients import directional
 from .lower import Kernel, lower
@@ -32,6 +35,7 @@ from .schedule import (
     momentum_balances,
     passes_of,
     tangent_of,
+    two_port,
     unknowns,
 )
 
@@ -55,26 +59,67 @@ def scheduled_kernels(equations: Equations) -> tuple[Kernel, ...]:
 
 def directional_kernels(equations: Equations) -> tuple[Kernel, ...]:
     """Directional derivatives of the programs of the condensed equations and of the energies."""
-    called = _called(condensed(equations.spec.effects)) | _called(energies(equations.spec.effects))
+    return _kernels(equations, {**condensed(equations.spec.effects), **energies(equations.spec.effects)}, directional)
+
+
+def end_kernels(equations: Equations) -> tuple[Kernel, ...]:
+    """Derivatives of the programs of the condensed equations and of a two-port by the motion of its ends."""
+    effects = equations.spec.effects
+    scheduled = _kernels(equations, {**condensed(effects), **two_port(effects)}, ends.by_ends)
+    return (*scheduled, *ends.outside(equations.programs))
+
+
+def _kernels(
+    equations: Equations, schedule: Schedule, differentiate: Callable[[Program, bool], Program]
+) -> tuple[Kernel, ...]:
+    called = _called(schedule)
     return tuple(
-        lower(directional(program, _at_hand(called[program.name])))
+        lower(differentiate(program, _at_hand(called[program.name])))
         for program in equations.programs
         if program.name in called
     )
 
 
-def schedule_context(equations: Equations, directional: Iterable[Kernel]) -> dict[str, Any]:
-    """What the templates of the schedules need. directional: the kernels of a model with gradients."""
+@dataclass(frozen=True)
+class Form:
+    """Directional derivatives by one set of directions.
+
+    Attributes:
+        name: that of the member of `InC`, and of the beginning of that of `List`, with C of the derivatives.
+        kernels: name of a program -> its derivatives.
+        read: the lists whose values these contain.
+    """
+
+    name: str
+    kernels: Mapping[str, Kernel]
+    read: set[str]
+
+
+def _form(name: str, suffix: str, schedule: Schedule, kernels: Iterable[Kernel]) -> Form:
+    found = {kernel.program.name.removesuffix(suffix): kernel for kernel in kernels}
+    return Form(name, found, _read_values(schedule, found))
+
+
+def schedule_context(equations: Equations, directional: Iterable[Kernel], by_ends: Iterable[Kernel]) -> dict[str, Any]:
+    """What the templates of the schedules need. directional, by_ends: the kernels of a model that has these."""
     effects, programs = equations.spec.effects, {program.name: program for program in equations.programs}
     balances, with_directions = momentum_balances(effects), {**condensed(effects), **energies(effects)}
+    port, of_ends = two_port(effects), {**condensed(effects), **two_port(effects)}
     moving = check(passes_of(balances), programs, equations.blocks)
     moving |= check(passes_of(with_directions), programs, equations.blocks)
     directed = _lists(with_directions)
-    used = {name: None for name in LISTS if name in directed or name in _lists(balances)}
-    read = _read_values(with_directions, {kernel.program.name: kernel for kernel in directional})
+    used = {name: None for name in LISTS if name in directed or name in _lists(balances) or name in _lists(port)}
+    forms = {
+        "directions": _form("directions", "_direction", with_directions, directional),
+        "by_ends": _form("by_ends", "_by_ends", of_ends, by_ends),
+    }
+    if forms["by_ends"].kernels:
+        check_by_ends(equations, forms["by_ends"].kernels)
+    every = {**balances, **with_directions, **port}
     return {
-        "parts": [_part(name, passes, programs, read) for name, passes in {**balances, **with_directions}.items()],
+        "parts": [_part(name, passes, programs, forms) for name, passes in every.items()],
         "directed": list(with_directions),
+        "of_ends": list(of_ends),
         "blocks": [_declared(LISTS[name], equations) for name in used if LISTS[name].kept is Kept.HERE],
         "block_tangents": [
             _declared(LISTS[name], equations) for name in used if name in moving and not LISTS[name].tangents
@@ -84,12 +129,30 @@ def schedule_context(equations: Equations, directional: Iterable[Kernel]) -> dic
             for name in directed
             if not LISTS[name].directions and LISTS[name].kept is not Kept.PARAMETERS
         ],
+        "blocks_by_ends": [
+            _declared(LISTS[name], equations) for name in _lists(of_ends) if LISTS[name].kept is not Kept.PARAMETERS
+        ],
         "variables": [
             (kind, [_entries(name, quantities, equations) for name, quantities in parts])
             for kind, parts in VARIABLES.items()
         ],
         "unknowns": unknowns(equations.spec),
     }
+
+
+def check_by_ends(equations: Equations, kernels: Mapping[str, Kernel]) -> None:
+    """As `check`, for the derivatives by the motion of the ends; kernels: by the name of the program."""
+    programs = {
+        program.name: replace(
+            kernels[program.name].program, inputs=kernels[program.name].program.inputs[: len(program.inputs)]
+        )
+        for program in equations.programs
+        if program.name in kernels
+    }
+    effects = equations.spec.effects
+    port = two_port(effects)
+    passes = passes_of({"interface": port["interface"], **condensed(effects), **port})
+    check(passes, programs, equations.blocks, ends.moving(equations.blocks), "by_ends")
 
 
 def _called(schedule: Schedule) -> dict[str, Call]:
@@ -110,10 +173,10 @@ def _lists(schedule: Schedule) -> dict[str, None]:
 
 
 def _read_values(schedule: Schedule, kernels: Mapping[str, Kernel]) -> set[str]:
-    """The lists whose values the directional derivatives of a schedule contain."""
+    """The lists whose values the directional derivatives of a schedule contain. kernels: by the name of the program."""
     read = set[str]()
     for call in _emitted(schedule):
-        for kernel in (kernels[f"{name}_direction"] for name in call.programs if f"{name}_direction" in kernels):
+        for kernel in (kernels[name] for name in call.programs if name in kernels):
             symbols = {
                 s.name for statement in (*kernel.values, *kernel.partials) for s in statement.expression.free_symbols
             }
@@ -129,9 +192,10 @@ def _at_hand(call: Call) -> bool:
     return call.by is None and not call.adds and len(call.writes) == 1 and list_of(call.writes[0]).kept is Kept.WORK
 
 
-def _part(name: str, passes: Iterable[Pass], programs: Programs, read: set[str]) -> dict[str, Any]:
+def _part(name: str, passes: Iterable[Pass], programs: Programs, directional: Mapping[str, Form]) -> dict[str, Any]:
     calls = list(calls_of(passes))
-    forms: dict[str, Lines] = {"values": _values, "tangents": _tangents, "directions": partial(_directions, read=read)}
+    forms: dict[str, Lines] = {"values": _values, "tangents": _tangents}
+    forms |= {key: partial(_directions, form=form) for key, form in directional.items() if _has(calls, form)}
     lines = {
         form: [(one, [line for call in one.calls for line in of(call, programs)]) for one in passes]
         for form, of in forms.items()
@@ -152,6 +216,11 @@ def _part(name: str, passes: Iterable[Pass], programs: Programs, read: set[str])
             for form, written in lines.items()
         },
     }
+
+
+def _has(calls: Iterable[Call], form: Form) -> bool:
+    """Whether a form has the derivatives of calls."""
+    return all(name in form.kernels for call in calls for name in call.programs if not isinstance(call.by, InC))
 
 
 def _unused(lines: Iterable[str]) -> list[str]:
@@ -249,29 +318,29 @@ def _tangent(call: Call, program: Program, writes: list[str]) -> Iterator[str]:
     yield "}"
 
 
-def _directions(call: Call, programs: Programs, read: set[str]) -> Iterator[str]:
-    """Statements that differentiate a call by parameters, with its values where the work area does not hold them.
-
-    read: the lists whose values some call reads.
-    """
+def _directions(call: Call, programs: Programs, form: Form) -> Iterator[str]:
+    """Statements that differentiate a call along directions, with its values where the work area does not hold them."""
     if isinstance(call.by, InC):
-        yield f"{call.by.directions};"
+        yield f"{getattr(call.by, form.name)};"
         return
-    writes = [_in_c(list_of(place).directions_in_c, place) for place in call.writes]
+    member = attrgetter(f"{form.name}_in_c")
+    writes = [_in_c(member(list_of(place)), place) for place in call.writes]
     names = {place.partition("[")[0] for place in call.writes}
-    values = any(LISTS[name].kept is Kept.HERE for name in names & read)
-    many = ((name, list(_direction(call, programs[name], writes, values))) for name in call.programs)
+    values = any(LISTS[name].kept is Kept.HERE for name in names & form.read)
+    many = ((name, list(_direction(call, programs[name], writes, values, form))) for name in call.programs)
     yield from _chosen(call, writes, many)
 
 
-def _direction(call: Call, program: Program, writes: list[str], with_values: bool) -> Iterator[str]:
+def _direction(call: Call, program: Program, writes: list[str], with_values: bool, form: Form) -> Iterator[str]:
     if with_values:
         yield from _evaluated(call, program)
+    derivatives, member = form.kernels[program.name].program, attrgetter(f"{form.name}_in_c")
     reads = [_in_c(list_of(place).values_in_c, place) for place in call.reads]
     values = [_in_c(list_of(place).values_in_c, place) for place in call.writes] if _at_hand(call) else []
-    moving = [_in_c(list_of(place).directions_in_c, place) for place in call.reads]
-    size = f"{_size(program)} * MSFP_COLUMNS"
-    yield from _written(call, f"msfp_{program.name}_direction", [*reads, *values, *moving], writes, size)
+    places = [place for place, use in zip(call.reads, derivatives.inputs, strict=False) if use.moving]
+    moving = [_in_c(member(list_of(place)), place) for place in places]
+    size = f"{_size(program)} * {derivatives.columns}"
+    yield from _written(call, f"msfp_{derivatives.name}", [*reads, *values, *moving], writes, size)
 
 
 def _chosen(call: Call, writes: list[str], programs: Iterable[tuple[str, list[str]]]) -> Iterator[str]:

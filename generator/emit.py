@@ -25,6 +25,7 @@ from .program import Block, Use
 
 # Each is made from the template of its name.
 GRADIENT_FILES = ("msfp_gradient_kernels.h", "msfp_directions.h")  # of models with gradients
+TWO_PORT_FILES = ("msfp_by_ends.h",)  # of models that can be a two-port
 FILES = (
     "msfp.h",
     "msfp_symbols.h",
@@ -215,8 +216,16 @@ def description(spec: ModelSpec) -> str:
     )
 
 
-def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[Kernel, ...] = ()) -> dict[str, str]:
-    """Render all generated files: {file name: text}. directional: kernels of a model with gradients."""
+def emit(
+    equations: Equations,
+    kernels: tuple[Kernel, ...],
+    directional: tuple[Kernel, ...] = (),
+    by_ends: tuple[Kernel, ...] = (),
+) -> dict[str, str]:
+    """Render all generated files: {file name: text}.
+
+    directional: kernels of a model with gradients; by_ends: of one that can be a two-port.
+    """
     spec = equations.spec
     every = (equations.blocks, equations.value_blocks, equations.column_blocks)
     groups = [group for group in every if group is not None]
@@ -230,6 +239,7 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         "blocks": blocks,
         "functions": [function(k) for k in kernels],
         "directional": [function(k) for k in directional],
+        "by_ends": [function(k) for k in by_ends],
         "gradient": {"columns": COLUMNS} | contact_lists(k.program for k in directional),
         "nb": spec.layout.surfaces,
         "lanes": lanes(spec.layout.surfaces),
@@ -251,10 +261,11 @@ def emit(equations: Equations, kernels: tuple[Kernel, ...], directional: tuple[K
         **interface_context(spec, shape_of(spec), public_header()),
         "checks": checks_context(spec),
         "scheduled": [function(k) for k in scheduled_kernels(equations)],
-        "schedule": schedule_context(equations, directional),
+        "schedule": schedule_context(equations, directional, by_ends),
     }
     names = {name: name for name in FILES} | {f"{model_name(spec)}.h": "msfp_layout.h"}
     names |= {name: name for name in GRADIENT_FILES if spec.gradients}
+    names |= {name: name for name in TWO_PORT_FILES if spec.effects.permits_moving_ends}
     templates = environment()
     return {
         file: templates.get_template(f"{template}.jinja").render(context, file=file) for file, template in names.items()

@@ -42,27 +42,34 @@ def _with_all_inputs(use: Use) -> Use:
 
 
 def directional(program: Program, at_hand: bool) -> Program:
-    """The program with all inputs active; the derivative of every result is emitted.
+    """The program with all inputs active and every result differentiated; at_hand: as of `differentiated`."""
+    inputs = [_with_all_inputs(use) for use in program.inputs]
+    return differentiated(program, "direction", inputs, frozenset(program.results), "MSFP_COLUMNS", at_hand)
+
+
+def differentiated(
+    program: Program, name: str, inputs: list[Use], tangents: frozenset[str], columns: str, at_hand: bool
+) -> Program:
+    """The derivatives of a program, as one of another name, with other inputs active and other results differentiated.
 
     at_hand: the results themselves are read, as a block `out`, where the derivatives contain them.
     """
     assert program.output is not None
-    inputs = [_with_all_inputs(use) for use in program.inputs]
     names: dict[sp.Expr, sp.Expr] = {}
     if at_hand:
-        inputs.append(program.output)
+        inputs = [*inputs, program.output]
         computed = {statement.target for statement in program.statements}
         for field, result in program.results.items():
             if result in computed:
                 names.setdefault(result, sp.Symbol(f"{program.output.alias}_{field}", real=True))
     return replace(
         program,
-        name=f"{program.name}_direction",
+        name=f"{program.name}_{name}",
         inputs=inputs,
         statements=[Statement(s.target.xreplace(names), s.expression.xreplace(names)) for s in program.statements],
         results={field: result.xreplace(names) for field, result in program.results.items()},
-        tangents=frozenset(program.results),
-        columns="MSFP_COLUMNS",
+        tangents=tangents,
+        columns=columns,
         lanes="",
         stored=False,
     )

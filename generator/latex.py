@@ -148,6 +148,11 @@ SYMBOLS: dict[str, dict[str, str]] = {
         for order, dot in enumerate(("", "dot", "ddot"))
         for name in ("psi", "theta", "phi")
     },
+    "far_end": {"u": "u_{B,#}", "v": r"\dot{u}_{B,#}", "a": "a_{#}", "rest": "r_{B,#}", "axial": "W"},
+    "end_wrench": {"F": "F_{@,#}", "M": "M_{@,#}"},
+    "frame": {"C": "u_{A,#}"},
+    "held": {"M": r"M^{\phi}_{@,#}"},
+    "all_held": {"M": r"\Sigma M^{\phi}_{#}"},
     "lock": {"moment": r"M^{\phi}_{@}"},
     "power": {"power": r"\dot{W}_{@}"},
     "linear": {"r": r"\epsilon_{@,#}"},
@@ -189,6 +194,10 @@ PLACES: dict[str, dict[str, str]] = {
     "base_power": {"b": "1", "base": "g", "f": "1", "m": "1", "out": "1"},
     "lock_power": {"b": "k", "l": "k", "out": "k"},
     "rotation_angles": {"t": "", "out": ""},
+    "interface_load": {"par": "T", "e": "B", "out": "E"},
+    "locking_moment": {"b": "k", "l": "k", "out": "k"},
+    "lower_wrench": {"e": "A", "b": "1", "f": "1", "m": "1", "h": "", "out": "A"},
+    "upper_wrench": {"e": "B", "b": "n", "f": "n", "m": "n", "out": "B"},
     "slid_friction": {"par": r"\gamma", "s": r"\gamma", "loc": r"\gamma", "out": r"\gamma"},
     "slip_work": {"par": r"\gamma", "s": r"\gamma", "e": r"\gamma", "out": r"\gamma"},
     "linear_balance": {"par": "k", "b": "k", "lo": "k-1", "up": "k", "out": "k"},
@@ -197,6 +206,10 @@ PLACES: dict[str, dict[str, str]] = {
 # (program, alias) -> kind of record, where it differs from the name of the block.
 KINDS = {
     ("moment_to_world", "loc"): "local_moment",
+    ("interface_load", "out"): "top_force",
+    ("locking_moment", "out"): "held",
+    ("lower_wrench", "e"): "frame",
+    ("lower_wrench", "h"): "all_held",
     **{(name, "fe"): "top_force" for name in ("top_wrench", "top_power")},
     **{(name, "me"): "top_moment" for name in ("top_wrench", "top_power")},
 }

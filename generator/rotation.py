@@ -1,4 +1,4 @@
-"""Programs of an end of a two-port: angles of its rotation vector, angular velocity of the axis that it turns.
+"""The rotation of an end of a two-port: angles of its rotation vector.
 
 The rotation matrix is cos(x) I + c_1 [r]x + c_2 r r^T with x = |r| and the Stumpff functions c_1 = sin(x)/x and
 c_2 = (1 - cos x)/x^2 of x^2, which are regular at x = 0 (docs/embedding.md, the two-port).
@@ -52,15 +52,4 @@ def rotation_angles(b: Blocks) -> Program:
     rates = {f"{name}1": p.rate(angle) for name, angle in angles.items()}
     second = {f"{name[:-1]}2": p.rate(rate) for name, rate in rates.items()}
     p.write(b.rotation_angles, {**angles, **rates, **second}, tangents=False)
-    return p
-
-
-def axis_turn(b: Blocks) -> Program:
-    """Angular velocity of the axis t_3 of a rotating support, (3.12) without spin, from its rotation vector."""
-    p = Program("axis_turn", "angular velocity (3.12) of the axis that a rotation vector turns")
-    angles = _angles(p, p.read(b.turn, "t", active=("r", "r1")))
-    psi1, theta1 = p.rate(angles["psi"]), p.rate(angles["theta"])
-    psi = angles["psi"]
-    turn = (psi1, theta1 * p.let(sp.cos(psi)), theta1 * p.let(sp.sin(psi)))
-    p.write(b.axis_turn, {"w": turn}, columns="6")
     return p

@@ -1,9 +1,9 @@
 """Schedules: which program runs over which bodies and surfaces, from which blocks to which.
 
 A program (`derive.py`) describes one body or one surface. A schedule states, as data, how the programs of a stack
-follow each other in one evaluation. The C that calls them is emitted from it three times (`drivers.py`): for the
-values, for derivatives with respect to the variables of a step, and, in models with gradients, for directional
-derivatives with respect to parameters; each program by its own tangent.
+follow each other in one evaluation. The C that calls them is emitted from it several times (`drivers.py`): for the
+values, for derivatives with respect to the variables of a step, for those by the motion of the ends of a two-port and,
+in models with gradients, for directional derivatives with respect to parameters; each program by its own tangent.
 
 A place is a block in a list of blocks: `body[k-1]` is the block of the body below body k, `rim[j]` that of surface j,
 which lies between bodies j and j+1. `base` and `top` are the indices of the lowest and of the highest body.
@@ -60,12 +60,14 @@ class InC:
         values: an expression, or with `fails` one that returns a status, at which the evaluation ends.
         tangents: derivatives by the variables of a step; empty where nothing that moves depends on it.
         directions: derivatives by parameters.
+        by_ends: derivatives by the motion of the ends of a two-port; empty where nothing of it needs them.
         fails: whether `values` returns a status.
     """
 
     values: str
     tangents: str
     directions: str
+    by_ends: str = ""
     fails: bool = False
 
 
@@ -151,6 +153,11 @@ class List:
             return f"dp->{self.name}"
         return f"d->{self.name}" if self.directions else f"ds->{self.name}"
 
+    @property
+    def by_ends_in_c(self) -> str:
+        """C of their derivatives by the motion of the ends of a two-port, which are all in one record."""
+        return "" if self.kept is Kept.PARAMETERS else f"d->{self.name}"
+
 
 SURFACES, BODIES = "MSFP_NB", "MSFP_NB + 1"
 LISTS: Mapping[str, List] = {
@@ -201,6 +208,12 @@ LISTS: Mapping[str, List] = {
     "lock_power": List("power", "lock_power"),
     "friction_power": List("friction_power", "friction_power"),
     "works": List("works", "works"),
+    "far_end": List("far_end", "far_end"),
+    "support": List("support", "support"),
+    "held": List("moment", "held"),
+    "lower": List("end_wrench", "lower"),
+    "upper": List("end_wrench", "upper"),
+    "gap": List("gap", "gap", length=SURFACES),
 }
 """All lists of blocks."""
 
@@ -241,6 +254,7 @@ def _top(effects: Effects) -> Pass:
     """Force and moment above the top plate, and the foot of a mass on a vertical spring."""
     support = ("upright",) if effects.top_rotation else ()
     reads = ("top_parameters", "foot_stage", "body[top]", "x[top]", "load_force", "load_moment", *support)
+    foot = "p->top, w->body[MSFP_NB], s->foot_stage, w->foot, d->body[MSFP_NB], d->foot_stage, d->foot"
     return Pass(
         Over.TOP,
         (
@@ -249,7 +263,12 @@ def _top(effects: Effects) -> Pass:
                 "foot",
                 ("top_parameters", "body[top]", "foot_stage"),
                 ("foot",),
-                InC("msfp_move_foot(p, s->foot_stage, w)", "", "msfp_foot_columns(p, dp, s->at, ds->point, w, d)"),
+                InC(
+                    "msfp_move_foot(p, s->foot_stage, w)",
+                    "",
+                    "msfp_foot_columns(p, dp, s->at, ds->point, w, d)",
+                    f"if (msfp_top_is_sprung(p)) msfp_foot_by_ends({foot})",
+                ),
             ),
         ),
     )
@@ -342,11 +361,14 @@ def condensed(effects: Effects) -> Schedule:
     """
     rim, uplift = ("rim[j]",) if effects.rims else (), effects.uplift
     law = ("coefficient[j]",) if effects.law is not None else ()
+    values = "p->surface[j], w->stage[j], w->local[j], s->g[j]" + (", w->coefficient[j]" if law else "")
+    moved = "w->contact[j], d->stage[j], d->local[j], d->contact[j]"
     summed = Call("interface_force", ("body_parameters[j+1]", "body[j+1]", "force[j+1]"), ("force[j]",))
     contact = InC(
         "msfp_contacts(p, w, s->seed, s->g, s->jacobians ? s->jacobians->contact : NULL)",
         "msfp_contact_tangents(w, ds->local, ds->contact)",
         "msfp_contact_columns(p, dp, w, ds->point, ds->slopes, s->seed, ds->all, d)",
+        f"for (int j = 0; j < MSFP_NB; ++j) msfp_contact_by_ends({values}, {moved})",
         fails=True,
     )
     split = ("surface_parameters[j]", "joint_moment[j]", "unilateral[j]", *(("rim_wrench[j]",) if effects.rims else ()))
@@ -452,6 +474,28 @@ def energies(effects: Effects) -> Schedule:
     }
 
 
+def two_port(effects: Effects) -> Schedule:
+    """The ends of a two-port: load and support of the top plate; after an evaluation the wrenches of the ends."""
+    moment = "below[base]" if effects.uplift else "moment[base]"
+    support = (Call("upright", ("support",), ("upright",)),) if effects.top_rotation else ()
+    # At the centre the sliding displacement has a kink, where its derivative counts as zero.
+    tilted = "msfp_body_sp(w->body[j + 1]) != 0.0 || w->body[j + 1][MSFP_BODY_ST] != 0.0"
+    sliding = Call("gap", ("surface_parameters[j]", "body[j+1]"), ("gap[j]",), Decision("", {"gap": tilted}))
+    return {
+        "interface": (
+            Pass(Over.TOP, (Call("interface_load", ("top_parameters", "far_end"), ("load_force",)), *support)),
+        ),
+        "wrenches": (
+            Pass(Over.BODIES, (Call("locking_moment", ("body[k]", "lock[k-1]"), ("held",), adds=True),)),
+            Pass(
+                Over.BASE, (Call("lower_wrench", ("frame", "body[base]", "force[base]", moment, "held"), ("lower",)),)
+            ),
+            Pass(Over.TOP, (Call("upper_wrench", ("far_end", "body[top]", "force[top]", "moment[top]"), ("upper",)),)),
+        ),
+        "sliding": (Pass(Over.SURFACES, (sliding,)),),
+    }
+
+
 def list_of(place: str) -> List:
     """The list of a place."""
     return LISTS[place.partition("[")[0]]
@@ -511,21 +555,31 @@ def tangent_of(program: Program) -> Program:
     return replace(program, name=f"{program.name}_columns", columns=COLUMNS)
 
 
-def check(passes: Iterable[Pass], programs: Mapping[str, Program], blocks: Blocks) -> set[str]:
+def check(
+    passes: Iterable[Pass],
+    programs: Mapping[str, Program],
+    blocks: Blocks,
+    given: Iterable[tuple[str, str]] | None = None,
+    form: str = "tangents",
+) -> set[str]:
     """Raise AssertionError where a place does not fit its program, or a derivative would be lost or is not there.
 
-    Every derivative that a call reads must have been written by an earlier one, or belong to `VARIABLES`; and a call
-    must not take for constant what has derivatives. What C differentiates itself is checked for its places only.
+    Every derivative that a call reads must have been written by an earlier one, or be given: (list, field), those of
+    `VARIABLES` where it is None. A call must not take for constant what has derivatives. What C differentiates itself,
+    as the member `form` of `InC` says, is checked for its places only.
 
     Returns:
         The lists that have derivatives.
     """
-    moving = {(name, field.name) for parts in VARIABLES.values() for name, _ in parts for field in _block(name, blocks)}
+    variables = (
+        (name, field.name) for parts in VARIABLES.values() for name, _ in parts for field in _block(name, blocks)
+    )
+    moving = set(variables if given is None else given)
     every = ((call, programs[name]) for call in calls_of(passes) for name in call.programs)
     for call, program in every:
         assert program.output is not None
         assert len(call.reads) == len(program.inputs), call
-        assert not isinstance(call.by, InC) or call.by.tangents or not program.tangents, call
+        assert not isinstance(call.by, InC) or getattr(call.by, form) or not program.tangents, call
         needed = set() if isinstance(call.by, InC) else _differentiated(program)
         for place, use in zip(call.reads, program.inputs, strict=True):
             assert getattr(blocks, list_of(place).kind) == use.block, (call, place)

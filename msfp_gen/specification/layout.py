@@ -164,6 +164,11 @@ class Effects:
         return law_of(self.friction, self.friction_law)
 
     @property
+    def permits_moving_ends(self) -> bool:
+        """Whether a bearing can be a two-port, whose ends another program moves: in space, with locked spin."""
+        return self.dimension == "spatial" and self.spin == "locked"
+
+    @property
     def permits_quasistatic_steps(self) -> bool:
         """Whether a run needs no integration: a planar model without inertia, uplift and friction law, whose friction
         state Y is a closed-form function of the slip.

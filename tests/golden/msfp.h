@@ -456,11 +456,10 @@ typedef struct msfp_api {
      * derivatives, and the wrench of end 1 is that load. Motions are in the row. The model is in
      * space, with locked spin and without top rotation; the rest as of port_new. */
     int (*port_new_loaded)(const msfp_scene *scene, msfp_port **port, const char **message);
-    /* The rows [2][row_size] and wrenches [2][2][6] at the end of the last trial, its steps held, with one freedom of its
-     * ends, 0..11, moved by -step and by +step along the direction of port_derivative: differences give the derivative of
-     * all that follows from them. step receives the size; rows and wrenches may be NULL. Returns as port_derivative. */
-    int (*port_beside)(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
-                       double *wrenches);
+    /* As port_derivative, with derivatives [row_size + 6][12] of the row at the end of the trial: of q, v, a, f, normal,
+     * sliding, force, base, top, top_force and top_moment, those of other numbers are zero; then of velocity and
+     * acceleration of r_nn. */
+    int (*port_row_derivative)(msfp_port *port, const double *direction, double *derivative, double *rows);
     /* Monitors, those of the scene of port_new, check the steps by stages. Whether one stops the step of the last
      * port_step_end, which you would accept now: do not commit it, and continue with a model that has the effect. */
     int (*port_tripped)(msfp_port *port);

@@ -343,17 +343,17 @@ def port_cases(b: Bench) -> Iterator[Case]:
     api = b.api
     still = np.zeros(36)
 
-    def use(port: int, time: float, ends: Array, direction: Array, freedom: int) -> Outcome:
+    def use(port: int, time: float, ends: Array, direction: Array) -> Outcome:
         status = api.port_trial(port, time, pointer(ends), None)
         wrench, row, matrix = np.zeros(12), np.zeros(api.row_size), np.zeros(144)
-        step, rows, pair = np.zeros(1), np.zeros((2, api.row_size)), np.zeros(24)
+        rows = np.zeros((api.row_size + 6, 12))
         if status == 0:
             status = api.port_derivative(port, pointer(direction), pointer(matrix))
         if status == 0:
-            status = api.port_beside(port, pointer(direction), freedom, *map(pointer, (step, rows, pair)))
+            status = api.port_row_derivative(port, pointer(direction), pointer(matrix), pointer(rows))
         if status == 0:
             status = api.port_wrench(port, pointer(wrench)) or api.port_row(port, pointer(row)) or api.port_commit(port)
-        finite = all(np.isfinite(array).all() for array in (wrench, row, matrix, rows, pair))
+        finite = all(np.isfinite(array).all() for array in (wrench, row, matrix, rows))
         return status, None, bool(finite)
 
     def outcome(scene: Any = None, load: float = 1e5, time: float = 0.01, ends: Array = still, **other: Any) -> Outcome:
@@ -361,7 +361,7 @@ def port_cases(b: Bench) -> Iterator[Case]:
         if port is None:
             return status, message, True
         along = other.get("direction", np.array([1.0, 0.0, 0.0]))
-        found = use(port, time, ends, along, other.get("freedom", 6)) if status == 0 else (status, message, True)
+        found = use(port, time, ends, along) if status == 0 else (status, message, True)
         api.port_free(port)
         return found[0], message, found[2]
 
@@ -417,7 +417,6 @@ def port_cases(b: Bench) -> Iterator[Case]:
             ends[i] = x
             yield f"port ends {i} = {x}", lambda e=ends: outcome(ends=e)
     for n in COUNTS:
-        yield f"port freedom = {n}", lambda n=n: outcome(freedom=n)
         yield f"port stage = {n}", lambda n=n: staged(stage=n)
     for field, kind in api.structs["msfp_scene"]._fields_:
         tried: tuple[Any, ...] = {ctypes.c_int: COUNTS, ctypes.c_void_p: (None,), ctypes.c_double: NUMBERS}.get(

@@ -271,27 +271,27 @@ static void direction_of(const fmu *f, int order, double direction[FMU_ORDERS])
         direction[0] = h * h * (0.5 + share / 6.0), direction[1] = h * (1.0 + 0.5 * share), direction[2] = 1.0 + share;
 }
 
-/* Central differences, for which the two-port repeats the step; afterwards it is as it was, bit by bit. */
+/* The two-port takes the step once more; afterwards it is as it was, bit by bit. */
 static fmu_status differentiate(fmu *f, int order)
 {
     const msfp_api *api = FMU_MODEL();
-    double direction[FMU_ORDERS], rows[2][FMU_ROW_SIZE], wrenches[2][FMU_FREEDOMS], outputs[2][FMU_OUTPUT_COUNT], step;
+    double direction[FMU_ORDERS], wrenches[FMU_FREEDOMS][FMU_FREEDOMS], rows[FMU_ROW_SIZE + 6][FMU_FREEDOMS];
     const char *message = NULL;
     direction_of(f, order, direction);
     int status = api->port_snapshot_read(f->port, f->before, f->size);
     if (status == MSFP_OK)
         status = api->port_trial(f->port, f->last.end, f->last.ends, &message);
+    if (status == MSFP_OK)
+        status = api->port_row_derivative(f->port, direction, wrenches[0], rows[0]);
     for (int freedom = 0; freedom < FMU_FREEDOMS && status == MSFP_OK; ++freedom) {
-        status = api->port_beside(f->port, direction, freedom, &step, &rows[0][0], &wrenches[0][0]);
-        for (int side = 0; side < 2 && status == MSFP_OK; ++side) {
-            double ends[FMU_ENDS];
-            memcpy(ends, f->last.ends, sizeof ends);
-            for (int k = 0; k < FMU_ORDERS; ++k)
-                ends[freedom / 6 * 18 + 6 * k + freedom % 6] += (side ? step : -step) * direction[k];
-            fmu_outputs(f, rows[side], wrenches[side], ends, outputs[side]);
-        }
-        for (int i = 0; i < FMU_OUTPUT_COUNT && status == MSFP_OK; ++i)
-            f->jacobian[order][i][freedom] = (outputs[1][i] - outputs[0][i]) / (2.0 * step);
+        double wrench[FMU_FREEDOMS], row[FMU_ROW_SIZE + 6], outputs[FMU_OUTPUT_COUNT];
+        for (int i = 0; i < FMU_FREEDOMS; ++i)
+            wrench[i] = wrenches[i][freedom];
+        for (size_t i = 0; i < FMU_ROW_SIZE + 6; ++i)
+            row[i] = rows[i][freedom];
+        fmu_output_derivatives(row, wrench, outputs);
+        for (int i = 0; i < FMU_OUTPUT_COUNT; ++i)
+            f->jacobian[order][i][freedom] = outputs[i];
     }
     /* Back to the end of the step. */
     api->port_revert(f->port);

@@ -95,6 +95,8 @@ fmu_status fmu_build(fmu *f);
 void fmu_release(fmu *f);
 /* Outputs of a row and of the wrenches [12], the ends at `ends`; outputs [FMU_OUTPUT_COUNT]. */
 void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs);
+/* Their derivatives by a freedom of the ends, from those that port_row_derivative gives. */
+void fmu_output_derivatives(const double *row, const double *wrench, double *outputs);
 fmu_status fmu_failure(const fmu *f, fmu_status status, const char *what, int found, const char *message);
 #if FMU_MASS
 /* Base motion [order][u_1..3, psi, theta, phi] of the lower end of `ends`. */

@@ -148,18 +148,40 @@ static void motion_of_top(const fmu *f, const double *row, const double *ends, d
 }
 #endif
 
-void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs)
+/* What the outputs take from a row as it is. */
+static void outputs_of_row(const double *row, const double *wrench, double *outputs)
 {
 #if FMU_MASS
-    motion_of_top(f, row, ends, outputs);
     memcpy(outputs + FMU_TOP_FORCE, row + FMU_ROW_TOP_FORCE, 3 * sizeof *row);
     memcpy(outputs + FMU_BASE_FORCE, row + FMU_ROW_FORCE, 3 * sizeof *row);
     (void)wrench;
 #else
     memcpy(outputs, wrench, FMU_FREEDOMS * sizeof *wrench);
-    (void)f;
-    (void)ends;
 #endif
     memcpy(outputs + FMU_SLIDING, row + FMU_ROW_SLIDING, NB * sizeof *row);
     memcpy(outputs + FMU_NORMAL, row + FMU_ROW_NORMAL, NB * sizeof *row);
+}
+
+void fmu_outputs(const fmu *f, const double *row, const double *wrench, const double *ends, double *outputs)
+{
+#if FMU_MASS
+    motion_of_top(f, row, ends, outputs);
+#else
+    (void)f;
+    (void)ends;
+#endif
+    outputs_of_row(row, wrench, outputs);
+}
+
+void fmu_output_derivatives(const double *row, const double *wrench, double *outputs)
+{
+#if FMU_MASS
+    const double *const moved[FMU_ORDERS] = { row + FMU_ROW_TOP, row + FMU_ROW_SIZE, row + FMU_ROW_SIZE + 3 };
+    const double *const rates[FMU_ORDERS] = { row + FMU_ROW_Q, row + FMU_ROW_V, row + FMU_ROW_A };
+    for (int order = 0; order < FMU_ORDERS; ++order) {
+        memcpy(outputs + 6 * order, moved[order], 3 * sizeof *row);
+        memcpy(outputs + 6 * order + 3, rates[order] + (NB - 1) * NQ, 3 * sizeof *row);
+    }
+#endif
+    outputs_of_row(row, wrench, outputs);
 }

@@ -84,8 +84,7 @@ int msfp_api_port_trial(msfp_port *port, double time, const double *ends, const 
 int msfp_api_port_wrench(const msfp_port *port, double *wrench);
 int msfp_api_port_derivative(msfp_port *port, const double *direction, double *derivative);
 int msfp_api_port_new_loaded(const msfp_scene *scene, msfp_port **port, const char **message);
-int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
-                         double *wrenches);
+int msfp_api_port_row_derivative(msfp_port *port, const double *direction, double *derivative, double *rows);
 int msfp_api_port_row(const msfp_port *port, double *row);
 void msfp_api_port_progress(const msfp_port *port, msfp_progress *trial);
 void msfp_api_port_counts(const msfp_port *port, int64_t *counts);

@@ -65,27 +65,15 @@ int msfp_api_port_derivative(msfp_port *port, const double *direction, double *d
     const int wrong = check_direction(port, direction);
     if (wrong)
         return wrong;
-    if (!derivative)
-        return MSFP_E_ARGUMENT;
-    return msfp_port_derivative(port, direction, derivative);
+    return derivative ? msfp_port_derivative(port, direction, derivative, NULL) : MSFP_E_ARGUMENT;
 }
 
-int msfp_api_port_beside(msfp_port *port, const double *direction, int freedom, double *step, double *rows,
-                         double *wrenches)
+int msfp_api_port_row_derivative(msfp_port *port, const double *direction, double *derivative, double *rows)
 {
-    msfp_row found[2];
-    double pair[2][MSFP_PORT_FREEDOMS];
     const int wrong = check_direction(port, direction);
     if (wrong)
         return wrong;
-    if (!step || freedom < 0 || freedom >= MSFP_PORT_FREEDOMS)
-        return MSFP_E_ARGUMENT;
-    const int status = msfp_port_beside(port, direction, freedom, step, found, pair);
-    if (status == MSFP_OK && rows)
-        memcpy(rows, found, sizeof found);
-    if (status == MSFP_OK && wrenches)
-        memcpy(wrenches, pair, sizeof pair);
-    return status;
+    return derivative && rows ? msfp_port_derivative(port, direction, derivative, rows) : MSFP_E_ARGUMENT;
 }
 
 int msfp_api_port_row(const msfp_port *port, double *row)

@@ -84,12 +84,6 @@ void msfp_support_axis(const msfp_point *at, double *upright);
 
 /* Angles psi, theta, phi (2.1) of a rotation vector, with two derivatives in time: both [order][3]. */
 void msfp_end_angles(const double rotation[3][3], double angles[3][3]);
-#if MSFP_TOP_ROTATION
-/* Angular velocities [direction][3] of the axis of a rotating support at unit rates of its rotation vector, and derivatives
- * of its present angular velocity by that vector. rotation [order][3]. */
-void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3]);
-#endif
-
 /* ---- contact_unilateral.c ---- */
 
 /* Compression of the unilateral contact of surface j [m]; negative where it is open. 1 in models without uplift. */

@@ -143,24 +143,6 @@ void msfp_end_angles(const double rotation[3][3], double angles[3][3])
         memset(&angles[0][0], 0, MSFP_ROTATION_ANGLES_SIZE * sizeof **angles);
 }
 
-#if MSFP_TOP_ROTATION
-void msfp_end_turns(const double rotation[2][3], double turns[3][3], double derivatives[3][3])
-{
-    enum { VARIABLES = 6 }; /* the rotation vector and its rate */
-    double turn[MSFP_TURN_SIZE] = { 0.0 }, dturn[MSFP_TURN_SIZE * VARIABLES] = { 0.0 };
-    double w[MSFP_AXIS_TURN_SIZE], dw[MSFP_AXIS_TURN_SIZE * VARIABLES];
-    memcpy(turn, rotation, VARIABLES * sizeof *turn);
-    for (int i = 0; i < VARIABLES; ++i)
-        dturn[i * VARIABLES + i] = 1.0;
-    msfp_axis_turn_tangent(turn, w, dturn, dw);
-    for (int i = 0; i < 3; ++i)
-        for (int k = 0; k < 3; ++k) {
-            derivatives[i][k] = dw[k * VARIABLES + i];
-            turns[i][k] = dw[k * VARIABLES + 3 + i];
-        }
-}
-#endif
-
 int msfp_top_is_sprung(const msfp_parameters *p)
 {
     return p->top[MSFP_TOP_PARAMETERS_KV] > 0.0 || p->top[MSFP_TOP_PARAMETERS_CV] > 0.0;

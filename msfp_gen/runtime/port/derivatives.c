@@ -1,183 +1,393 @@
-/* derivatives.c: derivatives of the wrenches of a trial, its steps held, by sensitivities of its stages.
+/* derivatives.c: derivatives of wrenches by the motion of the ends: of a trial, whose steps are taken once more, and of a
+ * stage that another program drives.
  *
- * The equations of a stage depend on its rates and on what is known there: the state before, the earlier stages, the
- * motion of the ends. Their tangent with respect to the rates is formed and factored once for each stage of the trial;
- * back substitution gives the rates that follow a small finite change of the rest, minus and plus. A trial beside the
- * given one is solved relative to it, so that no tolerance of Newton's method is left in the difference.
+ * The equations of a stage are differentiated where it was solved, by what is known there: the state before, the earlier
+ * stages, the motion of the ends (msfp_by_ends.h, from generator/schedule.py). The factored tangent of the stage gives
+ * the rates that follow, by the implicit function theorem.
  */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O1", "tree-vectorize") /* compiled in half the time of -O2 */
+#endif
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "port.h"
 
-enum { FREEDOMS = MSFP_PORT_FREEDOMS, MOST_STEPS = 4 };
-/* A perturbation accelerates a supported mass by no more than its share of this [m/s^2]. */
-static const double mild_acceleration = 10.0;
-/* The slip that a perturbation causes, over the smallest yield displacement: Y and Z are known to 1e-12. */
-static const double share = 2e-5;
-/* What a step of Newton's method beside the trial may leave of a residual, over its change by the perturbation. */
-static const double second_order = 1e-7;
+#if MSFP_MOVING_ENDS
+#include "msfp_by_ends.h"
 
-/* Perturbation of a freedom of an end [m] or [rad] that causes no larger slip than `share` of a yield displacement; of a
- * load [N] or [N m] the force that accelerates the mass mildly, at an arm of a radius. */
-static double perturbation(const msfp_parameters *p, int freedom, int load)
+enum { W = MSFP_PORT_FREEDOMS, EACH = MSFP_END_FREEDOMS };
+typedef double columns[W];                        /* derivatives of a number by the freedoms of both ends */
+typedef columns channels[MSFP_ORDERS][EACH]; /* of displacement and angles of an end, or of the load */
+
+static const int unknown[ND] = MSFP_FREE;
+
+/* ---- a trial ---- */
+
+/* Of a state: q, v, Y and Z, height and velocity of the foot, parts of the rise in temperature; or of their rates. */
+typedef struct {
+    columns q[NB][NQ], v[NB][NQ], f[NB][2], foot[2];
+#if MSFP_HEAT
+    columns heat[NB][MSFP_HEAT];
+#endif
+} state_columns;
+
+typedef struct {
+    channels to[MSFP_ENDS]; /* at the end of the trial */
+    state_columns now, rates[MSFP_STAGES];
+    msfp_by_ends d;
+} moved;
+
+/* to += factor * from */
+static void add(state_columns *to, const state_columns *from, double factor)
 {
-    double yield = p->surface[0][MSFP_SURFACE_PARAMETERS_DY], radius = p->surface[0][MSFP_SURFACE_PARAMETERS_R];
-    for (int j = 1; j < NB; ++j) {
-        yield = fmin(yield, p->surface[j][MSFP_SURFACE_PARAMETERS_DY]);
-        radius = fmax(radius, p->surface[j][MSFP_SURFACE_PARAMETERS_R]);
-    }
-    if (load) {
-        const double force = share * mild_acceleration * p->top[MSFP_TOP_PARAMETERS_M];
-        return freedom < 3 ? force : force * radius;
-    }
-    return freedom < 3 ? share * yield : share * yield / radius;
+    double *sum = &to->q[0][0][0];
+    const double *more = &from->q[0][0][0];
+    for (size_t i = 0; i < sizeof *to / sizeof *sum; ++i)
+        sum[i] += factor * more[i];
 }
 
-/* Solve stage i and factor its tangent at the solution. */
-static int linearise(msfp_run *run, msfp_stages *s, int i, msfp_solved *solved)
+/* Derivatives of the channels of an end along a direction, at its motion [order][6]; rates: not of second derivatives. */
+static void channels_by_freedoms(const double *motion, const double direction[MSFP_ORDERS], int end, int rates,
+                                 columns (*of)[EACH])
 {
-    double size;
-    int status = msfp_stage_solve(run, s, i);
-    if (status == MSFP_OK)
-        status = msfp_factorise_stage(run, &s->now, solved->residual, &size);
-    memcpy(solved->v, s->now.at.v, sizeof solved->v);
-    memcpy(solved->g, s->now.g, sizeof solved->g);
-    memcpy(solved->factors, run->factors, sizeof solved->factors);
-    memcpy(solved->pivots, run->pivots, sizeof solved->pivots);
-    return status;
-}
-
-/* Change of a residual; returns its largest entry. */
-static double change_of(const double *residual, const double *before, double *change)
-{
-    double most = 0.0;
-    for (int i = 0; i < DOF; ++i) {
-        change[i] = residual[i] - before[i];
-        most = fmax(most, fabs(change[i]));
+    double turn[MSFP_TURN_SIZE], dturn[MSFP_TURN_SIZE * W] = { 0.0 }, angles[MSFP_ROTATION_ANGLES_SIZE * W] = { 0.0 };
+    memset(of, 0, sizeof(channels));
+    for (int order = 0; order < MSFP_ORDERS; ++order) {
+        memcpy(turn + 3 * order, motion + order * EACH + 3, 3 * sizeof *turn);
+        for (int i = 0; i < 3; ++i) {
+            of[order][i][end * EACH + i] = direction[order];
+            dturn[(3 * order + i) * W + end * EACH + 3 + i] = direction[order];
+        }
     }
-    return most;
+    if (rates)
+        msfp_support_angles_by_ends(turn, dturn, angles);
+    else
+        msfp_rotation_angles_by_ends(turn, dturn, angles);
+    for (int order = 0; order < MSFP_ORDERS; ++order)
+        memcpy(of[order][3], angles + 3 * order * W, 3 * sizeof(columns));
 }
 
-/* Solve a stage whose known parts are beside those of the trial, by the tangent of the trial. Its first step leaves what
- * is of second order, which matters under a mass that light sliders carry. */
-static int follow(msfp_run *run, msfp_stage *s, const msfp_solved *solved)
+/* What the motion of the lower end is to the equations. */
+static void move_base(const msfp_parameters *p, const msfp_work *w, columns (*of)[EACH], msfp_blocks *s, msfp_by_ends *d)
 {
-    double residual[DOF], step[DOF], first = 0.0;
-    memcpy(s->at.v, solved->v, sizeof solved->v);
-    memcpy(s->g, solved->g, sizeof solved->g);
-    for (int i = 0;; ++i) {
-        if (!(msfp_stage_residual(run, s, &run->work, residual) < INFINITY))
-            return MSFP_E_FINITE;
-        const double left = change_of(residual, solved->residual, step);
-        if (i == MOST_STEPS || left <= second_order * first)
-            return MSFP_OK;
-        first = fmax(first, left);
-        msfp_lu_solve(solved->factors, DOF, solved->pivots, step);
-        msfp_stage_move(s, step, 1.0);
+    memcpy(d->frame + MSFP_BODY_CX * W, of[0], 3 * sizeof(columns));
+    memcpy(d->frame + MSFP_BODY_VX * W, of[1], 3 * sizeof(columns));
+    memcpy(d->frame + MSFP_BODY_AX * W, of[2], 3 * sizeof(columns));
+    for (int order = 0; order < MSFP_ORDERS; ++order)
+        memcpy(d->x[0] + msfp_coordinate_field(order, 0) * W, of[order] + 3, 3 * sizeof(columns));
+    msfp_base_by_ends(p, w, s, d);
+}
+
+/* What that of the upper end is to the top plate, through the interface; or the load. */
+static void move_top(const msfp_port *port, const msfp_work *w, columns (*of)[EACH], msfp_blocks *s, msfp_by_ends *d)
+{
+    if (port->loaded) {
+        memcpy(d->load_force, of[0], sizeof d->load_force);
+        memcpy(d->load_moment, of[0] + 3, sizeof d->load_moment);
+        return;
     }
+    memcpy(d->far_end + MSFP_FAR_END_UX * W, of[0], 3 * sizeof(columns));
+    memcpy(d->far_end + MSFP_FAR_END_VX * W, of[1], 3 * sizeof(columns));
+#if MSFP_TOP_ROTATION
+    memcpy(d->support + MSFP_SUPPORT_PSI * W, of[0] + 3, PAIR * sizeof(columns));
+    memcpy(d->support + MSFP_SUPPORT_PSI1 * W, of[1] + 3, PAIR * sizeof(columns));
+#endif
+    msfp_interface_by_ends(&port->run.parameters, w, s, d);
 }
 
-/* The steps of the trial with the ends at `to`, and the wrenches at their end. to NULL: those of the trial itself, which
- * are linearised. */
-static int repeat(msfp_port *port, msfp_run *run, const msfp_ends *to, double *wrench)
+/* Derivatives of an evaluation from those of its point and its base; balances: of the balances too. */
+static void differentiate(const msfp_parameters *p, const msfp_work *w, int balances, msfp_blocks *s, msfp_by_ends *d)
 {
-    double error;
+    msfp_bodies_by_ends(p, w, s, d);
+    msfp_top_by_ends(p, w, s, d);
+    msfp_forces_by_ends(p, w, s, d);
+    msfp_surfaces_by_ends(p, w, s, d);
+    if (balances)
+        msfp_moments_by_ends(p, w, s, d);
+}
+
+/* Derivatives of coordinates and accelerations of a stage from those of the rates and of what is known before it. */
+static void point(const state_columns *known, double beta, state_columns *rates, msfp_by_ends *d)
+{
+    for (int k = 0; k < NB; ++k)
+        for (int i = 0; i < ND; ++i) {
+            const int at = unknown[i];
+            columns *x[MSFP_ORDERS];
+            for (int order = 0; order < MSFP_ORDERS; ++order)
+                x[order] = (columns *)(d->x[k + 1] + msfp_unknown_field(order, i) * W);
+            for (int c = 0; c < W; ++c) {
+                (*x[0])[c] = known->q[k][at][c] + beta * rates->q[k][at][c];
+                (*x[1])[c] = rates->q[k][at][c];
+                (*x[2])[c] = rates->v[k][at][c] = (rates->q[k][at][c] - known->v[k][at][c]) / beta;
+            }
+        }
+}
+
+#if MSFP_HEAT
+static const double decay[MSFP_HEAT] = MSFP_HEAT_RATES, weight[MSFP_HEAT] = MSFP_HEAT_WEIGHTS;
+#endif
+
+/* What the stage formulas of friction, heat and foot know of the earlier stages. */
+static void known_of_stage(const state_columns *known, double beta, msfp_by_ends *d)
+{
+    for (int j = 0; j < NB; ++j) {
+        memcpy(d->before[j] + MSFP_BEFORE_Y * W, known->f[j], MSFP_SHEAR_SIZE * sizeof(columns));
+#if MSFP_HEAT
+        double *rise = d->before[j] + MSFP_BEFORE_RISE * W;
+        memset(rise, 0, sizeof(columns));
+        for (int i = 0; i < MSFP_HEAT * W; ++i)
+            rise[i % W] += known->heat[j][i / W][i % W] / (1.0 + beta * decay[i / W]);
+#endif
+    }
+    for (int c = 0; c < W; ++c)
+        d->foot_stage[MSFP_FOOT_STAGE_Y * W + c] = known->foot[0][c] + beta * known->foot[1][c];
+    memcpy(d->foot_stage + MSFP_FOOT_STAGE_Y1 * W, known->foot[1], sizeof(columns));
+}
+
+/* Rates of Y and Z, of the foot and of the temperature, from the derivatives of the solved stage. */
+static void rates_of_stage(const state_columns *known, double beta, const msfp_by_ends *d, state_columns *rates)
+{
+    (void)known, (void)beta;
+    for (int j = 0; j < NB; ++j) {
+        memcpy(rates->f[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
+#if MSFP_HEAT
+        const double *flux = d->contact[j] + MSFP_CONTACT_FLUX * W;
+        for (int i = 0; i < MSFP_HEAT * W; ++i)
+            rates->heat[j][i / W][i % W] = (weight[i / W] * flux[i % W] - decay[i / W] * known->heat[j][i / W][i % W])
+                                           / (1.0 + beta * decay[i / W]);
+#endif
+    }
+    memcpy(rates->foot, d->foot + MSFP_FOOT_Y1 * W, sizeof rates->foot);
+}
+
+/* Derivatives of the rates of the stage: -(dr/dv)^-1 dr, with r the balances over N as Newton's method divides them. */
+static void solve(const msfp_run *run, const double *residual, const msfp_by_ends *d, state_columns *rates)
+{
+    for (int c = 0; c < W; ++c) {
+        double x[DOF];
+        for (int k = 0; k < NB; ++k)
+            for (int i = 0; i < ND; ++i) {
+                double *one = x + k * ND + i;
+#if MSFP_UPLIFT
+                *one = i < NA ? d->angular[k + 1][i * W + c] : d->excess[k][(i - NA) * W + c];
+#else
+                *one = (d->angular[k + 1][i * W + c] - residual[k * ND + i] * d->contact[k][MSFP_CONTACT_N * W + c])
+                       / run->work.contact[k][MSFP_CONTACT_N];
+#endif
+            }
+        msfp_lu_solve(run->factors, DOF, run->pivots, x);
+        for (int k = 0; k < NB; ++k)
+            for (int i = 0; i < ND; ++i)
+                rates->q[k][unknown[i]][c] = -x[k * ND + i];
+    }
+    (void)residual;
+}
+
+/* Stage i, which is solved and whose tangent is factored. residual: what is left of it over N; basis: the channels of
+ * msfp_unit_paths at its time; balances: whether those of the balances are wanted at the solution. */
+static void differentiate_stage(const msfp_port *port, const msfp_run *run, const msfp_stages *stages, int i,
+                                const double *residual, double basis[MSFP_ORDERS][6], int balances, msfp_blocks *s, moved *m)
+{
+    enum { COUNT = sizeof(m->to[0][0]) / sizeof(double) };
+    const double beta = stages->now.beta;
+    state_columns known = m->now, *rates = &m->rates[i];
+    channels here[MSFP_ENDS];
+    for (int j = 0; j < i; ++j)
+        add(&known, &m->rates[j], stages->h * stages->method->a[i][j]);
+    for (int e = 0; e < MSFP_ENDS; ++e)
+        for (int order = 0; order < MSFP_ORDERS; ++order)
+            for (int c = 0; c < COUNT; ++c) {
+                const double *to = &m->to[e][0][0][0] + c, *at = basis[order];
+                (&here[e][order][0][0])[c] = at[0] * to[0] + at[1] * to[COUNT] + at[2] * to[2 * COUNT];
+            }
+    move_base(&run->parameters, &run->work, here[0], s, &m->d);
+    move_top(port, &run->work, here[1], s, &m->d);
+    known_of_stage(&known, beta, &m->d);
+    memset(rates, 0, sizeof *rates);
+    point(&known, beta, rates, &m->d);
+    differentiate(&run->parameters, &run->work, 1, s, &m->d);
+    solve(run, residual, &m->d, rates);
+    point(&known, beta, rates, &m->d);
+    differentiate(&run->parameters, &run->work, balances, s, &m->d);
+    rates_of_stage(&known, beta, &m->d, rates);
+    if (i < stages->method->stages - 1)
+        return;
+    m->now = known; /* the last stage is at the end of the step */
+    add(&m->now, rates, beta);
+    m->rates[0] = *rates;
+}
+
+/* The blocks of the evaluation of a stage that msfp_work has not. */
+static void blocks_of(const msfp_port *port, msfp_stage *stage, msfp_work *w, msfp_blocks *s)
+{
+    const msfp_ends *at = &port->to;
+    msfp_seed seed = stage->seed;
+    seed.same_base = 0;
+    msfp_set_inputs(&port->run.parameters, &stage->at, &seed, w, s);
+    msfp_far_end(port, at->of[1][0], at->of[1][1], at->of[1][0], s->far_end);
+    s->g = stage->g;
+#if MSFP_TOP_ROTATION
+    msfp_support(&stage->at, s->support);
+#endif
+}
+
+/* The steps of the trial once more, with their derivatives; of balances and wrenches at its end. */
+static int repeat(msfp_port *port, msfp_run *run, moved *m)
+{
+    const double end = port->times[port->time_count - 1];
+    msfp_polynomials paths;
+    msfp_history units;
     msfp_stages s;
-    msfp_solved *solved = port->solved;
-    msfp_port_prepare(port, run, port->times[port->time_count - 1], to ? to : &port->to);
-    for (size_t i = 0; i < port->time_count; ++i) {
-        if (to)
-            run->factored_beta = 0.0; /* the factors in `run` are of another stage */
-        msfp_stages_begin(run, &s, port->times[i] - run->now.t);
+    msfp_blocks blocks;
+    msfp_port_prepare(port, run, end, &port->to);
+    msfp_unit_paths(end - run->now.t, &paths);
+    msfp_attach(&units, port->knots, &paths);
+    for (size_t step = 0; step < port->time_count; ++step) {
+        double error, size, residual[DOF], basis[MSFP_ORDERS][6];
+        msfp_stages_begin(run, &s, port->times[step] - run->now.t);
         s.now.seed.accuracy = 0.0;
-        for (int k = 1; k < s.method->stages; ++k, ++solved) {
-            msfp_stage_begin(run, &s, k);
-            msfp_point_at(run, run->now.t + s.method->c[k] * s.h, &s.now.at);
-            const int status = to ? follow(run, &s.now, solved) : linearise(run, &s, k, solved);
+        for (int i = 1; i < s.method->stages; ++i) {
+            const double t = run->now.t + s.method->c[i] * s.h;
+            const int last = step + 1 == port->time_count && i + 1 == s.method->stages;
+            msfp_stage_begin(run, &s, i);
+            msfp_point_at(run, t, &s.now.at);
+            int status = msfp_stage_solve(run, &s, i);
+            if (status == MSFP_OK)
+                status = msfp_factorise_stage(run, &s.now, residual, &size);
             if (status)
                 return status;
-            msfp_stage_end(run, &s, k);
+            blocks_of(port, &s.now, &run->work, &blocks);
+            msfp_history_at(&units, t, MSFP_ORDERS, basis);
+            differentiate_stage(port, run, &s, i, residual, basis, last, &blocks, m);
+            msfp_stage_end(run, &s, i);
         }
         msfp_stages_end(run, &s, &error);
-        run->next.t = port->times[i];
+        run->next.t = port->times[step];
         run->now = run->next;
         run->restart = run->retry_after_newton = 0;
     }
-    msfp_port_wrench_of(port, run, to ? to : &port->to, wrench);
+    for (int k = 0; k < NB; ++k)
+        memcpy(m->d.lock[k], m->d.angular[k + 1] + (MSFP_ANGULAR_SIZE - 1) * W, sizeof m->d.lock[k]);
+    msfp_wrenches_by_ends(&run->parameters, &run->work, &blocks, &m->d);
+    msfp_sliding_by_ends(&run->parameters, &run->work, &blocks, &m->d);
     return MSFP_OK;
 }
 
-/* The stages of the trial, solved and linearised, once for each trial. */
-static int linearise_trial(msfp_port *port, msfp_run *run)
+/* Derivatives of a row [MSFP_ROW_SIZE][12], and of velocity and acceleration of r_nn after it. */
+static void give_row(const moved *m, double *rows)
 {
-    const size_t count = port->time_count * (MSFP_STAGES - 1);
-    double wrench[2 * FREEDOMS];
-    if (port->linearised)
-        return MSFP_OK;
-    if (count > port->solved_capacity) {
-        msfp_solved *more = realloc(port->solved, count * sizeof *more);
-        if (!more)
-            return MSFP_E_MEMORY;
-        port->solved = more;
-        port->solved_capacity = count;
+    const msfp_by_ends *d = &m->d;
+    memset(rows, 0, MSFP_ROW_SIZE * sizeof(columns));
+    memcpy(rows + MSFP_ROW_Q * W, m->now.q, sizeof m->now.q);
+    memcpy(rows + MSFP_ROW_V * W, m->now.v, sizeof m->now.v);
+    memcpy(rows + MSFP_ROW_A * W, m->rates[0].v, sizeof m->rates[0].v);
+    memcpy(rows + MSFP_ROW_F * W, m->now.f, sizeof m->now.f);
+    for (int j = 0; j < NB; ++j) {
+        memcpy(rows + (MSFP_ROW_NORMAL + j) * W, d->contact[j] + MSFP_CONTACT_N * W, sizeof(columns));
+        memcpy(rows + (MSFP_ROW_SLIDING + j) * W, d->gap[j] + MSFP_GAP_S * W, sizeof(columns));
     }
-    const int status = repeat(port, run, NULL, wrench);
-    port->linearised = status == MSFP_OK;
-    return status;
+    memcpy(rows + MSFP_ROW_FORCE * W, d->force[0], NB * 3 * sizeof(columns));
+    memcpy(rows + MSFP_ROW_BASE * W, d->frame + MSFP_BODY_CX * W, 3 * sizeof(columns));
+    memcpy(rows + MSFP_ROW_TOP * W, d->body[NB] + MSFP_BODY_CX * W, 3 * sizeof(columns));
+    memcpy(rows + MSFP_ROW_TOP_FORCE * W, d->force[NB], 3 * sizeof(columns));
+    memcpy(rows + MSFP_ROW_TOP_MOMENT * W, d->moment[NB], 3 * sizeof(columns));
+    memcpy(rows + MSFP_ROW_SIZE * W, d->body[NB] + MSFP_BODY_VX * W, 6 * sizeof(columns));
 }
+MSFP_STATIC_ASSERT(MSFP_BODY_AX == MSFP_BODY_VX + 3, acceleration_follows_velocity);
 
-/* Size of a perturbation of an end along a direction. */
-static double step_along(const msfp_port *port, const double direction[MSFP_ORDERS], int column)
+int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative, double *rows)
 {
-    const msfp_parameters *p = &port->run.parameters;
-    const int end = column / MSFP_END_FREEDOMS, freedom = column % MSFP_END_FREEDOMS;
-    const double h = port->run.now.t - port->committed.now.t;
-    /* Rates and accelerations move the path inside the step less than displacements do. */
-    const double path = fabs(direction[0]) + 0.2 * h * fabs(direction[1]) + 0.02 * h * h * fabs(direction[2]);
-    const double step = perturbation(p, freedom, port->loaded && end) / path;
-    if (!port->loaded || end)
-        return step;
-    /* The accelerations of the path act on the mass. */
-    const double most = 20.0 * fabs(direction[0]) + 8.0 * h * fabs(direction[1]) + h * h * fabs(direction[2]);
-    const double radius = freedom < 3 ? 1.0 : p->surface[0][MSFP_SURFACE_PARAMETERS_R];
-    return fmin(step, share * mild_acceleration * h * h / (most * radius));
-}
-
-int msfp_port_beside(msfp_port *port, const double direction[MSFP_ORDERS], int column, double *step, msfp_row rows[2],
-                     double wrenches[2][FREEDOMS])
-{
-    const int end = column / MSFP_END_FREEDOMS, freedom = column % MSFP_END_FREEDOMS;
     msfp_run run = port->run; /* with rows and events that no step of this file writes */
-    int status = linearise_trial(port, &run);
-    *step = step_along(port, direction, column);
-    for (int side = 0; side < 2 && status == MSFP_OK; ++side) {
-        msfp_ends to = port->to;
-        for (int order = 0; order < MSFP_ORDERS; ++order)
-            to.of[end][order][freedom] += (side ? *step : -*step) * direction[order];
-        status = repeat(port, &run, &to, wrenches[side]);
-        if (rows && status == MSFP_OK)
-            msfp_observe_state(&run, &run.now, &rows[side]);
-    }
+    moved m;
+    memset(&m, 0, sizeof m);
+    for (int e = 0; e < MSFP_ENDS - port->loaded; ++e)
+        channels_by_freedoms(port->to.of[e][0], direction, e, 0, m.to[e]);
+    for (int i = 0; i < MSFP_ORDERS * EACH && port->loaded; ++i)
+        m.to[1][i / EACH][i % EACH][EACH + i % EACH] = direction[i / EACH];
+    const int status = repeat(port, &run, &m);
     if (status)
         return status;
-    const int finite = msfp_all_finite(&wrenches[0][0], 2 * FREEDOMS)
-                       && (!rows || msfp_all_finite((const double *)rows, 2 * sizeof *rows / sizeof(double)));
-    return finite ? MSFP_OK : MSFP_E_FINITE;
-}
-
-int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative)
-{
-    double step, pair[2][FREEDOMS], found[FREEDOMS * FREEDOMS];
-    for (int j = 0; j < FREEDOMS; ++j) {
-        const int status = msfp_port_beside(port, direction, j, &step, NULL, pair);
-        if (status)
-            return status;
-        for (int i = 0; i < FREEDOMS; ++i)
-            found[i * FREEDOMS + j] = (pair[1][i] - pair[0][i]) / (2.0 * step);
-    }
-    if (!msfp_all_finite(found, FREEDOMS * FREEDOMS)) /* along a direction beyond all measure */
+    if (port->loaded) /* the load is the wrench of end B */
+        memcpy(m.d.upper, m.to[1], sizeof m.d.upper);
+    if (!msfp_all_finite(m.d.lower, EACH * W) || !msfp_all_finite(m.d.upper, EACH * W)) /* a direction beyond all measure */
         return MSFP_E_FINITE;
-    memcpy(derivative, found, sizeof found);
+    memcpy(derivative, m.d.lower, sizeof m.d.lower);
+    memcpy(derivative + EACH * W, m.d.upper, sizeof m.d.upper);
+    if (rows)
+        give_row(&m, rows);
     return MSFP_OK;
 }
+
+/* ---- a stage that another program drives ---- */
+
+/* Rates of the stage that follow those of end B, by the wrench at the top: its columns in `d` are those at rest. */
+static void solve_moves(msfp_port *port, const msfp_by_ends *d)
+{
+    msfp_run *run = &port->committed;
+    for (int begin = 0; begin < EACH; begin += DOF) { /* DOF at a time */
+        double force[3 * DOF] = { 0.0 }, moment[3 * DOF] = { 0.0 }, found[DOF * DOF];
+        const int count = EACH - begin < DOF ? EACH - begin : DOF;
+        for (int i = 0; i < 3; ++i) {
+            memcpy(force + i * DOF, d->force[NB] + i * W + EACH + begin, count * sizeof *force);
+            memcpy(moment + i * DOF, d->moment[NB] + i * W + EACH + begin, count * sizeof *moment);
+        }
+        msfp_load_tangent(&run->parameters, &run->work, force, moment, found);
+        for (int c = 0; c < count; ++c) {
+            double x[DOF];
+            for (int i = 0; i < DOF; ++i)
+                x[i] = -found[i * DOF + c] / (MSFP_UPLIFT ? 1.0 : run->work.contact[i / ND][MSFP_CONTACT_N]);
+            msfp_lu_solve(run->factors, DOF, run->pivots, x);
+            for (int i = 0; i < DOF; ++i)
+                port->step.moves[i][begin + c] = x[i];
+        }
+    }
+    port->step.moved = 1;
+}
+
+int msfp_port_stage_derivative(msfp_port *port, double *derivative)
+{
+    msfp_run *run = &port->committed;
+    msfp_stage *stage = &port->step.stages.now;
+    const msfp_work *w = &run->work;
+    const double along[MSFP_ORDERS] = { stage->beta, 1.0, 0.0 }; /* displacements change with the rates by beta */
+    double residual[DOF], size, by_rates[9][DOF]; /* force and moment at the top, and its position, by the rates of the stage */
+    channels upper;
+    msfp_blocks s;
+    msfp_by_ends d;
+    const int status = msfp_factorise_stage(run, stage, residual, &size);
+    if (status)
+        return status;
+    memcpy(by_rates, w->dforce[NB], 3 * sizeof *by_rates);
+    memcpy(by_rates + 3, w->dmoment[NB], 3 * sizeof *by_rates);
+    memcpy(by_rates + 6, w->dbody[NB] + MSFP_BODY_CX * DOF, 3 * sizeof *by_rates);
+    blocks_of(port, stage, &run->work, &s);
+    memset(d.foot_stage, 0, sizeof d.foot_stage);
+    memset(d.body[NB], 0, sizeof d.body[NB]);
+    memset(d.x[NB], 0, sizeof d.x[NB]);
+    memset(d.load_moment, 0, sizeof d.load_moment);
+    channels_by_freedoms(port->to.of[1][0], along, 1, 1, upper);
+    move_top(port, w, upper, &s, &d);
+    msfp_top_by_ends(&run->parameters, w, &s, &d);
+    solve_moves(port, &d);
+    double *const moving[] = { d.force[NB], d.moment[NB], d.body[NB] + MSFP_BODY_CX * W };
+    for (int i = 0; i < 9; ++i)
+        for (int l = 0; l < DOF; ++l)
+            for (int c = 0; c < EACH; ++c)
+                moving[i / 3][i % 3 * W + EACH + c] += by_rates[i][l] * port->step.moves[l][c];
+    msfp_upper_wrench_by_ends(s.far_end, w->body[NB], w->force[NB], w->moment[NB], d.far_end, d.body[NB], d.force[NB],
+                              d.moment[NB], d.upper);
+    for (int i = 0; i < EACH; ++i)
+        memcpy(derivative + i * EACH, d.upper + i * W + EACH, EACH * sizeof *derivative);
+    return msfp_all_finite(derivative, EACH * EACH) ? MSFP_OK : MSFP_E_FINITE;
+}
+#else /* no bearing of this model is a two-port (msfp_check_port) */
+int msfp_port_derivative(msfp_port *port, const double *direction, double *derivative, double *rows)
+{
+    return (void)port, (void)direction, (void)derivative, (void)rows, MSFP_E_ARGUMENT;
+}
+
+int msfp_port_stage_derivative(msfp_port *port, double *derivative)
+{
+    return (void)port, (void)derivative, MSFP_E_ARGUMENT;
+}
+#endif

@@ -1,4 +1,4 @@
-/* ends.c: the motion of the ends as base motion, load on the top plate and rotation of its support.
+/* ends.c: the motion of the ends as base motion, load on the top plate and rotation of its support; their wrenches.
  *
  * Between two times every channel is the polynomial of degree five through values, first and second derivatives at
  * both: base accelerations are continuous, and a history of such pieces is repeated exactly.
@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 #include "port.h"
+#include "msfp_schedule.h"
 
 /* ---- polynomials of a step ---- */
 
@@ -28,78 +29,127 @@ static void through(const double from[MSFP_ORDERS], const double to[MSFP_ORDERS]
     then[2] = 0.5 * to[2];
 }
 
-/* Those polynomials of one freedom of an end. */
-static void freedom_path(const double from[MSFP_ORDERS][MSFP_END_FREEDOMS], const double to[MSFP_ORDERS][MSFP_END_FREEDOMS],
-                         int freedom, double h, msfp_polynomials *path)
+void msfp_unit_paths(double h, msfp_polynomials *paths)
 {
-    double start[MSFP_ORDERS], end[MSFP_ORDERS];
+    static const double rest[MSFP_ORDERS];
+    memset(paths, 0, sizeof *paths);
     for (int order = 0; order < MSFP_ORDERS; ++order) {
-        start[order] = from[order][freedom];
-        end[order] = to[order][freedom];
+        double to[MSFP_ORDERS] = { 0.0 };
+        to[order] = 1.0;
+        through(rest, to, h, order, paths);
     }
-    through(start, end, h, freedom, path);
 }
 
-/* Polynomials of psi, theta, phi of an end, from a channel on. */
-static void angle_paths(const double from[MSFP_ORDERS][MSFP_END_FREEDOMS], const double to[MSFP_ORDERS][MSFP_END_FREEDOMS],
-                        double h, int channel, msfp_polynomials *path)
+/* The polynomials of all channels [order][channel] of an end. */
+static void paths(const double *from, const double *to, double h, msfp_polynomials *path)
 {
-    double rotation[MSFP_ORDERS][3], start[MSFP_ORDERS][3], end[MSFP_ORDERS][3], one[MSFP_ORDERS], other[MSFP_ORDERS];
-    for (int order = 0; order < MSFP_ORDERS; ++order)
-        memcpy(rotation[order], from[order] + 3, sizeof rotation[order]);
-    msfp_end_angles((const double(*)[3])rotation, start);
-    for (int order = 0; order < MSFP_ORDERS; ++order)
-        memcpy(rotation[order], to[order] + 3, sizeof rotation[order]);
-    msfp_end_angles((const double(*)[3])rotation, end);
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < MSFP_END_FREEDOMS; ++i) {
+        double start[MSFP_ORDERS], end[MSFP_ORDERS];
         for (int order = 0; order < MSFP_ORDERS; ++order) {
-            one[order] = start[order][i];
-            other[order] = end[order][i];
+            start[order] = from[order * MSFP_END_FREEDOMS + i];
+            end[order] = to[order * MSFP_END_FREEDOMS + i];
         }
-        through(one, other, h, channel + i, path);
+        through(start, end, h, i, path);
     }
 }
 
-void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *motion)
+void msfp_end_channels(const double *end, double *channels)
 {
-    for (int i = 0; i < 3; ++i)
-        freedom_path(from->of[0], to->of[0], i, h, motion);
-    angle_paths(from->of[0], to->of[0], h, 3, motion);
+    double turn[MSFP_ORDERS][3], angles[MSFP_ORDERS][3];
+    for (int order = 0; order < MSFP_ORDERS; ++order)
+        memcpy(turn[order], end + order * MSFP_END_FREEDOMS + 3, sizeof turn[order]);
+    msfp_end_angles((const double(*)[3])turn, angles);
+    memcpy(channels, end, MSFP_ORDERS * MSFP_END_FREEDOMS * sizeof *channels);
+    for (int order = 0; order < MSFP_ORDERS; ++order)
+        memcpy(channels + order * MSFP_END_FREEDOMS + 3, angles[order], sizeof angles[order]);
 }
 
-/* The force k u + c du/dt by which springs with moving ends differ from those of the top, whose ends are fixed. */
-void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const msfp_ends *to, double h,
-                         double axial_load, msfp_polynomials *load)
+/* The polynomials of displacement and angles of an end. */
+static void motion_paths(const double *from, const double *to, double h, msfp_polynomials *path)
 {
-    const double *top = p->top;
-    const double stiffness[3] = { top[MSFP_TOP_PARAMETERS_K], top[MSFP_TOP_PARAMETERS_K], top[MSFP_TOP_PARAMETERS_KV] };
-    const double damping[3] = { top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_C], top[MSFP_TOP_PARAMETERS_CV] };
+    double start[MSFP_ORDERS][MSFP_END_FREEDOMS], end[MSFP_ORDERS][MSFP_END_FREEDOMS];
+    msfp_end_channels(from, start[0]);
+    msfp_end_channels(to, end[0]);
+    paths(start[0], end[0], h, path);
+}
+
+/* The load of the interface is linear in displacement and rate, and so in the coefficients of their polynomials. */
+static void interface_path(const msfp_port *port, const msfp_parameters *p, const msfp_ends *to, double h,
+                           msfp_polynomials *load)
+{
+    msfp_polynomials motion;
+    paths(port->from.of[1][0], to->of[1][0], h, &motion);
     memset(load, 0, sizeof *load);
-    for (int i = 0; i < 3; ++i) {
-        freedom_path(from->of[1], to->of[1], i, h, load);
-        for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) {
-            double *out = load->coefficients[piece][i];
-            out[0] -= i < 2 ? to->of[1][0][i] : 0.0;
-            for (int k = 0; k <= MSFP_DEGREE; ++k)
-                out[k] = stiffness[i] * out[k] + (k < MSFP_DEGREE ? damping[i] * (k + 1) * out[k + 1] : 0.0);
-        }
-    }
     for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece)
-        load->coefficients[piece][2][0] -= axial_load;
+        for (int k = 0; k <= (piece ? MSFP_ORDERS - 1 : MSFP_DEGREE); ++k) {
+            static const double none[3];
+            double u[3], v[3] = { 0.0 }, force[3], block[MSFP_FAR_END_SIZE];
+            for (int i = 0; i < 3; ++i) {
+                u[i] = motion.coefficients[piece][i][k];
+                if (k < MSFP_DEGREE)
+                    v[i] = (k + 1) * motion.coefficients[piece][i][k + 1];
+            }
+            msfp_far_end(port, u, v, k ? none : to->of[1][0], block);
+            block[MSFP_FAR_END_AXIAL] *= k == 0;
+            msfp_load_of_interface(p, block, force);
+            for (int i = 0; i < 3; ++i)
+                load->coefficients[piece][i][k] = force[i];
+        }
 }
 
-void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *load)
+void msfp_port_paths(msfp_port *port, const msfp_parameters *p, double t, double end, const msfp_ends *to)
 {
-    for (int i = 0; i < MSFP_END_FREEDOMS; ++i)
-        freedom_path(from->of[1], to->of[1], i, h, load);
-}
-
+    const double h = end - t;
+    port->knots[0] = t;
+    port->knots[1] = end;
+    port->knots[2] = end + h;
+    motion_paths(port->from.of[0][0], to->of[0][0], h, &port->motion);
+    if (port->loaded) {
+        paths(port->from.of[1][0], to->of[1][0], h, &port->load);
+        return;
+    }
+    interface_path(port, p, to, h, &port->load);
 #if MSFP_TOP_ROTATION
-void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support)
-{
-    memset(support, 0, sizeof *support);
-    angle_paths(from->of[1], to->of[1], h, 0, support);
-    for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) /* the interface does not transmit torsion */
-        memset(support->coefficients[piece][2], 0, sizeof support->coefficients[piece][2]);
-}
+    motion_paths(port->from.of[1][0], to->of[1][0], h, &port->support);
+    for (int piece = 0; piece < MSFP_PORT_PIECES; ++piece) { /* psi, theta; the interface does not transmit torsion */
+        double(*channels)[MSFP_DEGREE + 1] = port->support.coefficients[piece];
+        memcpy(channels[0], channels[3], 2 * sizeof *channels);
+        memset(channels[2], 0, 4 * sizeof *channels);
+    }
 #endif
+}
+
+/* ---- the interface and the wrenches ---- */
+
+void msfp_far_end(const msfp_port *port, const double *u, const double *v, const double *anchor, double *block)
+{
+    const double fixed[3] = { anchor[0], anchor[1], 0.0 };
+    msfp_far_end_u_put(block, u);
+    msfp_far_end_v_put(block, v);
+    msfp_far_end_a_put(block, fixed);
+    msfp_far_end_rest_put(block, port->plate);
+    block[MSFP_FAR_END_AXIAL] = port->axial_load;
+}
+
+void msfp_load_of_interface(const msfp_parameters *p, const double *far_end, double *load)
+{
+    double force[MSFP_FORCE_SIZE];
+    msfp_interface_load(p->top, far_end, force);
+    msfp_force_F_get(force, load);
+}
+
+void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench)
+{
+    msfp_blocks s;
+    msfp_body_C_put(s.frame, at->of[0][0]);
+    msfp_far_end(port, at->of[1][0], at->of[1][1], at->of[1][0], s.far_end);
+    msfp_wrenches_values(&run->parameters, &run->work, &s);
+    msfp_end_wrench_F_get(s.lower, wrench);
+    msfp_end_wrench_M_get(s.lower, wrench + 3);
+    if (port->loaded) {
+        memcpy(wrench + MSFP_END_FREEDOMS, at->of[1][0], sizeof at->of[1][0]);
+        return;
+    }
+    msfp_end_wrench_F_get(s.upper, wrench + MSFP_END_FREEDOMS);
+    msfp_end_wrench_M_get(s.upper, wrench + MSFP_END_FREEDOMS + 3);
+}

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "port.h"
 
-static void attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
+void msfp_attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials)
 {
     memset(history, 0, sizeof *history);
     history->pieces = MSFP_PORT_PIECES;
@@ -15,10 +15,10 @@ static void attach(msfp_history *history, const double *knots, const msfp_polyno
 /* The histories of a run are the polynomials of the port. */
 static void attach_all(msfp_port *port, msfp_run *run)
 {
-    attach(&run->motion, port->knots, &port->motion);
-    attach(&run->load, port->knots, &port->load);
+    msfp_attach(&run->motion, port->knots, &port->motion);
+    msfp_attach(&run->load, port->knots, &port->load);
 #if MSFP_TOP_ROTATION
-    attach(&run->support, port->knots, &port->support);
+    msfp_attach(&run->support, port->knots, &port->support);
 #endif
 }
 
@@ -33,11 +33,11 @@ static int start(msfp_port *port, const msfp_parameters *p, const msfp_options *
                  const double *v, const double *f)
 {
     msfp_history motion, load;
-    attach(&motion, port->knots, &port->motion);
-    attach(&load, port->knots, &port->load);
+    msfp_attach(&motion, port->knots, &port->motion);
+    msfp_attach(&load, port->knots, &port->load);
 #if MSFP_TOP_ROTATION
     msfp_history support;
-    attach(&support, port->knots, &port->support);
+    msfp_attach(&support, port->knots, &port->support);
     return msfp_run_start(&port->committed, p, &motion, &load, &support, NULL, 0, options, q, v, f);
 #else
     return msfp_run_start(&port->committed, p, &motion, &load, NULL, 0, options, q, v, f);
@@ -71,10 +71,7 @@ msfp_port *msfp_port_new(const msfp_parameters *p, const msfp_options *options, 
     port->loaded = loaded;
     port->axial_load = axial_load;
     port->step.stage = MSFP_NO_STEP;
-    port->knots[0] = options->start_time;
-    port->knots[1] = options->start_time + 1.0;
-    port->knots[2] = options->start_time + 2.0;
-    msfp_interface_path(p, &port->from, &port->to, 1.0, axial_load, &port->load);
+    msfp_port_paths(port, p, options->start_time, options->start_time + 1.0, &port->to);
     if (begin(port, p, options, q, v, f) == MSFP_OK) {
         memcpy(port->plate, port->committed.rows[0].top, sizeof port->plate);
         msfp_port_wrench_of(port, &port->committed, &port->from, port->wrench);
@@ -89,7 +86,6 @@ void msfp_port_free(msfp_port *port)
     msfp_run_free(&port->committed);
     msfp_run_free(&port->run);
     free(port->times);
-    free(port->solved);
     free(port);
 }
 
@@ -128,24 +124,14 @@ double msfp_port_move_anchor(const msfp_port *port, msfp_run *run, const double 
 
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to)
 {
-    const double h = t - port->committed.now.t;
     copy_state(run, &port->committed);
     memset(run->counts, 0, sizeof run->counts);
     run->row_count = run->event_count = 0;
     run->options.duration = t;
-    port->knots[0] = run->now.t;
-    port->knots[1] = t;
-    port->knots[2] = t + h;
-    msfp_base_path(&port->from, to, h, &port->motion);
+    msfp_port_paths(port, &run->parameters, run->now.t, t, to);
     attach_all(port, run); /* nothing of an earlier trial is left in the searches */
-    if (port->loaded) {
-        msfp_load_path(&port->from, to, h, &port->load);
+    if (port->loaded)
         return;
-    }
-    msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
-#if MSFP_TOP_ROTATION
-    msfp_support_path(&port->from, to, h, &port->support);
-#endif
     /* The springs are fixed where end B is at the end: the load that its motion adds stays small beside the axial load. */
     run->now.energy += msfp_port_move_anchor(port, run, port->committed.rows[0].top, port->from.of[1][0], to->of[1][0]);
 }
@@ -169,7 +155,7 @@ int msfp_port_trial(msfp_port *port, double t, const double *to)
 {
     msfp_run *run = &port->run;
     memcpy(&port->to, to, sizeof port->to);
-    port->tried = port->ready = port->linearised = 0;
+    port->tried = port->ready = 0;
     port->step.stage = MSFP_NO_STEP;
     port->step.finished = 0;
     port->time_count = 0;
@@ -195,56 +181,6 @@ const msfp_row *msfp_port_row(const msfp_port *port)
 {
     const msfp_run *run = current(port);
     return &run->rows[run->row_count - 1];
-}
-
-static void add_moment(const double arm[3], const double force[3], double *moment)
-{
-    moment[0] += arm[1] * force[2] - arm[2] * force[1];
-    moment[1] += arm[2] * force[0] - arm[0] * force[2];
-    moment[2] += arm[0] * force[1] - arm[1] * force[0];
-}
-
-/* Moment about the centre of the lowest sphere, and those that lock the spin of the bodies (docs/model.md, choice 3):
- * end A exerts them, so that both ends and the weights balance all inertia. */
-static void moment_from_below(const msfp_work *w, double moment[3])
-{
-#if MSFP_UPLIFT
-    const double *below = w->below[0];
-#else
-    const double *below = w->moment[0];
-#endif
-    double axis[3];
-    msfp_moment_M_get(below, moment);
-    for (int k = 1; k <= NB; ++k) {
-        msfp_body_t3_get(w->body[k], axis);
-        for (int i = 0; i < 3; ++i)
-            moment[i] += w->lock[k - 1][MSFP_LOCK_MOMENT] * axis[i];
-    }
-}
-
-void msfp_port_wrench_of(const msfp_port *port, const msfp_run *run, const msfp_ends *at, double *wrench)
-{
-    const msfp_work *w = &run->work;
-    double centre[3], *a = wrench, *b = wrench + 6, arm[3];
-    msfp_body_C_get(w->body[0], centre);
-    msfp_force_F_get(w->force[0], a);
-    moment_from_below(w, a + 3);
-    for (int i = 0; i < 3; ++i)
-        arm[i] = centre[i] - at->of[0][0][i];
-    add_moment(arm, a, a + 3);
-    if (port->loaded) {
-        memcpy(b, at->of[1][0], sizeof at->of[1][0]);
-        return;
-    }
-    /* The top plate exerts F and M on the interface, which hands them on to end B. */
-    msfp_body_C_get(w->body[NB], centre);
-    msfp_force_F_get(w->force[NB], b);
-    msfp_moment_M_get(w->moment[NB], b + 3);
-    for (int i = 0; i < 6; ++i)
-        b[i] = -b[i];
-    for (int i = 0; i < 3; ++i)
-        arm[i] = centre[i] - (port->plate[i] + at->of[1][0][i]);
-    add_moment(arm, b, b + 3);
 }
 
 void msfp_port_wrench(const msfp_port *port, double *wrench)

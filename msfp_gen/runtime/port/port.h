@@ -46,12 +46,6 @@ typedef struct {
     int tripped;       /* a monitor stops it */
 } msfp_port_step;
 
-/* A stage of a trial as it was solved: rates, friction force over -mu N, what is left of the residual, factored tangent. */
-typedef struct {
-    double v[MSFP_NB][MSFP_NQ], g[MSFP_NB][2], residual[MSFP_DOF], factors[MSFP_DOF * MSFP_DOF];
-    int pivots[MSFP_DOF];
-} msfp_solved;
-
 struct msfp_port {
     msfp_run committed; /* state at the end of the last committed step, with its row */
     msfp_run run;       /* the trial: its state is a copy of that of `committed` at first */
@@ -67,9 +61,6 @@ struct msfp_port {
     double plate[3];   /* r_nn at rest, where end B is with u = 0 [m] */
     double *times;     /* [time_count]: ends of the steps of the trial [s] */
     size_t time_count, time_capacity;
-    msfp_solved *solved; /* [solved_capacity]: the stages of these steps, one after the other, if they are linearised */
-    size_t solved_capacity;
-    int linearised;
     int tried; /* a trial has succeeded since the last commit, revert or failure */
     int ready; /* it may be committed: the same, or a trial of no duration */
     msfp_port_step step;
@@ -106,6 +97,8 @@ int msfp_port_snapshot_read(msfp_port *port, const void *snapshot, size_t size);
 /* Whether all numbers [end][order][6] are finite and no end turns by more than MSFP_LARGEST_TURN;
  * loaded: those of end B are a load. */
 int msfp_valid_ends(const double *ends, int loaded);
+/* A history of those polynomials. */
+void msfp_attach(msfp_history *history, const double *knots, const msfp_polynomials *polynomials);
 /* Prepare a trial that ends at `t` with the ends at `to`: the histories of `run`, from the committed state. */
 void msfp_port_prepare(msfp_port *port, msfp_run *run, double t, const msfp_ends *to);
 /* Wrenches [end][6] of the evaluation in run->work, the ends at `at`. */
@@ -144,29 +137,25 @@ int msfp_port_cause(msfp_port *port, int status);
 
 /* ---- ends.c: what a motion of the ends is to the equations ---- */
 
-/* Motion of the base over a step of length h [s]. */
-void msfp_base_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *motion);
-/* Force on the top plate over a step: what the motion of end B adds to springs that are fixed horizontally where end B
- * is at the end of the step, and vertically at rest; and the axial load [N]. */
-void msfp_interface_path(const msfp_parameters *p, const msfp_ends *from, const msfp_ends *to, double h,
-                         double axial_load, msfp_polynomials *load);
-/* Load on the top plate of a loaded two-port over a step. */
-void msfp_load_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *load);
-#if MSFP_TOP_ROTATION
-/* Rotation psi, theta of end B over a step. */
-void msfp_support_path(const msfp_ends *from, const msfp_ends *to, double h, msfp_polynomials *support);
-#endif
+/* Displacement and angles psi, theta, phi (2.1) [order][6] of the motion [order][6] of an end. */
+void msfp_end_channels(const double *end, double *channels);
+/* The polynomials of a step from the committed motion at the time t to the ends at `to` at the time `end` [s]: motion of
+ * the base; load on the top plate; rotation of its support. The load is what the motion of end B adds to springs that are
+ * fixed horizontally where it is at `end`, and vertically at rest, and the axial load; or that of a loaded two-port. */
+void msfp_port_paths(msfp_port *port, const msfp_parameters *p, double t, double end, const msfp_ends *to);
+/* Channel k: a motion from rest at zero whose derivative k at the end of the step is 1, the others 0. */
+void msfp_unit_paths(double h, msfp_polynomials *paths);
+/* The block `far_end` of end B; anchor: where the horizontal springs are fixed, a displacement of end B [m]. */
+void msfp_far_end(const msfp_port *port, const double *u, const double *v, const double *anchor, double *block);
+/* Force on the top plate [3] that follows from it [N]. */
+void msfp_load_of_interface(const msfp_parameters *p, const double *far_end, double *load);
 
 /* ---- derivatives.c ---- */
 
-/* Derivatives [12][12] of the wrenches of the last trial with respect to the motion of the ends at its end, its steps
- * held. direction: how displacements, rates and accelerations change together; (1, 0, 0) gives the tangent. Returns
- * MSFP_OK or a status, after which `derivative` is as it was. */
-int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative);
-/* The rows and wrenches [2][12] at the end of the last trial, its steps held, with freedom `column` moved along
- * `direction` by minus and plus a step: differences give the derivative of anything that follows from them. Returns
- * MSFP_OK or a status. */
-int msfp_port_beside(msfp_port *port, const double direction[MSFP_ORDERS], int column, double *step, msfp_row rows[2],
-                     double wrenches[2][MSFP_PORT_FREEDOMS]);
+/* Derivatives of the last trial, its steps held, by the freedoms of the ends at its end. direction: how displacements,
+ * rates and accelerations change together; (1, 0, 0) gives the tangent. derivative [12][12]: of the wrenches; rows
+ * [MSFP_ROW_SIZE + 6][12], or NULL: of the row, as port_row_derivative of msfp.h says, and of velocity and acceleration of
+ * r_nn. Returns MSFP_OK or a status, after which nothing was written. */
+int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative, double *rows);
 
 #endif

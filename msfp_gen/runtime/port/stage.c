@@ -13,25 +13,16 @@ enum { FREEDOMS = MSFP_END_FREEDOMS };
 /* Base motion, load and rotation of the support of a stage. */
 static void set_ends(const msfp_port *port, const msfp_ends *ends, msfp_point *at)
 {
-    const double *top = port->committed.parameters.top, *u = ends->of[1][0], *v = ends->of[1][1];
-    double rotation[MSFP_ORDERS][3], angles[MSFP_ORDERS][3];
+    double far_end[MSFP_FAR_END_SIZE];
     memset(at->load, 0, sizeof at->load);
-    for (int i = 0; i < 2; ++i)
-        at->load[i] = top[MSFP_TOP_PARAMETERS_K] * (u[i] - port->step.anchor[i]) + top[MSFP_TOP_PARAMETERS_C] * v[i];
-    at->load[2] = top[MSFP_TOP_PARAMETERS_KV] * u[2] + top[MSFP_TOP_PARAMETERS_CV] * v[2] - port->axial_load;
-    for (int order = 0; order < MSFP_ORDERS; ++order)
-        memcpy(rotation[order], ends->of[0][order] + 3, sizeof rotation[order]);
-    msfp_end_angles((const double(*)[3])rotation, angles);
-    for (int order = 0; order < MSFP_ORDERS; ++order) {
-        memcpy(at->base[order], ends->of[0][order], 3 * sizeof(double));
-        memcpy(at->base[order] + 3, angles[order], 3 * sizeof(double));
-    }
+    msfp_far_end(port, ends->of[1][0], ends->of[1][1], port->step.anchor, far_end);
+    msfp_load_of_interface(&port->committed.parameters, far_end, at->load);
+    msfp_end_channels(ends->of[0][0], at->base[0]);
 #if MSFP_TOP_ROTATION
-    for (int order = 0; order < MSFP_ORDERS; ++order)
-        memcpy(rotation[order], ends->of[1][order] + 3, sizeof rotation[order]);
-    msfp_end_angles((const double(*)[3])rotation, angles);
+    double upper[MSFP_ORDERS][MSFP_END_FREEDOMS];
+    msfp_end_channels(ends->of[1][0], upper[0]);
     for (int order = 0; order < 2; ++order)
-        memcpy(at->support[order], angles[order], 3 * sizeof(double));
+        memcpy(at->support[order], upper[order] + 3, 3 * sizeof(double));
 #endif
 }
 
@@ -93,139 +84,15 @@ int msfp_port_stage(msfp_port *port, int i, const double *ends, double *wrench)
     return MSFP_OK;
 }
 
-/* ---- derivatives: the stage equations differentiated ---- */
-
-/* Derivatives [6][6] of force and moment at the top with respect to the rates of end B at a given bearing. */
-static void interface_derivatives(const msfp_port *port, const msfp_work *w, double d[FREEDOMS][FREEDOMS])
-{
-    const double *top = port->committed.parameters.top, beta = port->step.stages.now.beta;
-    memset(d, 0, FREEDOMS * sizeof *d);
-    for (int i = 0; i < 2; ++i)
-        d[i][i] = -(top[MSFP_TOP_PARAMETERS_C] + beta * top[MSFP_TOP_PARAMETERS_K]);
-    d[2][2] = -(top[MSFP_TOP_PARAMETERS_CV] + beta * top[MSFP_TOP_PARAMETERS_KV]);
-#if MSFP_TOP_ROTATION
-    static const int next[3] = { 1, 2, 0 };
-    double upright[MSFP_UPRIGHT_SIZE], axis[3], plate[3], turns[3][3], changes[3][3], rotation[2][3];
-    for (int order = 0; order < 2; ++order)
-        memcpy(rotation[order], port->to.of[1][order] + 3, sizeof rotation[order]);
-    msfp_end_turns((const double(*)[3])rotation, turns, changes);
-    msfp_support_axis(&port->step.stages.now.at, upright);
-    msfp_upright_e_get(upright, axis);
-    msfp_body_t3_get(w->body[NB], plate);
-    for (int k = 0; k < 3; ++k) {
-        double moved[3]; /* the axis turns */
-        for (int i = 0; i < 3; ++i)
-            moved[i] = turns[k][next[i]] * axis[next[next[i]]] - turns[k][next[next[i]]] * axis[next[i]];
-        for (int i = 0; i < 3; ++i) {
-            const int j = next[i], l = next[j];
-            d[3 + i][3 + k] =
-                beta * top[MSFP_TOP_PARAMETERS_KR] * (moved[j] * plate[l] - moved[l] * plate[j]) -
-                top[MSFP_TOP_PARAMETERS_CR] * (turns[k][i] + beta * changes[k][i]);
-        }
-    }
-#else
-    (void)w;
-#endif
-}
-
-/* What a change of the rates of the stage changes at the top: force, moment and position of the plate [..][DOF]. */
-typedef struct {
-    double wrench[FREEDOMS][DOF], centre[3][DOF];
-} columns;
-
-static void read_columns(const msfp_work *w, columns *c)
-{
-    memcpy(c->wrench, w->dforce[NB], 3 * sizeof *c->wrench);
-    memcpy(c->wrench + 3, w->dmoment[NB], 3 * sizeof *c->wrench);
-    memcpy(c->centre, w->dbody[NB] + MSFP_BODY_CX * DOF, sizeof c->centre);
-}
-
-/* Derivatives [DOF][6] of the residual over N with respect to force and moment at the top. */
-static void load_derivatives(msfp_run *run, double derivatives[DOF][FREEDOMS])
-{
-    for (int begin = 0; begin < FREEDOMS; begin += DOF) { /* DOF at a time */
-        double dforce[3 * DOF] = { 0.0 }, dmoment[3 * DOF] = { 0.0 }, found[DOF * DOF];
-        for (int k = begin; k < FREEDOMS && k < begin + DOF; ++k)
-            (k < 3 ? dforce : dmoment)[k % 3 * DOF + k - begin] = 1.0;
-        msfp_load_tangent(&run->parameters, &run->work, dforce, dmoment, found);
-        for (int i = 0; i < DOF; ++i)
-            for (int k = begin; k < FREEDOMS && k < begin + DOF; ++k)
-                derivatives[i][k] = found[i * DOF + k - begin] /
-                                    (MSFP_UPLIFT ? 1.0 : run->work.contact[i / ND][MSFP_CONTACT_N]);
-    }
-}
-
-/* Rates of the stage that follow those of end B: -(dr/dv)^-1 dr/d(force, moment) d(force, moment)/d(end B). */
-static void solve_moves(msfp_port *port, double of_load[DOF][FREEDOMS], double of_end[FREEDOMS][FREEDOMS])
-{
-    msfp_run *run = &port->committed;
-    for (int k = 0; k < FREEDOMS; ++k) {
-        double rhs[DOF] = { 0.0 };
-        for (int i = 0; i < DOF; ++i)
-            for (int l = 0; l < FREEDOMS; ++l)
-                rhs[i] -= of_load[i][l] * of_end[l][k];
-        msfp_lu_solve(run->factors, DOF, run->pivots, rhs);
-        for (int i = 0; i < DOF; ++i)
-            port->step.moves[i][k] = rhs[i];
-    }
-    port->step.moved = 1;
-}
-
-int msfp_port_stage_derivative(msfp_port *port, double *derivative)
-{
-    msfp_run *run = &port->committed;
-    msfp_stage *s = &port->step.stages.now;
-    const msfp_work *w = &run->work;
-    double residual[DOF], size, of_load[DOF][FREEDOMS], of_end[FREEDOMS][FREEDOMS], arm[3], force[3];
-    static const int next[3] = { 1, 2, 0 };
-    columns c;
-    int status = msfp_factorise_stage(run, s, residual, &size);
-    if (status)
-        return status;
-    read_columns(w, &c);
-    interface_derivatives(port, w, of_end);
-    load_derivatives(run, of_load);
-    solve_moves(port, of_load, of_end);
-    msfp_body_C_get(w->body[NB], arm);
-    msfp_force_F_get(w->force[NB], force);
-    for (int i = 0; i < 3; ++i)
-        arm[i] -= port->plate[i] + port->to.of[1][0][i];
-    for (int k = 0; k < FREEDOMS; ++k) { /* end B exerts -F, and -M and the moment of -F about its position */
-        double change[FREEDOMS], moved[3];
-        for (int i = 0; i < FREEDOMS; ++i) {
-            change[i] = -of_end[i][k];
-            for (int l = 0; l < DOF; ++l)
-                change[i] -= c.wrench[i][l] * port->step.moves[l][k];
-        }
-        for (int i = 0; i < 3; ++i) {
-            moved[i] = i == k ? -s->beta : 0.0;
-            for (int l = 0; l < DOF; ++l)
-                moved[i] += c.centre[i][l] * port->step.moves[l][k];
-        }
-        for (int i = 0; i < 3; ++i) {
-            const int j = next[i], l = next[j];
-            derivative[i * FREEDOMS + k] = change[i];
-            derivative[(3 + i) * FREEDOMS + k] = change[3 + i] + arm[j] * change[l] - arm[l] * change[j] -
-                                                 moved[j] * force[l] + moved[l] * force[j];
-        }
-    }
-    return msfp_all_finite(derivative, FREEDOMS * FREEDOMS) ? MSFP_OK : MSFP_E_FINITE;
-}
-
 /* ---- the end of a step ---- */
 
 /* The histories of the committed run between the ends of a step of length h [s]. */
 static void set_histories(msfp_port *port, const msfp_ends *to, double h)
 {
     msfp_run *run = &port->committed;
-    port->knots[0] = run->now.t;
-    port->knots[1] = run->now.t + h;
-    port->knots[2] = run->now.t + 2.0 * h;
-    msfp_base_path(&port->from, to, h, &port->motion);
-    msfp_interface_path(&run->parameters, &port->from, to, h, port->axial_load, &port->load);
+    msfp_port_paths(port, &run->parameters, run->now.t, run->now.t + h, to);
     run->motion.held = run->load.held = 0;
 #if MSFP_TOP_ROTATION
-    msfp_support_path(&port->from, to, h, &port->support);
     run->support.held = 0;
 #endif
 }

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import Array
+from support import Array, thinned
 from support.ends import BEARING, INTERFACE, LOAD, STILL, advance, port, swing
 
 from msfp_gen import Effects, InputError, Motion, RunError, Scene, Solver, Top, TwoPort, load_scene
@@ -57,27 +57,52 @@ def test_small_commits_tend_to_one_large_one():
     assert found == pytest.approx(expected, abs=1e-4 * LOAD)
 
 
-# Largest error of a derivative, rows and columns of rotation taken over 0.5 m, over the largest entry; the smaller the
-# share of a derivative in the wrench, the larger the error that rounding leaves in it.
-@pytest.mark.parametrize("order, name, accuracy", [(0, "tangent", 2e-5), (1, "damping", 1e-4), (2, "inertia", 1e-3)])
-def test_derivatives_equal_differences_of_trials(order: int, name: str, accuracy: float):
-    """Trials at a tight tolerance are smooth enough to be differenced from outside."""
-    two_port = port(1e-9)
+# Effects of a model, tolerance and step of the trial, and how far its derivatives by displacements, rates and
+# accelerations are from differences, over the largest entry: what the tolerance of Newton's method leaves in these.
+SMOOTH: list[tuple[dict[str, object], float, float, tuple[float, float, float]]] = [
+    ({}, 1e-8, 5e-5, (1e-8, 1e-8, 1e-7)),
+    ({"uplift": True}, 1e-8, 5e-5, (5e-7, 5e-7, 2e-5)),
+    ({"friction": "pvt"}, 1e-7, 1e-4, (1e-7, 1e-7, 1e-6)),
+    ({"sliders": "massless"}, 1e-7, 1e-4, (1e-7, 1e-7, 1e-5)),
+]
+HOT = BEARING.replace(reference_pressure=15e6, patch_radius=0.025, velocity_rate=100.0)
+
+
+def differences(two_port: TwoPort, time: float, end: Array, order: int) -> Array:
+    """Richardson's differences of the wrenches with respect to derivative `order` of the motion of the ends."""
+    expected = np.empty((12, 12))
+    for column, (side, freedom) in enumerate(np.ndindex(2, 6)):
+        size = (4e-6 if freedom > 2 else 2e-6) * (1.0, 5.0, 50.0)[order] / STEP**order
+        moves = np.array([size, -size, size / 2, -size / 2])
+        wrenches = []
+        for move in moves:
+            moved = end.copy()
+            moved[side, order, freedom] += move
+            wrenches.append(two_port.trial(time, *moved).wrench.ravel())
+        coarse, fine = ((wrenches[i] - wrenches[i + 1]) / (2 * moves[i]) for i in (0, 2))
+        expected[:, column] = (4 * fine - coarse) / 3
+    return expected
+
+
+@pytest.mark.parametrize(
+    ("effects", "rtol", "step", "accuracies"), thinned(SMOOTH, lambda effects, *_: not effects), ids=str
+)
+def test_derivatives_equal_differences_of_trials(
+    effects: dict[str, object], rtol: float, step: float, accuracies: tuple[float, float, float]
+):
+    """In steps that all have the longest length trials are smooth. Rows and columns of rotation count over 0.5 m."""
+    bearing = HOT if "friction" in effects else BEARING
+    two_port = port(rtol, bearing, Effects(**effects), max_step=step)  # type: ignore[arg-type]
     advance(two_port, 0, 12, 0.05)
     time = 0.61
     end = swing(time)
-    found = getattr(two_port.trial(time, *end), name)
-    sizes = np.repeat([2e-7, 4e-7], 3)[None] * (1.0, 5.0, 50.0)[order] / STEP**order * np.ones((2, 6))
-    expected = np.empty((12, 12))
-    for column, (side, freedom) in enumerate(np.ndindex(2, 6)):
-        moved = [end.copy(), end.copy()]
-        for each, sign in zip(moved, (1, -1), strict=True):
-            each[side, order, freedom] += sign * sizes[side, freedom]
-        high, low = (two_port.trial(time, *each).wrench.ravel() for each in moved)
-        expected[:, column] = (high - low) / (moved[0] - moved[1])[side, order, freedom]
+    response = two_port.trial(time, *end)
+    found = {name: getattr(response, name) for name in ("tangent", "damping", "inertia")}
     arms = np.tile(np.repeat([1.0, 2.0], 3), 2)
-    scaled = [arms[:, None] * each * arms for each in (found, expected)]
-    assert np.abs(scaled[0] - scaled[1]).max() < accuracy * np.abs(scaled[1]).max()
+    for order, (name, accuracy) in enumerate(zip(found, accuracies, strict=True)):
+        expected = arms[:, None] * differences(two_port, time, end, order) * arms
+        error = arms[:, None] * found[name] * arms - expected
+        assert np.abs(error).max() < accuracy * np.abs(expected).max(), name
 
 
 def test_the_effective_stiffness_is_the_sum_of_the_derivatives():

@@ -12,7 +12,7 @@ from support.emitted_c import emitted, text, warnings_of
 
 from msfp_gen import Effects, InputError, Layout
 from msfp_gen.generator import generate
-from msfp_gen.generator.emit import FILES
+from msfp_gen.generator.emit import FILES, TWO_PORT_FILES
 from msfp_gen.jit.compiler import FLAGS
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
@@ -100,7 +100,7 @@ def test_generating_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Path, "write_text", refuse)
     monkeypatch.setattr(Path, "mkdir", refuse)
     generated = generate(ModelSpec(Layout(2, 1, 0)))
-    assert sorted(generated.files) == sorted([*FILES, "msfp_2_1_0.h"])
+    assert sorted(generated.files) == sorted([*FILES, *TWO_PORT_FILES, "msfp_2_1_0.h"])
     assert not list(tmp_path.iterdir())
 
 
@@ -109,7 +109,7 @@ def test_generating_twice_gives_the_same_text() -> None:
     assert generate(spec).files == generate(spec).files
 
 
-@pytest.mark.parametrize("name", [*FILES, "msfp_5_2_2.h"])
+@pytest.mark.parametrize("name", [*FILES, *TWO_PORT_FILES, "msfp_5_2_2.h"])
 def test_each_file_carries_its_stamp(name: str) -> None:
     head = "\n".join(text(name).splitlines()[:4])
     spec = ModelSpec(Layout.tfp())

@@ -1,0 +1,207 @@
+"""Programs of a bearing between two moving ends: load of the interface, wrenches of the ends, and derivatives by them.
+
+End A holds the base, end B the far side of the interface, springs and dampers on the top plate (docs/embedding.md).
+Derivatives by the motion of the ends are those of the programs of the schedule with all inputs active but parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import sympy as sp
+
+from .blocks import Blocks
+from .gradients import differentiated
+from .lower import Kernel, Tangent, active_inputs, jacobian_column, lower, values_of_tangents
+from .program import Program, Statement, Use, fields_of
+from .vectors import ZERO, add, cross, scale, subtract
+
+Symbols = dict[str, Any]
+WIDTH = "MSFP_PORT_FREEDOMS"
+"""C constant with the number of columns: the freedoms of both ends."""
+MOVING: Mapping[str, tuple[str, ...]] = {
+    "foot_stage": ("y", "y1"),
+    "before": ("Y", "Z", "rise"),
+    "stage": ("Y", "Z", "rise"),
+    "far_end": ("u", "v"),
+    "body": ("t1", "t2", "t3", "w", "wp", "al", "alp", "C", "V", "A", "ac", "sp", "cp", "st", "ct"),
+}
+"""Block -> what moves with the ends, where that is not all of it; a step has a given length."""
+CONTACT = ("M", "dY", "dZ", "mu", "N", "flux")
+"""Results of `contact` on which anything depends."""
+SUPPORT = frozenset({"psi", "theta", "psi1", "theta1"})
+"""Results of `rotation_angles` on which a stage depends at the upper end."""
+
+
+def interface_load(b: Blocks) -> Program:
+    """Force on the top plate by which springs with a moving end differ from those of the top, whose ends are fixed."""
+    p = Program("interface_load", "force of the moving end of the interface, and its axial load at rest")
+    par: Symbols = p.read(b.top_parameters, "par", active=False)
+    end: Symbols = p.read(b.far_end, "e", active=False)
+    x, y, z = subtract(end["u"], end["a"])
+    u, v, w = end["v"]
+    force = (par["k"] * x + par["c"] * u, par["k"] * y + par["c"] * v, par["kv"] * z + par["cv"] * w - end["axial"])
+    p.write(b.vector, {"F": force}, tangents=False)
+    return p
+
+
+def locking_moment(b: Blocks) -> Program:
+    """Moment that locks the spin of a body (docs/model.md, choice 3): end A exerts it. In the plane there is none."""
+    p = Program("locking_moment", "moment that locks the spin of a body")
+    body: Symbols = p.read(b.body, "b", active=False)
+    lock: Symbols = p.read(b.lock, "l", active=False)
+    planar = len(b.moment.fields) == 1
+    p.write(b.moment, {"M": ZERO if planar else scale(lock["moment"], body["t3"])}, tangents=False)
+    return p
+
+
+def lower_wrench(b: Blocks) -> Program:
+    """Force and moment that end A exerts on the bearing, about its present position."""
+    p = Program("lower_wrench", "wrench that the lower end exerts, about its present position")
+    frame: Symbols = p.read(b.body, "e", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    force: Symbols = p.read(b.vector, "f", active=False)
+    moment: Symbols = p.read(b.moment, "m", active=False)
+    held: Symbols = p.read(b.moment, "h", active=False)
+    arm = p.let_vector(subtract(body["C"], frame["C"]), "arm")
+    total = add(add(moment["M"], held["M"]), cross(arm, force["F"]))
+    p.write(b.end_wrench, {"F": force["F"], "M": total}, tangents=False)
+    return p
+
+
+def upper_wrench(b: Blocks) -> Program:
+    """Force and moment that end B exerts on the bearing, about its present position: the interface hands them on."""
+    p = Program("upper_wrench", "wrench that the upper end exerts, about its present position")
+    end: Symbols = p.read(b.far_end, "e", active=False)
+    body: Symbols = p.read(b.body, "b", active=False)
+    force: Symbols = p.read(b.vector, "f", active=False)
+    moment: Symbols = p.read(b.moment, "m", active=False)
+    arm = p.let_vector(subtract(body["C"], add(end["rest"], end["u"])), "arm")
+    against = scale(sp.Integer(-1), force["F"])
+    p.write(
+        b.end_wrench,
+        {"F": against, "M": subtract(cross(arm, against), moment["M"])},
+        tangents=False,
+    )
+    return p
+
+
+def programs(b: Blocks) -> list[Program]:
+    """All programs of a two-port but those of `rotation.py`."""
+    return [interface_load(b), locking_moment(b), lower_wrench(b), upper_wrench(b)]
+
+
+def _moves(use: Use) -> Use:
+    """An input with what moves with the ends as active: of a program with a tangent what is active there."""
+    if use.moving or use.block.name.endswith("_parameters"):
+        return use
+    given = [name for name in MOVING.get(use.block.name, use.block.quantities) if name in use.block.quantities]
+    return replace(use, active=frozenset(fields_of(use.block, given)), moving=True)
+
+
+def moving(blocks: Blocks) -> Iterator[tuple[str, str]]:
+    """What moves with an end before an evaluation, as (list, field) of the schedule."""
+    lists = {"x": blocks.coordinates, "frame": blocks.body, "load_moment": blocks.moment, "support": blocks.support}
+    lists |= {"lock": blocks.lock, "far_end": blocks.far_end, "foot_stage": blocks.foot_stage, "before": blocks.before}
+    for name, block in lists.items():
+        names = MOVING.get(name, tuple(block.quantities))
+        yield from ((name, field) for field in fields_of(block, (one for one in names if one in block.quantities)))
+
+
+def by_ends(program: Program, at_hand: bool) -> Program:
+    """The derivatives of a program by the motion of the ends; at_hand: as of `gradients.differentiated`."""
+    results = program.tangents or frozenset(program.results)
+    if program.name == "contact":
+        assert program.output is not None
+        names = [name for name in CONTACT if name in program.output.block.quantities]
+        results = frozenset(fields_of(program.output.block, names))
+    return differentiated(program, "by_ends", [_moves(use) for use in program.inputs], results, WIDTH, at_hand)
+
+
+def outside(every: Iterable[Program]) -> Iterator[Kernel]:
+    """The derivatives of the programs that C calls itself."""
+    for program in every:
+        if program.name == "contact":
+            yield eliminated(by_ends(program, at_hand=True))
+        elif program.name == "foot":
+            yield lower(by_ends(program, at_hand=True))
+        elif program.name == "rotation_angles":
+            every_angle = by_ends(program, at_hand=False)
+            yield lower(every_angle)
+            yield lower(replace(every_angle, name="support_angles_by_ends", tangents=SUPPORT))
+
+
+def _local_equations(program: Program) -> Iterator[tuple[sp.Symbol, str, sp.Expr, sp.Symbol | None]]:
+    """The local unknowns of a contact, each with the equation unknown = known + factor result (contact.c)."""
+    for use in program.inputs:
+        for field in use.block.fields if use.alias in ("g", "c") else ():
+            unknown = sp.Symbol(f"{use.alias}_{field.name}", real=True)
+            if use.alias == "c":
+                yield unknown, field.name, sp.Integer(1), None
+            else:
+                tau, known = (sp.Symbol(f"h_{name}", real=True) for name in ("tau", field.name))
+                yield unknown, f"d{field.name}", tau, known
+
+
+def _by_unknowns(
+    kernel: Kernel, equations: list[tuple[sp.Symbol, str, sp.Expr, sp.Symbol | None]]
+) -> tuple[list[Statement], list[dict[str, sp.Expr]], sp.Matrix]:
+    """Statements, derivatives of the results by each unknown, and the inverse of the matrix of the equations."""
+    statements: list[Statement] = []
+    columns: list[dict[str, sp.Expr]] = []
+    for unknown, *_ in equations:
+        more, results = jacobian_column(kernel, unknown)
+        statements += more
+        columns.append(results)
+
+    def name(text: str, expression: sp.Expr) -> sp.Symbol:
+        statements.append(Statement(sp.Symbol(text, real=True), expression))
+        return statements[-1].target
+
+    count = len(equations)
+    matrix = sp.Matrix(
+        count, count, lambda k, i: name(f"m_{k}{i}", int(k == i) - equations[k][2] * columns[i][equations[k][1]])
+    )
+    determinant = name("determinant", matrix.det(method="berkowitz"))
+    adjugate = matrix.adjugate()
+    return statements, columns, sp.Matrix(count, count, lambda k, i: name(f"n_{k}{i}", adjugate[k, i] / determinant))
+
+
+def eliminated(program: Program) -> Kernel:
+    """The derivatives of `contact`, whose local unknowns follow by the implicit function theorem."""
+    kernel, equations = lower(program), list(_local_equations(program))
+    statements, columns, inverse = _by_unknowns(kernel, equations)
+    unknowns = {unknown for unknown, *_ in equations}
+    moving = active_inputs(program) - unknowns
+    tangents: list[Tangent] = []
+
+    def add(target: sp.Symbol, terms: Iterable[tuple[sp.Expr, sp.Symbol]]) -> None:
+        kept = tuple((partial, source) for partial, source in terms if partial != 0 and source in moving)
+        if kept:
+            tangents.append(Tangent(target, kept))
+            moving.add(target)
+
+    for tangent in kernel.tangents:  # at constant unknowns
+        add(tangent.target, tangent.terms)
+    rests = [sp.Symbol(f"rest_{k}", real=True) for k in range(len(equations))]
+    for rest, (_, result, factor, known) in zip(rests, equations, strict=True):
+        add(rest, [(factor, program.results[result]), *([(sp.Integer(1), known)] if known is not None else [])])
+    for k, (unknown, *_) in enumerate(equations):
+        moving.discard(unknown)
+        add(unknown, [(inverse[k, i], rest) for i, rest in enumerate(rests)])
+    results = dict(program.results)
+    for name in (name for name in program.results if name in program.tangents):
+        value, total = results[name], sp.Symbol(f"total_{name}", real=True)
+        sign = 1 if value.is_Symbol else -1
+        by_unknowns = [(column[name], unknown) for column, (unknown, *_) in zip(columns, equations, strict=True)]
+        add(total, [(sp.Integer(sign), sign * value), *by_unknowns])
+        results[name] = total
+    given = [
+        replace(use, active=frozenset(), moving=False) if use.alias in ("g", "c") else use for use in program.inputs
+    ]
+    found = Kernel(
+        replace(program, inputs=given, results=results), (), (*kernel.partials, *statements), tuple(tangents)
+    )
+    return replace(found, values=values_of_tangents(found))
