@@ -15,10 +15,13 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import embedding_ports
 import kernels
 from quick import parser, pick
 
 from msfp_gen import Layout, Scene, load_scene
+from msfp_gen.embedding import export_library
+from msfp_gen.jit.compiler import FLAGS, find_compiler
 
 CALLS = pick(200, 2)
 RUN = """
@@ -63,6 +66,24 @@ def of_kernels(scene: Scene) -> list[float]:
         return [instructions([program, str(CALLS), str(i)], "repeated", text) / CALLS for i in range(len(KERNELS))]
 
 
+def of_two_port() -> tuple[float, float]:
+    """Instructions of a trial of 10 ms of a two-port, and of one of its derivatives."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        export_library([embedding_ports.SPEC], folder / "msfp")
+        embedding_ports.headers(folder)
+        includes = [f"-I{folder}", f"-I{folder / 'msfp/include'}"]
+        library = [str(folder / "msfp/lib/libmsfp.a"), *FLAGS["libraries"], "-o", str(folder / "port")]
+        source = str(embedding_ports.HERE / "c" / "port.c")
+        subprocess.run([*find_compiler().command, "-std=c99", "-O2", *includes, source, *library], check=True)
+        given = embedding_ports.numbers()
+        count = int(given["count"] * given["rounds"])
+        trials, derivatives = (
+            instructions([str(folder / "port")], f"msfp_5_2_2_api_port_{call}") for call in ("trial", "derivative")
+        )
+    return trials / (2 * count), derivatives / count
+
+
 def main() -> None:
     """Print one row per run and kernel."""
     parser(__doc__).parse_args()
@@ -80,6 +101,8 @@ def main() -> None:
     few, many = of_kernels(tfp), of_kernels(kernels.deep(pick(Layout(11, 5, 5), Layout(5, 2, 2))))
     for text, count, more in zip(KERNELS, few, many, strict=True):
         print(f"| {text}, TFP; (11,5,5) | {count / 1e3:.1f} thousand; {more / 1e3:.1f} ({more / count:.1f} times) |")
+    trial, derivative = of_two_port()
+    print(f"| derivative of a two-port over a trial of 10 ms | {derivative / trial:.1f} |")
 
 
 if __name__ == "__main__":
