@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from msfp_gen.analysis.summary import axial_load
 from msfp_gen.figures import COLOURS, FAINT, INK, MILLI, page, panels
 from msfp_gen.scene.top import RigTop
 
@@ -47,7 +46,7 @@ def drawn(path: Path, width: float, height: float) -> AbstractContextManager[Fig
 
 def ratio(result: Result) -> Array:
     """Force on the top support over the axial load, ndarray, shape (T, 3)."""
-    load = axial_load(result)
+    load = result.axial_load
     assert load is not None, f"{result.scene.name} has no axial load"
     force: Array = result.history.top_force / load
     return force

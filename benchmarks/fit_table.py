@@ -40,7 +40,7 @@ def push(friction: Array) -> Scene:
 
 def computed(result: Result) -> Array:
     """The numbers of Table 4.2 of a run, shape (6,), [m] and over the axial load."""
-    found = transitions(result, LOAD)
+    found = transitions(result)
     return np.array([found[key] for key in TABLE_42], dtype=float)
 
 

@@ -60,7 +60,7 @@ def cells(result: Any) -> list[str]:
     """The verdict, displacement [mm], capacity used, rim force over N, bearings at all rims, bearings lifted, height."""
     ends = result.verdict
     ratios = [float(np.max(one.extremes.rim_force)) / one.axial_load for one in result.bearings]
-    used = max(float((one.extremes.sliding / one.capacity).max()) for one in result.bearings)
+    used = max(float((one.extremes.sliding / one.bearing.arrays()["capacity"]).max()) for one in result.bearings)
     full = sum(reading.limit.key == "travel" for reading in ends.exceeded)
     lifts = [one["uplift"] for one in result.summary["bearings"]]
     lifted = [lift["height"] for lift in lifts if lift["height"] > VISIBLE]

@@ -140,7 +140,7 @@ def neutral() -> None:
             bearings = [replace(each, effects=Effects(uplift=uplift)) for each in scene.bearings]
             result = simulate(replace(scene, bearings=bearings))
             friction = scene.axial_loads * [max(s.friction for s in each.bearing.surfaces) for each in bearings]
-            forces = np.stack([each.top_force[:, :2] for each in result.bearings], axis=1) / friction[:, None]
+            forces = np.stack([each.history.top_force[:, :2] for each in result.bearings], axis=1) / friction[:, None]
             parts.append((result.axial_force / scene.axial_loads, forces))
         print(row(f"{name}, 25 s", *parts), flush=True)
 

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
-from msfp_gen.analysis.characterise import Characterisation, characterise
-from msfp_gen.analysis.summary import axial_load, rows_of_bearing, summarise, summarise_gradients
-from msfp_gen.analysis.tables import summary_tables
-from msfp_gen.analysis.verdict import Judged
-from msfp_gen.common.tables import Table
+from msfp_gen.analysis.any_result import OneBearing, Rows
+from msfp_gen.analysis.summary import summarise, summarise_gradients
+from msfp_gen.analysis.tables import work_rows
 from msfp_gen.results import dataset
 from msfp_gen.results.history import Counters, Event, History
 from msfp_gen.results.run_data import RunData
@@ -25,7 +22,7 @@ __all__ = ["Counters", "Event", "History", "Result"]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Result(AnyResult, RunData):
+class Result(OneBearing, RunData):
     """The result of `simulate`; a RunError has one in `.result` if the run failed after its start.
 
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
@@ -38,27 +35,15 @@ class Result(AnyResult, RunData):
         """Main results of the run in SI units, as values that JSON can hold; `summary.summarise` lists the keys."""
         return summarise(self) | {"verdict": self.verdict.as_dict}
 
-    def judged(self) -> list[Judged]:
-        """The bearing itself."""
-        return [
-            Judged(0, "", self.scene.bearing, axial_load(self), self.history, self.extremes, self.notes, self.events)
-        ]
-
     def main_results(self) -> Rows:
         """Label and value of the main results."""
         steps, wall_time = self.counters.steps, self.counters.wall_time
         time = f"{self.history.time[-1]:.6g} s in {steps} steps, {wall_time:.3g} s"
-        return [("time", time), *rows_of_bearing(self.summary)]
+        return [("time", time), *super().main_results()]
 
-    @property
-    def curve(self) -> Curve:
-        """The hysteresis loop."""
-        return hysteresis_loop(self.history, self.history.top_force)
-
-    def tables(self) -> list[Table]:
-        """Tables of peaks and surfaces, and of the transitions of a monotonic run."""
-        first, *others = summary_tables(self.summary, self.scene.bearing.surfaces)
-        return [first, self.verdict.table, *others]
+    def work_rows(self) -> Rows:
+        """Label and value of its energy and of the work of the solver."""
+        return work_rows(self.summary)
 
     @cached_property
     def gradient(self) -> xr.Dataset:
@@ -75,13 +60,6 @@ class Result(AnyResult, RunData):
         Raises InputError where the run computed none.
         """
         return summarise_gradients(self)
-
-    def characterise(self) -> Characterisation:
-        """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/characterise.md).
-
-        Raises InputError where the bearing did not move.
-        """
-        return characterise(self)
 
     @classmethod
     def storage(cls) -> Storage:

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.analysis.verdict import Judged, Verdict, verdict_of
+from msfp_gen.analysis.characterise import Characterisation
+from msfp_gen.analysis.characterise import characterise as characterise_bearing
+from msfp_gen.analysis.summary import rows_of_bearing
+from msfp_gen.analysis.tables import surface_table, transition_table
+from msfp_gen.analysis.verdict import Verdict, verdict_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.results.files import ResultFiles
-from msfp_gen.results.history import HorizontalMotion
 from msfp_gen.results.note import by_importance
+from msfp_gen.results.run_data import BearingData
 
 MAX_NOTES = 3  # printed, the most important ones; the others are counted
 MAX_POINTS = 600  # of the curve
@@ -43,12 +48,8 @@ class AnyResult(ResultFiles):
         """Main results in SI units, as values that JSON can hold."""
 
     @abstractmethod
-    def characterise(self) -> Any:
+    def characterise(self) -> Characterisation:
         """Effective properties and demands. Raises InputError where nothing moved."""
-
-    @abstractmethod
-    def tables(self) -> list[Table]:
-        """The main results as tables for the console."""
 
     @abstractmethod
     def main_results(self) -> Rows:
@@ -59,14 +60,28 @@ class AnyResult(ResultFiles):
     def curve(self) -> Curve:
         """The curve that says most about the run."""
 
+    @property
     @abstractmethod
-    def judged(self) -> list[Judged]:
-        """The bearings of which the verdict is."""
+    def bearings(self) -> Sequence[OneBearing]:
+        """The results of its bearings."""
+
+    @abstractmethod
+    def part_tables(self) -> list[Table]:
+        """Tables of its parts."""
+
+    def work_rows(self) -> Rows:
+        """Label and value of its energies and of the work of the solver."""
+        return []
+
+    def tables(self) -> list[Table]:
+        """The main results, the verdict and the parts as tables, for the console and the report."""
+        first = Table(self.title, (), [*self.stated_rows, *self.work_rows()])
+        return [first, self.verdict.table, *self.part_tables()]
 
     @cached_property
     def verdict(self) -> Verdict:
         """What the device was asked to bear, against its limits (docs/limits.md)."""
-        return verdict_of(self.judged(), self.scene.limits, "" if self.succeeded else self.status_text)
+        return verdict_of(self.bearings, self.scene.limits, "" if self.succeeded else self.status_text)
 
     @property
     def status_text(self) -> str:
@@ -109,9 +124,37 @@ class AnyResult(ResultFiles):
         )
 
 
-def hysteresis_loop(motion: HorizontalMotion, top_force: Array) -> Curve:
-    """Force over displacement along the direction of the largest displacement. top_force: shape (T, 3) [N]."""
-    return Curve(motion.path[0], top_force[:, :2] @ motion.direction, "force over displacement")
+class OneBearing(AnyResult, BearingData):
+    """The result of one bearing, alone or of a building."""
+
+    @property
+    def bearings(self) -> tuple[OneBearing]:
+        """Itself."""
+        return (self,)
+
+    def main_results(self) -> Rows:
+        """Label and value of its peaks."""
+        return rows_of_bearing(self.summary)
+
+    @property
+    def curve(self) -> Curve:
+        """The hysteresis loop: force over displacement along the direction of the largest displacement."""
+        rows = self.history
+        return Curve(rows.path[0], rows.top_force[:, :2] @ rows.direction, "force over displacement")
+
+    def part_tables(self) -> list[Table]:
+        """Tables of the surfaces, and of the transitions of a monotonic run."""
+        changes = self.summary.get("transitions")
+        more = [] if changes is None else [transition_table(changes)]
+        return [surface_table(self.summary, self.bearing.surfaces), *more]
+
+    def characterise(self) -> Characterisation:
+        """Effective stiffness, damping, sliding regimes, remaining capacity, velocity and heat (docs/characterise.md).
+
+        What the rows of a bearing of a building do not have is None, and the notes say so. Raises InputError where the
+        bearing did not move.
+        """
+        return characterise_bearing(self)
 
 
 def _svg(x: Array, y: Array) -> str:

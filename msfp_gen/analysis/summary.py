@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +12,19 @@ from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.errors import InputError
 from msfp_gen.results.dataset import gradients_of
-from msfp_gen.results.extremes import Extremes, by_axis
+from msfp_gen.results.extremes import by_axis
 from msfp_gen.results.gradient import Gradients, gradients_of_extremes
-from msfp_gen.results.history import LABELS, Event, History
+from msfp_gen.results.history import LABELS, History
 from msfp_gen.results.sliding import merged, open_times
 
 if TYPE_CHECKING:
     from msfp_gen.results.files import ResultFiles
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.results.run_data import BearingData, RunData
     from msfp_gen.scene.parameters import Parameter
 
 
 def summarise(result: RunData) -> dict[str, Any]:
-    """Summary of a run as plain data, ready for JSON; SI units; lists are one value per surface, bottom first.
+    """Summary of a `Result` as plain data, ready for JSON; SI units; lists are one value per surface, bottom first.
 
     Keys:
         name, status, message: of the run.
@@ -50,27 +50,13 @@ def summarise(result: RunData) -> dict[str, Any]:
         peak_temperature: [degC], of runs with a friction law that heats.
         transitions: of monotonic runs, see `transitions.transitions`.
     """
-    extremes, load, counters = result.extremes, axial_load(result), asdict(result.counters)
+    counters = asdict(result.counters)
     wall_time = counters.pop("wall_time")
-    bearing = result.scene.bearing
-    sheet = bearing.friction_at_pivot
-    summary = {
+    return {
         **summary_of_run(result, result.history.time, counters, wall_time),
-        **peaks_of_bearing(extremes, load),
-        "friction": [surface.friction for surface in bearing.surfaces],
-        "friction_at_pivot": None if sheet is None else list(sheet),
-        "uplift": uplift_of(result.history, extremes, result.events),
-        "rims_met": rims_met(result),
+        **summary_of_bearing(result),
         "energy": energy_balance(result.history),
     }
-    if extremes.least_friction is not None and extremes.most_friction is not None:
-        summary["least_friction"] = extremes.least_friction.tolist()
-        summary["most_friction"] = extremes.most_friction.tolist()
-    if extremes.temperature is not None:
-        summary["peak_temperature"] = extremes.temperature.tolist()
-    if is_monotonic(result):
-        summary["transitions"] = transitions(result, load)
-    return summary
 
 
 def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int], wall_time: float) -> dict[str, Any]:
@@ -88,10 +74,11 @@ def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int]
     }
 
 
-def peaks_of_bearing(extremes: Extremes, load: float | None) -> dict[str, Any]:
-    """The part of a summary that all bearings have, alone or below a building. load: axial [N], where it is known."""
+def summary_of_bearing(one: BearingData) -> dict[str, Any]:
+    """The part of a summary that all bearings have, alone or below a building."""
+    extremes, load, sheet = one.extremes, one.axial_load, one.bearing.friction_at_pivot
     force = by_axis(extremes.top_force)
-    return {
+    summary = {
         "peak_displacement": by_axis(extremes.displacement),
         "peak_force": force,
         "axial_load": load,
@@ -101,11 +88,19 @@ def peaks_of_bearing(extremes: Extremes, load: float | None) -> dict[str, Any]:
         "minimum_normal_force": extremes.least_normal.tolist(),
         "maximum_normal_force": extremes.most_normal.tolist(),
         "peak_rim_force": None if extremes.rim_force is None else extremes.rim_force.tolist(),
+        "friction": [surface.friction for surface in one.bearing.surfaces],
+        "friction_at_pivot": None if sheet is None else list(sheet),
+        "uplift": uplift_of(one),
+        "rims_met": rims_met(one),
     }
+    optional = {"least_friction": "least_friction", "most_friction": "most_friction", "temperature": "peak_temperature"}
+    recorded = {key: getattr(extremes, name) for name, key in optional.items()}
+    summary |= {key: values.tolist() for key, values in recorded.items() if values is not None}
+    return summary | ({"transitions": transitions(one)} if is_monotonic(one) else {})
 
 
-def uplift_of(history: Any, extremes: Extremes, events: Sequence[Event] = ()) -> dict[str, Any]:
-    """Uplift of a bearing. history: with `time` and `lift`, shape (T, n-1) [m].
+def uplift_of(one: BearingData) -> dict[str, Any]:
+    """Uplift of a bearing.
 
     Keys:
         height: largest clearance between the faces of any surface [m].
@@ -113,8 +108,8 @@ def uplift_of(history: Any, extremes: Extremes, events: Sequence[Event] = ()) ->
             is shorter than their distance.
         count: how often the bearing opened, likewise.
     """
-    height = 0.0 if extremes.lift is None else float(extremes.lift.max())
-    spells = merged(spell for spells in open_times(history, events) for spell in spells) if height else []
+    height = 0.0 if one.extremes.lift is None else float(one.extremes.lift.max())
+    spells = merged(spell for spells in open_times(one.history, one.events) for spell in spells) if height else []
     duration = max((length for _, length in spells), default=0.0)
     return {"height": height, "duration": duration, "count": max(len(spells), int(height > 0))}
 
@@ -124,11 +119,17 @@ def rows_of_bearing(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     ratio = "" if summary["peak_force_ratio"] is None else f" ({summary['peak_force_ratio']:.3f} of the axial load)"
     least, most = min(summary["minimum_normal_force"]), max(summary["maximum_normal_force"])
     return [
-        ("peak displacement", f"{1e3 * summary['peak_displacement']['radial']:.4g} mm"),
-        ("peak force", f"{1e-3 * summary['peak_force']['radial']:.4g} kN{ratio}"),
+        ("peak displacement", _along(summary["peak_displacement"], 1e3, "mm")),
+        ("peak force", _along(summary["peak_force"], 1e-3, "kN") + ratio),
         ("peak sliding", ", ".join(f"{1e3 * s:.4g}" for s in summary["peak_sliding"]) + " mm, bottom first"),
         ("normal force", f"{1e-3 * least:.4g} to {1e-3 * most:.4g} kN"),
     ]
+
+
+def _along(peaks: Mapping[str, float], scale: float, unit: str) -> str:
+    """The peak in the horizontal plane, and those along its axes."""
+    radial, *axes = (f"{peaks[key] * scale:.4g}" for key in ("radial", "E1", "E2"))
+    return f"{radial} {unit}, along E1 {axes[0]}, E2 {axes[1]}"
 
 
 def energy_balance(history: History) -> dict[str, float | None]:
@@ -151,28 +152,11 @@ def energy_balance(history: History) -> dict[str, float | None]:
     }
 
 
-def rims_met(result: RunData) -> list[int]:
+def rims_met(result: BearingData) -> list[int]:
     """Surfaces (1..n-1) whose slider reached its rim, by an event or by a gap of zero or less in some row."""
     located = {event.surface for event in result.events if event.kind == "rim_contact"}
     closed = np.flatnonzero(result.extremes.gap <= 0) + 1
     return sorted(located | set(closed.tolist()))
-
-
-def axial_load(result: RunData) -> float | None:
-    """The constant axial load on the top plate [N]; None if there is none, or it varies."""
-    scene = result.scene
-    loads: dict[str, Callable[[Any], float]] = {
-        "rig": lambda top: top.axial_load,
-        "prescribed": lambda top: -top.force[2],
-        "mass": lambda top: top.mass * scene.bearing.gravity,
-    }
-    load = loads[scene.top.kind](scene.top)
-    if scene.load is not None:
-        vertical = scene.load.coefficients[:, 2]
-        if np.any(vertical[:, 1:]) or np.any(vertical[:, 0] != vertical[0, 0]):
-            return None
-        load -= float(vertical[0, 0])
-    return load if load > 0 else None
 
 
 WITHOUT = {
@@ -213,7 +197,7 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
             gradients, i, own, _ratio_slope(result, parameter, float(own["top_force"][3]))
         )
         if gradients.error is not None:
-            own, load = gradients.error.extremes[i].arrays, axial_load(result)
+            own, load = gradients.error.extremes[i].arrays, result.axial_load
             ratio = float(own["top_force"][3]) / load if load else None
             gradients_of_summary[parameter.path]["error"] = _summary(gradients.error, i, own, ratio)
     return gradients_of_summary
@@ -241,7 +225,7 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
 
 def _ratio_slope(result: RunData, parameter: Parameter, slope: float) -> float | None:
     """Derivative of peak radial force over axial load; None without a constant load."""
-    load = axial_load(result)
+    load = result.axial_load
     if not load:
         return None
     peak = float(result.extremes.top_force[3])

@@ -20,28 +20,10 @@ MEANINGS = {
 }
 
 
-def summary_tables(summary: Mapping[str, Any], surfaces: Sequence[Surface]) -> list[Table]:
-    """Tables of peaks and surfaces, and of the transitions of a monotonic run. summary: as of `summary.summarise`."""
-    tables = [_run_table(summary), surface_table(summary, surfaces)]
-    if "transitions" in summary:
-        tables.append(transition_table(summary["transitions"]))
-    return tables
-
-
-def _run_table(summary: Mapping[str, Any]) -> Table:
-    displacement, force, energy = summary["peak_displacement"], summary["peak_force"], summary["energy"]
-    ratio, counters = summary["peak_force_ratio"], summary["counters"]
-    over = "" if ratio is None else f", radial over axial load {ratio:.4f}"
-    rows = [
-        ("status", " - ".join(filter(None, (summary["status"], summary["message"])))),
-        ("verdict", summary["verdict"]["text"]),
-        ("time simulated", _speed(summary)),
-        ("peak displacement", f"{_peaks(displacement, 1e3)} mm"),
-        ("peak force on the top", f"{_peaks(force, 1e-3)} kN{over}"),
-        ("energy", _energy(energy)),
-        ("solver", ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counters.items() if count)),
-    ]
-    return Table(summary["name"] or "unnamed scene", (), rows)
+def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of the energy of a run of one bearing, and of the work of the solver."""
+    counters = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in summary["counters"].items() if count)
+    return [("energy", _energy(summary["energy"])), ("solver", counters)]
 
 
 # Column -> (key of the values, scale, format). Columns whose key a run does not have are left out.
@@ -84,17 +66,6 @@ def transition_table(transitions: Mapping[str, float | None]) -> Table:
         shown = "none" if value is None else f"{value:.4f}" if kind == "F_dr" else f"{value * 1e3:.2f} mm"
         rows.append((SYMBOLS.get(key, key), shown, MEANINGS[kind].format(key.removeprefix(kind))))
     return Table("transitions between sliding regimes (PEER 2017/07, Table 4.2)", (), rows)
-
-
-def _peaks(peaks: Mapping[str, float], scale: float) -> str:
-    shown = {axis: value for axis, value in peaks.items() if axis != "E3"}
-    return ", ".join(f"{axis} {value * scale:.4g}" for axis, value in shown.items())
-
-
-def _speed(summary: Mapping[str, Any]) -> str:
-    factor = summary["real_time_factor"]
-    text = f"{summary['duration']:.6g} s in {summary['wall_time']:.3g} s"
-    return text if factor is None else f"{text}, {factor:.4g} times real time"
 
 
 def _energy(energy: Mapping[str, float | None]) -> str:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.results.history import History
+from msfp_gen.results.history import BearingRows
 from msfp_gen.results.sliding import SHARE, slip_shares
 
 if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.results.run_data import BearingData
 
 WINDOW = 2e-4  # displacement over which shares of sliding are taken [m]
 MONOTONIC = 1e-3  # largest reverse or transverse motion of a monotonic run, over the largest displacement
@@ -23,8 +23,13 @@ RIMS = (1, 4)  # surfaces of a four-surface stack whose rims are met (Table 4.2)
 SYMBOLS = {"u_star": "u*", "u_star_star": "u**"}  # keys that PEER 2017/07 writes differently
 
 
-def is_monotonic(result: RunData) -> bool:
-    """Whether the run is a monotonic push: its motion is a ramp, or the displacement has no reversal."""
+def is_monotonic(result: BearingData) -> bool:
+    """Whether the run is a monotonic push: its motion is a ramp, or the displacement has no reversal.
+
+    Never that of a bearing below a building, whose first contacts of rims are not located.
+    """
+    if result.number:
+        return False
     if result.scene.motion.metadata.get("source") == "ramp":
         return True
     along, transverse = result.history.path
@@ -33,7 +38,7 @@ def is_monotonic(result: RunData) -> bool:
     return bool(peak > WINDOW and max(reverse, np.abs(transverse).max()) <= MONOTONIC * peak)
 
 
-def transitions(result: RunData, axial_load: float | None) -> dict[str, float | None]:
+def transitions(result: BearingData) -> dict[str, float | None]:
     """Displacements [m], and forces over the axial load [-], at which the sliding regimes of a monotonic run change.
 
     Stacks of four surfaces have u_star, u_star_star (surfaces 2, 3 stop sliding) and u_dr1, u_dr4, F_dr1, F_dr4 (first
@@ -41,7 +46,7 @@ def transitions(result: RunData, axial_load: float | None) -> dict[str, float | 
     transition does not occur. `resolution` [m] is the largest spacing of rows at u_star and u_star_star, which limits
     their accuracy; rim contacts are located by the runtime.
     """
-    history = result.history
+    history, axial_load = result.history, result.axial_load
     four = history.surfaces == 4
     values: dict[str, float | None] = {}
     if four:
@@ -57,7 +62,7 @@ def transitions(result: RunData, axial_load: float | None) -> dict[str, float | 
     return values
 
 
-def stopping_displacement(history: History, surface: int, window: float = WINDOW) -> float | None:
+def stopping_displacement(history: BearingRows, surface: int, window: float = WINDOW) -> float | None:
     """Displacement [m] at which `surface` (1..n-1) stops sliding; None if it never slides or never stops.
 
     It stops where its share of all sliding, taken over a centred `window` of displacement [m], falls below `SHARE` and
@@ -81,14 +86,14 @@ def stopping_displacement(history: History, surface: int, window: float = WINDOW
     return float(np.interp(0.0, below[[i, i - 1]], centres[[i, i - 1]]))
 
 
-def _spacing(history: History, displacement: float) -> float:
+def _spacing(history: BearingRows, displacement: float) -> float:
     """Difference of displacement [m] between the rows on either side of `displacement` [m]."""
     maxima = np.maximum.accumulate(history.path[0])
     row = int(np.searchsorted(maxima, displacement))
     return float(maxima[row] - maxima[row - 1])
 
 
-def _first_contact(result: RunData, surface: int) -> tuple[float, float] | tuple[None, None]:
+def _first_contact(result: BearingData, surface: int) -> tuple[float, float] | tuple[None, None]:
     """Displacement [m] and force [N] along the direction of the run at the first contact with the rim of `surface`."""
     direction = result.history.direction
     for event in result.events:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,36 +11,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from msfp_gen.common.tables import Table
+from msfp_gen.results.run_data import BearingData
 from msfp_gen.results.sliding import open_times
 from msfp_gen.scene.friction_parameters import start_temperatures
 from msfp_gen.scene.limits import Limits
 
 if TYPE_CHECKING:
     from msfp_gen.common.arrays import Array
-    from msfp_gen.results.extremes import Extremes
-    from msfp_gen.results.history import Event
-    from msfp_gen.results.note import Note
     from msfp_gen.scene.bearing import Bearing
 
 RIM_SHARE = 1 / 3  # rim force over the axial load, up to which the spring of a rim was compared
 SCALES = {"N": (1e-3, "kN"), "m": (1e3, "mm")}  # unit -> factor and unit of texts
-
-
-class Judged(NamedTuple):
-    """A bearing alone, or one of a building: number from 1 and label; 0 and "" for a bearing alone.
-
-    load: axial load at rest [N]; None where it varies. history: its rows by the names of `History`. notes: of its
-    monitors. events: none of a bearing of a building.
-    """
-
-    number: int
-    label: str
-    bearing: Bearing
-    load: float | None
-    history: Any
-    extremes: Extremes
-    notes: Sequence[Note]
-    events: Sequence[Event]
 
 
 class Value(NamedTuple):
@@ -52,7 +33,7 @@ class Value(NamedTuple):
     allowed: float
 
 
-Reader = Callable[[Judged, Limits], Iterable[Value]]
+Reader = Callable[[BearingData, Limits], Iterable[Value]]
 
 
 @dataclass(frozen=True)
@@ -193,7 +174,7 @@ class Verdict:
         }
 
 
-def verdict_of(bearings: Iterable[Judged], limits: Limits | None, failure: str) -> Verdict:
+def verdict_of(bearings: Iterable[BearingData], limits: Limits | None, failure: str) -> Verdict:
     """The verdict of a run. limits: of the scene; None: the defaults."""
     given = limits or Limits()
     readings = [
@@ -205,7 +186,7 @@ def verdict_of(bearings: Iterable[Judged], limits: Limits | None, failure: str) 
     return Verdict(tuple(readings), failure)
 
 
-def _by_surface(one: Judged, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
+def _by_surface(one: BearingData, rows: Array, reached: Array, allowed: Array | float) -> Iterator[Value]:
     """Values of every surface. rows: shape (T, n-1), of which the largest has the time."""
     times = one.history.time[rows.argmax(axis=0)]
     allowed = np.broadcast_to(allowed, reached.shape)
@@ -213,31 +194,31 @@ def _by_surface(one: Judged, rows: Array, reached: Array, allowed: Array | float
         yield Value(surface, float(time), float(value), float(most))
 
 
-def _rim_force(one: Judged, limits: Limits) -> Iterator[Value]:
+def _rim_force(one: BearingData, limits: Limits) -> Iterator[Value]:
     """By the rows, and by the spring of the rim at its largest compression over all steps."""
     bearing = one.bearing.arrays()
     rows, reached = one.history.rim_force, np.asarray(one.extremes.rim_force)
     if not any(note.kind == "rims" and not note.action for note in one.notes):
         reached = np.maximum(reached, bearing["rim_stiffness"] * np.maximum(0.0, -one.extremes.gap))
-    load = float(one.extremes.most_normal.max()) if one.load is None else one.load
+    load = float(one.extremes.most_normal.max()) if one.axial_load is None else one.axial_load
     allowed = limits.rim_force or RIM_SHARE * load
     return _by_surface(one, rows, reached, allowed)
 
 
-def _rim_compression(one: Judged, limits: Limits) -> Iterable[Value]:
+def _rim_compression(one: BearingData, limits: Limits) -> Iterable[Value]:
     if limits.rim_compression is None:
         return ()
     return _by_surface(one, -one.history.gap, np.maximum(0.0, -one.extremes.gap), limits.rim_compression)
 
 
-def _travel(one: Judged, limits: Limits) -> Iterator[Value]:
+def _travel(one: BearingData, limits: Limits) -> Iterator[Value]:
     """Rims in contact at one time; one surface must be left to slide."""
     met = ((one.history.gap <= 0) | (one.history.rim_force > 0)).sum(axis=1)
     row = int(met.argmax())
     yield Value(0, float(one.history.time[row]), float(met[row]), float(len(one.extremes.gap) - 1))
 
 
-def _uplift_height(one: Judged, limits: Limits) -> Iterator[Value]:
+def _uplift_height(one: BearingData, limits: Limits) -> Iterator[Value]:
     bearing = one.bearing
     offsets = bearing.arrays()["rim_offset"][[bearing.slider(j) for j in range(len(bearing.surfaces))]]
     allowed = np.full(len(offsets), limits.uplift_height) if limits.uplift_height else offsets
@@ -246,15 +227,15 @@ def _uplift_height(one: Judged, limits: Limits) -> Iterator[Value]:
             yield value
 
 
-def _uplift_duration(one: Judged, limits: Limits) -> Iterator[Value]:
+def _uplift_duration(one: BearingData, limits: Limits) -> Iterator[Value]:
     for surface, spells in enumerate(open_times(one.history, one.events), start=1):
         start, length = max(spells, key=lambda spell: spell[1], default=(0.0, 0.0))
         yield Value(surface, start, length, limits.uplift_duration)
 
 
-def _temperature(one: Judged, limits: Limits) -> Iterator[Value]:
+def _temperature(one: BearingData, limits: Limits) -> Iterator[Value]:
     """Of the friction law, or of the monitor of heat where the law has none."""
-    reached, rows = one.extremes.temperature, getattr(one.history, "temperature", None)
+    reached, rows = one.extremes.temperature, one.history.temperature
     if reached is not None and rows is not None:
         yield from _by_surface(one, rows, reached, limits.temperature)
     for note in one.notes:
@@ -263,25 +244,25 @@ def _temperature(one: Judged, limits: Limits) -> Iterator[Value]:
             yield Value(note.surface, note.time, start + note.value, limits.temperature)
 
 
-def _of_bearing(one: Judged, rows: Array, reached: float, allowed: float | None) -> Iterator[Value]:
+def _of_bearing(one: BearingData, rows: Array, reached: float, allowed: float | None) -> Iterator[Value]:
     """The value of a whole bearing, where a limit is given. rows: shape (T,), of which the largest has the time."""
     if allowed is not None:
         yield Value(0, float(one.history.time[rows.argmax()]), reached, allowed)
 
 
-def _axial_load(one: Judged, limits: Limits) -> Iterator[Value]:
+def _axial_load(one: BearingData, limits: Limits) -> Iterator[Value]:
     rows = np.abs(one.history.top_force[:, 2])
     return _of_bearing(one, rows, float(one.extremes.top_force[2]), limits.axial_load)
 
 
-def _displacement(one: Judged, limits: Limits) -> Iterator[Value]:
+def _displacement(one: BearingData, limits: Limits) -> Iterator[Value]:
     return _of_bearing(one, one.history.horizontal, float(one.extremes.displacement[3]), limits.displacement)
 
 
 def _noted(kind: str, allowed: Callable[[Bearing, int], float]) -> Reader:
     """A limit of the model whose monitor leaves a note; without one nothing is read."""
 
-    def read(one: Judged, limits: Limits) -> Iterator[Value]:
+    def read(one: BearingData, limits: Limits) -> Iterator[Value]:
         for note in one.notes:
             if note.kind == kind and not note.action:
                 yield Value(note.surface, note.time, note.value, allowed(one.bearing, note.surface))
@@ -294,7 +275,7 @@ def _radius(bearing: Bearing, surface: int) -> float:
     return float(bearing.arrays()["rim_radius"][bearing.slider(surface - 1)])
 
 
-def _face(one: Judged, limits: Limits) -> Iterator[Value]:
+def _face(one: BearingData, limits: Limits) -> Iterator[Value]:
     """As recorded of a bearing of a building, or as the note of a bearing alone states it."""
     offsets, times = one.extremes.contact_offset, one.extremes.contact_time
     if offsets is None or times is None:

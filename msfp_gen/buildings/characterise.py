@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,13 +11,7 @@ import numpy as np
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.analysis.characterise.loops import Path, rests
 from msfp_gen.analysis.characterise.report import characterised, effective_period
-from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, capacity_demands
 from msfp_gen.common.tables import Table, yes
-
-NOT_RECORDED = (
-    "the rows of a building have no slip velocities: no sliding regimes, velocities and heat of surfaces; periods are "
-    "with N at rest"
-)
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ class BuildingCharacterisation(Characterisation):
     @classmethod
     def of(cls, result: Any) -> BuildingCharacterisation:
         """Characterise the run of a `BuildingResult`. Raises InputError where the bearings did not move."""
-        mean, summary = np.mean([one.displacement for one in result.bearings], axis=0), result.summary
+        mean, summary = np.mean([one.history.displacement for one in result.bearings], axis=0), result.summary
         path = Path.of(result.time, mean, result.base_reaction, "the building")
         peaks = (float(result.extremes.mean_displacement[3]), summary["peak_force"]["radial"])
         load, gravity = result.scene.weight, result.scene.gravity
@@ -93,7 +87,7 @@ class BuildingCharacterisation(Characterisation):
             bearings=tuple(
                 BearingDemand.of(one.summary, float(np.hypot(*u[-1])) if rests(result.time, u) else None)
                 for one in result.bearings
-                for u in [one.displacement[:, :2]]
+                for u in [one.history.displacement[:, :2]]
             ),
         )
 
@@ -129,27 +123,3 @@ class BuildingCharacterisation(Characterisation):
         ]
         columns = ("no.", "name", "u [mm]", "left [mm]", "rim", "N / N at rest", "residual [mm]", "dissipated [kJ]")
         return Table("bearings; left: least capacity less sliding", columns, rows)
-
-
-def characterise_bearing(one: Any) -> Characterisation:
-    """Characterise a `BearingResult`, by what the rows of a building have. Raises InputError where it did not move."""
-    path, peaks = Path.of(one.time, one.displacement, one.top_force), one.extremes
-    largest_of_run = (peaks.displacement[3], peaks.top_force[3])
-
-    lifts = one.scene.modelled[one.index].uplift or bool(one.lift.any())
-
-    def demands(rows: slice | None) -> tuple[SurfaceDemand, ...]:
-        gap, lift = (peaks.gap, peaks.lift) if rows is None else (one.gap[rows].min(0), one.lift[rows].max(0))
-        return capacity_demands(one.bearing, gap, lift if lifts else None)
-
-    found = characterised(
-        one.title,
-        one.status,
-        path,
-        largest_of_run,
-        one.axial_load,
-        one.bearing.gravity,
-        one.dissipated,
-        demands,
-    )
-    return replace(found, notes=(*found.notes, NOT_RECORDED))

@@ -16,9 +16,9 @@ from msfp_gen.buildings.storey import FREEDOMS, Columns, Node
 from msfp_gen.common.arrays import Array
 from msfp_gen.motions.motion import Motion
 from msfp_gen.results.dataset import ROWS as ONE_BEARING
-from msfp_gen.results.dataset import labels_of as labels_of_one
+from msfp_gen.results.dataset import dataset_of_bearing
 from msfp_gen.results.files import COUNTER, attributes_of, motion_in, notes_in, without
-from msfp_gen.results.history import LABELS
+from msfp_gen.results.history import ENERGY_BELOW, LABELS
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
     SURFACES,
@@ -175,8 +175,7 @@ STORED = {
     "normal_force": _of_bearings("normal_force", "normal_force", "compression"),
     **{name: _of_bearings(name, name) for name in OF_SURFACES},
     **_motions("support", VECTORS, "{} of the ground below the bearing"),
-    "dissipated": Variable(OF_BEARING, "J", "energy dissipated in the bearing", "dissipated"),
-    "stored": Variable(OF_BEARING, "J", "energy stored in the bearing and its interface", "stored"),
+    **{name: Variable(OF_BEARING, "J", meaning, name) for name, meaning in ENERGY_BELOW.items()},
     "energy_damped": Variable(ALL, "J", "dissipated by the damping of the building", "damped"),
     "energy_received": Variable(
         ALL, "J", "work of the bearings on the building, by their forces beyond those at rest", "received"
@@ -205,10 +204,6 @@ DERIVED = {
     "energy_strain": Variable(ALL, "J", "strain energy of the building", "strain"),
 }
 VARIABLES = STORED | DERIVED
-# Of one bearing of a building: variables of a bearing alone, and others that its result has.
-ALONE = ("normal_force", "sliding", "gap", "rim_force", "lift", "temperature", "base_displacement", "displacement")
-OF_ONE = {name: ONE_BEARING[name] for name in ("time", *ALONE, "top_force", "top_moment")}
-OF_ONE |= {name: VARIABLES[name]._replace(dims=ALL) for name in ("axial_force", "dissipated", "stored")}
 
 
 def arrays_of(result: Any) -> Arrays:
@@ -216,8 +211,8 @@ def arrays_of(result: Any) -> Arrays:
     nodes, bearings = result.scene.building.nodes, result.bearings
     several = {
         "node": [result.node(node.name) for node in nodes],
-        "bearing_displacement": [one.displacement for one in bearings],
-        "top_force": [one.top_force for one in bearings],
+        "bearing_displacement": [one.history.displacement for one in bearings],
+        "top_force": [one.history.top_force for one in bearings],
     }
     fields = {variable.field for variable in VARIABLES.values()} - several.keys()
     arrays = {name: np.stack(columns, axis=1) for name, columns in several.items()}
@@ -232,14 +227,12 @@ def to_dataset(result: Any) -> xr.Dataset:
     return dataset_of(_variables(result.scene), arrays_of(result), labelled(labels_of(result.scene)), about)
 
 
-def dataset_of_bearing(one: Any) -> xr.Dataset:
+def dataset_of_one(one: Any) -> xr.Dataset:
     """The rows of a bearing of a building, for other programs; their names are those of a bearing alone."""
     given = one.scene.bearings[one.index]
     parts = {"bearing": bearing_table(given.bearing), "interface": plain_table(given.interface)}
     text = dumps({"axial_load": one.axial_load, **parts})
-    about = attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label}
-    arrays = {variable.field: getattr(one, variable.field) for variable in OF_ONE.values()}
-    return dataset_of(OF_ONE, arrays, labelled(labels_of_one(one.surfaces)), about)
+    return dataset_of_bearing(one, attributes_of(one, "", text, one.notes, {}) | {"bearing": one.label})
 
 
 def _variables(scene: BuildingScene) -> dict[str, Variable]:

@@ -236,6 +236,11 @@ def temperature_of(bearing: Bearing, recorded: Array) -> Array:
     return np.where(recorded == 0.0, start_temperatures(bearing), recorded)
 
 
+def heated(bearing: Bearing, temperature: Array) -> Array | None:
+    """The temperatures of surfaces, shape (..., surfaces) [degC]; None where none of them was heated."""
+    return temperature if (temperature > start_temperatures(bearing)).any() else None
+
+
 def padded(columns: Sequence[Array], fill: float = 0.0) -> Array:
     """Values of the surfaces of all bearings, each of shape (..., surfaces): shape (..., bearings, most surfaces).
 

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from msfp_gen.analysis.any_result import AnyResult, Curve, Rows, hysteresis_loop
-from msfp_gen.analysis.characterise import Characterisation
-from msfp_gen.analysis.summary import peaks_of_bearing, rows_of_bearing, uplift_of
-from msfp_gen.analysis.tables import surface_table
-from msfp_gen.analysis.verdict import Judged
+from msfp_gen.analysis.any_result import AnyResult, Curve, OneBearing, Rows
+from msfp_gen.analysis.summary import summary_of_bearing
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
-from msfp_gen.buildings.characterise import BuildingCharacterisation, characterise_bearing
-from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, overturning
+from msfp_gen.buildings.characterise import BuildingCharacterisation
+from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, heated, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
@@ -24,13 +21,14 @@ from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import KINDS, Storage
-from msfp_gen.results.history import Event, HorizontalMotion
+from msfp_gen.results.history import ENERGY_BELOW, BearingRows, Event
 from msfp_gen.results.note import Note
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.specification.layout import Effects
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,21 +240,20 @@ class BuildingResult(AnyResult):
             ("rims met", summaries.rims_text(s["bearings"])),
         ]
 
-    def judged(self) -> list[Judged]:
-        """All bearings."""
-        return [judged for bearing in self.bearings for judged in bearing.judged()]
-
     @property
     def curve(self) -> Curve:
         """The orbit of the bearing that moves most."""
         most = self.bearings[int(self.extremes.bearing_displacement[:, 3].argmax())]
-        x, y = most.displacement[:, :2].T
+        x, y = most.history.displacement[:, :2].T
         return Curve(x, y, f"orbit of {most.label}")
 
-    def tables(self) -> list[Table]:
-        """Tables of the run with its floors, storeys and bearings."""
-        first, *others = summaries.tables(self.title, self.stated_rows, self.summary)
-        return [first, self.verdict.table, *others]
+    def work_rows(self) -> Rows:
+        """Label and value of its energies, its twist and its overturning moment."""
+        return summaries.work_rows(self.summary)
+
+    def part_tables(self) -> list[Table]:
+        """Tables of its floors, storeys and bearings."""
+        return summaries.tables(self.summary)
 
     def characterise(self) -> BuildingCharacterisation:
         """Effective properties of the isolation system, and what is left of every bearing (docs/buildings.md).
@@ -278,40 +275,18 @@ def _squares(rows: Array, matrix: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BearingResult(AnyResult, HorizontalMotion):
-    """One bearing of a building, at the k times of its result: names and signs are those of `Result` and `History`.
+class BearingResult(OneBearing):
+    """One bearing of a building; names and signs are those of the `Result` of one bearing.
 
-    building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0; bearing: its
-    values. time: shape (k,) [s]. base_displacement: of the ground below the bearing; displacement: across the bearing
-    and its interface, base less top, shape (k, 3) [m]. top_force, top_moment: on the building, the moment about the
-    upper end of the bearing, shape (k, 3) [N], [N m]. axial_force: compression between bearing and building, shape (k,)
-    [N]. sliding (3.20), gap to the rims (3.21), rim_force, normal_force, lift, the clearance between separated faces,
-    temperature: of the surfaces, shape (k, n-1) [m], [N], [degC]. dissipated: energy in the bearing since the start;
-    stored: in the bearing and its interface, shape (k,) [J].
+    building: the whole result, with scene, status, message and provenance. index: of the bearing, from 0. history: its
+    rows, with base_displacement of the ground below it, and displacement across it and its interface; top_moment is
+    about its upper end.
     """
 
     source: ClassVar[str] = "msfp-gen bearing"
     building: BuildingResult
     index: int
-    scene: BuildingScene
-    bearing: Bearing
-    status: str
-    message: str
-    provenance: dict[str, str]
-    time: Array
-    base_displacement: Array
-    displacement: Array
-    top_force: Array
-    top_moment: Array
-    axial_force: Array
-    sliding: Array
-    gap: Array
-    rim_force: Array
-    lift: Array
-    temperature: Array
-    normal_force: Array
-    dissipated: Array
-    stored: Array
+    history: BearingRows
 
     @classmethod
     def of(cls, building: BuildingResult, index: int) -> BearingResult:
@@ -320,29 +295,58 @@ class BearingResult(AnyResult, HorizontalMotion):
         base, wrench = building.support[:, index, 0], building.wrench[:, index, 1]
         across = base - building.displacement @ scene.attachments[index, :3].T
         own = (slice(None), index, slice(bearing.layout.surfaces))
-        return cls(
-            building=building,
-            index=index,
-            scene=scene,
-            bearing=bearing,
-            status=building.status,
-            message=building.message,
-            provenance=building.provenance,
+        rows = {name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")}
+        rows["temperature"] = heated(bearing, rows["temperature"])
+        history = BearingRows(
             time=building.time,
             base_displacement=base,
             displacement=across - across[0],
             top_force=-wrench[:, :3],
             top_moment=-wrench[:, 3:],
-            axial_force=building.axial_force[:, index],
-            gap=bearing.arrays()["capacity"] - building.sliding[own],
-            **{name: getattr(building, name)[own] for name in (*OF_SURFACES, "normal_force")},
-            dissipated=building.dissipated[:, index],
-            stored=building.stored[:, index],
+            gap=bearing.arrays()["capacity"] - rows["sliding"],
+            energy={name: getattr(building, name)[:, index] for name in ENERGY_BELOW},
+            **rows,
         )
+        return cls(building, index, history)
+
+    @property
+    def scene(self) -> BuildingScene:
+        """That of the building."""
+        return self.building.scene
+
+    @property
+    def status(self) -> str:
+        """That of the building."""
+        return self.building.status
+
+    @property
+    def message(self) -> str:
+        """That of the building."""
+        return self.building.message
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """That of the building."""
+        return self.building.provenance
+
+    @property
+    def bearing(self) -> Bearing:
+        """Its values."""
+        return self.scene.bearings[self.index].bearing
+
+    @property
+    def effects(self) -> Effects:
+        """The effects of its model at the start."""
+        return self.scene.modelled[self.index]
+
+    @property
+    def number(self) -> int:
+        """Its number, from 1."""
+        return self.index + 1
 
     @property
     def label(self) -> str:
-        """What messages call the bearing: its number from 1, and its name."""
+        """What messages call the bearing: its number, and its name."""
         return self.scene.label(self.index)
 
     @property
@@ -351,24 +355,9 @@ class BearingResult(AnyResult, HorizontalMotion):
         return f"{self.label} of {self.building.title}"
 
     @property
-    def history(self) -> BearingResult:
-        """Its rows, by the names of `History`: this view itself."""
-        return self
-
-    @property
     def events(self) -> tuple[Event, ...]:
         """None: the run of a building does not record them."""
         return ()
-
-    @property
-    def surfaces(self) -> int:
-        """Number of surfaces, n - 1."""
-        return self.bearing.layout.surfaces
-
-    @property
-    def capacity(self) -> Array:
-        """Capacities of the surfaces, shape (n-1,) [m]."""
-        return self.bearing.arrays()["capacity"]
 
     @property
     def axial_load(self) -> float:
@@ -378,7 +367,7 @@ class BearingResult(AnyResult, HorizontalMotion):
     @property
     def notes(self) -> tuple[Note, ...]:
         """The notes of its monitors, in order of time."""
-        own = (note for note in self.building.monitored if note.bearing == self.index + 1)
+        own = (note for note in self.building.monitored if note.bearing == self.number)
         return tuple(sorted(own, key=lambda note: note.time))
 
     @property
@@ -390,43 +379,37 @@ class BearingResult(AnyResult, HorizontalMotion):
     def extremes(self) -> Extremes:
         """Extremes over all steps."""
         peaks, index = self.building.extremes, self.index
-        own = (index, slice(self.surfaces))
-        least, most = peaks.normal_force[index, :, : self.surfaces]
+        own = (index, slice(self.bearing.layout.surfaces))
+        least, most = peaks.normal_force[index, :, own[1]]
+        rows = {name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)}
         return Extremes(
             displacement=peaks.bearing_displacement[index],
             top_force=peaks.top_force[index],
-            gap=self.capacity - peaks.sliding[own],
+            gap=self.bearing.arrays()["capacity"] - peaks.sliding[own],
             least_normal=least,
             most_normal=most,
-            **{name: getattr(peaks, name)[own] for name in (*OF_SURFACES, *CONTACT)},
+            **rows | {"temperature": heated(self.bearing, rows["temperature"])},
         )
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """Main results as plain data, SI units; peaks are over all steps, lists for the surfaces, bottom first.
 
-        Keys that `Result.summary` has too: peak_displacement and peak_force along E1, E2, E3 and radial [m], [N];
-        axial_load at rest [N], and peak_force_ratio over it [-]; peak_sliding and minimum_gap [m]; rims_met (surfaces);
-        minimum_normal_force and maximum_normal_force, peak_rim_force [N], peak_temperature [degC] where the friction
-        heats; uplift: height [m], duration [s] and count; verdict. Others: number (from 1), name, layout, position;
-        minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at the end [J].
+        Keys of all bearings: see `Result.summary`; axial_load is that at rest [N]. Others: number (from 1), name,
+        layout, position; minimum_load_ratio and maximum_load_ratio: axial force over that at rest [-]; dissipated at
+        the end [J].
         """
         least, most = self.building.extremes.axial_force[self.index] / self.axial_load
-        hottest = self.building.extremes.temperature[self.index, : self.surfaces]
-        heated = {"peak_temperature": hottest.tolist()} if (hottest > self.temperature[0]).any() else {}
         return {
-            "number": self.index + 1,
+            "number": self.number,
             "name": self.scene.bearings[self.index].name,
             "layout": self.bearing.layout.name,
             "position": self.scene.places[self.index].tolist(),
-            **peaks_of_bearing(self.extremes, self.axial_load),
+            **summary_of_bearing(self),
             "minimum_load_ratio": float(least),
             "maximum_load_ratio": float(most),
-            **heated,
-            "uplift": uplift_of(self, self.extremes),
             "verdict": self.verdict.as_dict,
-            "rims_met": (np.flatnonzero(self.extremes.gap <= 0) + 1).tolist(),
-            "dissipated": float(self.dissipated[-1]),
+            "dissipated": float(self.history.dissipated[-1]),
         }
 
     def main_results(self) -> Rows:
@@ -435,29 +418,8 @@ class BearingResult(AnyResult, HorizontalMotion):
         x, y = s["position"]
         return [
             ("bearing", f"{s['layout']} at ({x:g}, {y:g}) m"),
-            *rows_of_bearing(s),
+            *super().main_results(),
             ("N over N at rest", f"{s['minimum_load_ratio']:.2f} to {s['maximum_load_ratio']:.2f}"),
-        ]
-
-    def judged(self) -> list[Judged]:
-        """The bearing itself, with its number and its label."""
-        return [
-            Judged(
-                self.index + 1, self.label, self.bearing, self.axial_load, self, self.extremes, self.notes, self.events
-            )
-        ]
-
-    @property
-    def curve(self) -> Curve:
-        """The hysteresis loop."""
-        return hysteresis_loop(self, self.top_force)
-
-    def tables(self) -> list[Table]:
-        """Tables of its main results and of its surfaces."""
-        return [
-            Table(self.title, (), self.stated_rows),
-            surface_table(self.summary, self.bearing.surfaces),
-            self.verdict.table,
         ]
 
     @classmethod
@@ -472,12 +434,4 @@ class BearingResult(AnyResult, HorizontalMotion):
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Its rows as an xarray.Dataset; variables, units and meanings are those of `Result.dataset`."""
-        return building_dataset.dataset_of_bearing(self)
-
-    def characterise(self) -> Characterisation:
-        """Effective stiffness, damping and remaining capacity, as `Result.characterise`; N of the period is at rest.
-
-        What the rows of a building do not have (slip velocities) is None, and the notes say so. Raises InputError where
-        the bearing did not move.
-        """
-        return characterise_bearing(self)
+        return building_dataset.dataset_of_one(self)

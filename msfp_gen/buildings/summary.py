@@ -91,16 +91,23 @@ def storey_rows(building: Building, extremes: BuildingExtremes) -> list[dict[str
     return rows
 
 
-def tables(title: str, rows: Sequence[tuple[str, str]], summary: Mapping[str, Any]) -> list[Table]:
-    """Tables of a summary, of which `rows` are the first: the run, its floors, storeys and bearings."""
-    rows = [*rows, ("energy", _energy(summary["energy"])), ("twist", f"{summary['peak_twist']:.3g} rad")]
+def work_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Label and value of the energies of a building, its twist and its overturning moment."""
     moment = summary["peak_overturning_moment"]
     about = f"{1e-6 * moment['E1']:.4g} MN m about E1, {1e-6 * moment['E2']:.4g} about E2"
-    rows.append(("overturning", f"{about}, at the height of the bearings"))
+    return [
+        ("energy", _energy(summary["energy"])),
+        ("twist", f"{summary['peak_twist']:.3g} rad"),
+        ("overturning", f"{about}, at the height of the bearings"),
+    ]
+
+
+def tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Tables of a summary: the floors, storeys and bearings."""
     storeys = [_storeys(summary["storeys"])] if summary["storeys"] else []
     bearings = summary["bearings"]
     lifted = [_uplift(bearings)] if any(each["uplift"]["count"] for each in bearings) else []
-    return [Table(title, (), rows), _floors(summary["floors"]), *storeys, _bearings(bearings), *lifted]
+    return [_floors(summary["floors"]), *storeys, _bearings(bearings), *lifted]
 
 
 def rims_text(bearings: Sequence[Mapping[str, Any]]) -> str:

@@ -124,14 +124,14 @@ def plot_building(result: BuildingResult, path: str | Path | None = None) -> Fig
 def draw_plan(axes: Axes, result: BuildingResult) -> None:
     """Bearings at their places with their orbits, magnified, and the centre of mass at rest."""
     scene, bearings = result.scene, result.bearings
-    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in bearings)
+    peak = max(float(one.history.horizontal.max()) for one in bearings)
     factor = magnification(scene.places, peak)
     for one, place in zip(bearings, scene.places, strict=True):
-        u = shown_sign().factor * factor * one.displacement[:, :2]
+        u = shown_sign().factor * factor * one.history.displacement[:, :2]
         axes.plot(*(place + u).T, color=COLOURS[0], linewidth=HAIR)
         axes.plot(*place, marker="s", markersize=3.5, color=INK, linestyle="none")
         if len(bearings) <= LABELLED:
-            own = 1e3 * float(np.hypot(*one.displacement[:, :2].T).max())
+            own = 1e3 * float(one.history.horizontal.max())
             name = scene.bearings[one.index].name or str(one.index + 1)
             axes.annotate(
                 f"{plain(name)}: {own:.0f} mm",
@@ -226,7 +226,7 @@ def title_of(result: BuildingResult) -> str:
 
 
 def _overview_title(result: BuildingResult) -> str:
-    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
+    peak = max(float(one.history.horizontal.max()) for one in result.bearings)
     shear = float(np.hypot(*result.base_reaction[:, :2].T).max()) / result.scene.weight
     return f"{title_of(result)}, bearings move {MILLI * peak:.4g} mm, base shear {shear:.3f} of the weight"
 

@@ -45,7 +45,7 @@ Move = tuple[Callable[[int], None], list[Any]]
 def building_film(result: BuildingResult, times: Array, azimuth: float | None) -> Film:
     """The movie of a building at these times [s], its first elevation along `azimuth` [rad]; None: along E1."""
     frames = at_times(result, times)
-    peak = max(float(np.hypot(*one.displacement[:, :2].T).max()) for one in result.bearings)
+    peak = max(float(one.history.horizontal.max()) for one in result.bearings)
     moving = MovingFrame(frames, magnification(result.scene.places, peak))
     first = 0.0 if azimuth is None else azimuth
     views = [Elevation(moving, azimuth_of_view) for azimuth_of_view in (first, first + np.pi / 2)]
@@ -199,8 +199,8 @@ def _draw_loops(axes: Axes, result: BuildingResult, time: Array) -> Move:
 
 def _loop(result: BuildingResult, axis: int) -> tuple[Array, Array]:
     """Mean displacement [mm] and base shear over the weight along an axis, in the sign of the figures."""
-    mean = np.mean([one.displacement[:, axis] for one in result.bearings], axis=0)
-    shear = sum(one.top_force[:, axis] for one in result.bearings) / result.scene.weight
+    mean = np.mean([one.history.displacement[:, axis] for one in result.bearings], axis=0)
+    shear = sum(one.history.top_force[:, axis] for one in result.bearings) / result.scene.weight
     return displacement(mean), shown_sign().factor * np.asarray(shear)
 
 

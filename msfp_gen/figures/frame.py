@@ -112,7 +112,7 @@ class MovingFrame:
     @cached_property
     def on_rim(self) -> NDArray[np.bool_]:
         """Whether a slider of each bearing touches its rim, shape (k, bearings)."""
-        return np.stack([(bearing.sliding >= bearing.capacity).any(axis=1) for bearing in self.result.bearings], axis=1)
+        return np.stack([(bearing.history.gap <= 0).any(axis=1) for bearing in self.result.bearings], axis=1)
 
     @cached_property
     def lifted(self) -> NDArray[np.bool_]:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.analysis.summary import axial_load
 from msfp_gen.analysis.transitions import SYMBOLS, is_monotonic, transitions
-from msfp_gen.buildings.result import BearingResult
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,
@@ -37,13 +35,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from msfp_gen.common.arrays import Array
-    from msfp_gen.figures.style import OneBearing
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.results.run_data import BearingData
 
 SIDE = 0.02  # least displacement along a horizontal axis that is drawn, over the largest
 
 
-def plot_loops(result: OneBearing, path: str | Path | None = None) -> Figure:
+def plot_loops(result: BearingData, path: str | Path | None = None) -> Figure:
     """Loops of the top force [kN] over the displacement across the bearing [mm], along each horizontal axis that moves.
 
     The right axis gives force over axial load; the first contact of every rim is marked. Raises InputError for a path
@@ -57,7 +54,7 @@ def plot_loops(result: OneBearing, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def plot_orbit(result: OneBearing, path: str | Path | None = None) -> Figure:
+def plot_orbit(result: BearingData, path: str | Path | None = None) -> Figure:
     """Orbits in the horizontal plane: displacement across the bearing [mm], and force on the top support [kN].
 
     Raises InputError for a path that cannot be written.
@@ -79,7 +76,7 @@ def plot_orbit(result: OneBearing, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def moving_axes(result: OneBearing) -> tuple[int, ...]:
+def moving_axes(result: BearingData) -> tuple[int, ...]:
     """Horizontal axes (0: E1, 1: E2) along which the bearing moves; E1 if it does not move."""
     return axes_along(result.history.displacement)
 
@@ -90,7 +87,7 @@ def axes_along(displacement: Array) -> tuple[int, ...]:
     return tuple(np.flatnonzero(peaks > SIDE * peaks.max()).tolist()) or (0,)
 
 
-def draw_loop(axes: Axes, result: OneBearing, axis: int) -> None:
+def draw_loop(axes: Axes, result: BearingData, axis: int) -> None:
     """Top force over displacement along `axis`, with the first rim contacts and force over axial load on the right."""
     history, name = result.history, subscript(axis + 1)
     scale = engineering(history.top_force[:, :2], "N")
@@ -105,20 +102,18 @@ def draw_loop(axes: Axes, result: OneBearing, axis: int) -> None:
         ylabel=f"force {shown_sign().force} F{name} [{scale.unit}]",
     )
     axes.margins(0.06)
-    whole = None if isinstance(result, BearingResult) else result
-    if whole is not None and len(moving_axes(result)) == 1 and is_monotonic(whole):
-        _draw_transitions(axes, whole, axis)
+    if len(moving_axes(result)) == 1 and is_monotonic(result):
+        _draw_transitions(axes, result, axis)
     elif first_contacts(result):
         axes.legend(loc="upper left", handletextpad=0.1)
-    load = result.axial_load if isinstance(result, BearingResult) else axial_load(result)
-    if load:
+    if load := result.axial_load:
         factor = scale.factor * load
         ratio = axes.secondary_yaxis("right", functions=(partial(mul, 1 / factor), partial(mul, factor)))
         ratio.set_ylabel(f"F{name} / N  (N = {load / 1e3:.4g} kN)")
         ratio.spines["right"].set_visible(True)
 
 
-def draw_orbit(axes: Axes, result: OneBearing, title: str = "Orbit") -> None:
+def draw_orbit(axes: Axes, result: BearingData, title: str = "Orbit") -> None:
     """Displacement across the bearing in the horizontal plane, with its start and the first contact of every rim."""
     u = displacement(result.history.displacement)
     axes.plot(u[:, 0], u[:, 1], color=COLOURS[0])
@@ -134,11 +129,11 @@ def draw_orbit(axes: Axes, result: OneBearing, title: str = "Orbit") -> None:
     axes.margins(0.06)
 
 
-def _draw_transitions(axes: Axes, result: RunData, axis: int) -> None:
+def _draw_transitions(axes: Axes, result: BearingData, axis: int) -> None:
     """Dotted lines at the transitions of a monotonic run, each with its symbol and value."""
     history = result.history
     sign = float(np.sign(displacement(history.displacement[history.peak_row, axis])))
-    for key, value in transitions(result, axial_load(result)).items():
+    for key, value in transitions(result).items():
         if not key.startswith("u_") or value is None:
             continue
         x = sign * value * MILLI

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.analysis.summary import axial_load
 from msfp_gen.figures.loops import draw_loop, draw_orbit, moving_axes
 from msfp_gen.figures.sliding import draw_sliding
 from msfp_gen.figures.style import MILLI, engineering, headline, label_of, page
@@ -15,10 +14,10 @@ from msfp_gen.figures.style import MILLI, engineering, headline, label_of, page
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.results.run_data import BearingData
 
 
-def plot_result(result: RunData, path: str | Path | None = None) -> Figure:
+def plot_result(result: BearingData, path: str | Path | None = None) -> Figure:
     """Overview of a run: loops along each axis that moves, orbit where both move, sliding of every surface over time.
 
     The right axis of the loops gives force over axial load; sliding is drawn with its capacity and the rim contacts.
@@ -47,9 +46,9 @@ def plot_result(result: RunData, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def _title(result: RunData) -> str:
+def _title(result: BearingData) -> str:
     """Name and peaks; of a failed run also the time it reached."""
-    history, load = result.history, axial_load(result)
+    history, load = result.history, result.axial_load
     force = np.hypot(*history.top_force[:, :2].T).max()
     scale = engineering(force, "N")
     lines = [

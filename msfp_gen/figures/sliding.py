@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.results.run_data import RunData
+    from msfp_gen.results.run_data import BearingData, RunData
 
 BAR, EDGE = 0.56, 0.16  # heights of the bars for sliding and for rim contact, in rows
 
 
-def plot_sliding(result: RunData, path: str | Path | None = None) -> Figure:
+def plot_sliding(result: BearingData, path: str | Path | None = None) -> Figure:
     """Sliding displacement of every surface [mm] over time, with its capacity and the rim contacts.
 
     Raises InputError for a path that cannot be written.
@@ -89,9 +89,9 @@ def draw_bars(axes: Axes, result: RunData) -> None:
     axes.set_title("Sliding surfaces" + (f"  ({', '.join(notes)})" if notes else ""))
 
 
-def draw_sliding(figure: Any, result: RunData) -> None:
+def draw_sliding(figure: Any, result: BearingData) -> None:
     """One panel per surface, top surface uppermost: sliding displacement, capacity and rim contacts."""
-    history, surfaces = result.history, result.scene.bearing.surfaces
+    history, surfaces = result.history, result.bearing.surfaces
     column = strips(figure, len(surfaces))
     events = contacts(result)
     for index, (axes, surface) in enumerate(zip(column[::-1], surfaces, strict=True)):
@@ -109,7 +109,7 @@ def draw_sliding(figure: Any, result: RunData) -> None:
     figure.align_ylabels(column)
 
 
-def _draw_displacement(axes: Axes, result: RunData) -> None:
+def _draw_displacement(axes: Axes, result: BearingData) -> None:
     from msfp_gen.figures.loops import moving_axes
 
     history = result.history

@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from msfp_gen.buildings.result import BearingResult
-    from msfp_gen.results.run_data import RunData
-
-    OneBearing = RunData | BearingResult
+    from msfp_gen.results.run_data import BearingData
 
 # The palette of Okabe and Ito, which can be distinguished in print and by colour-blind readers.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -155,7 +152,7 @@ def colour(surface: int) -> str:
     return COLOURS[(surface - 1) % len(COLOURS)]
 
 
-def label_of(result: OneBearing) -> str:
+def label_of(result: BearingData) -> str:
     """The name of a run for a title; of a failed run with its status and the time it reached."""
     name = result.title
     if result.succeeded:
@@ -163,12 +160,12 @@ def label_of(result: OneBearing) -> str:
     return f"{name}, run failed ({result.status}) at t = {result.history.time[-1]:.4g} s"
 
 
-def contacts(result: OneBearing) -> list[Event]:
+def contacts(result: BearingData) -> list[Event]:
     """All events of rim contact."""
     return [event for event in result.events if event.kind == "rim_contact"]
 
 
-def first_contacts(result: OneBearing) -> list[Event]:
+def first_contacts(result: BearingData) -> list[Event]:
     """The first contact of every rim; markers of all contacts would cover the loop."""
     return list({event.surface: event for event in reversed(contacts(result))}.values())[::-1]
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.common.tables import Table
 from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.report.content import TERMS as BEARING_TERMS
 from msfp_gen.report.frames import FEWEST, packed
@@ -54,9 +53,9 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     motion[..., :3] -= result.ground[rows, None, 0]
     low, high = plan_of(scene)
     size = size_of(scene)
-    bearings = [bearing.displacement[rows] for bearing in result.bearings]
+    bearings = [bearing.history.displacement[rows] for bearing in result.bearings]
     mean = np.mean(bearings, axis=0)
-    left = np.stack([(bearing.capacity - bearing.sliding[rows]).min(axis=1) for bearing in result.bearings], axis=1)
+    left = np.stack([bearing.history.gap[rows].min(axis=1) for bearing in result.bearings], axis=1)
     heights = np.diff([node.position[2] for node in scene.building.nodes])
     drift = np.hypot(*np.moveaxis(result.drift[rows, :, :2], -1, 0))
     frames = {
@@ -91,13 +90,6 @@ def building_view(result: BuildingResult, count: int) -> dict[str, Any]:
     }
 
 
-def summary_page(result: BuildingResult) -> list[Table]:
-    """Tables of the run, without times of the machine."""
-    first, *others = result.tables()
-    rows = [row for row in first.rows if row[0] != "time"]
-    return [Table("the run", (), [("time simulated", f"{result.time[-1]:.6g} s"), *rows]), *others]
-
-
 def introduction(result: BuildingResult) -> str:
     """One sentence about building and program."""
     scene = result.scene
@@ -121,6 +113,6 @@ def _rows(result: BuildingResult, count: int) -> Array:
     """Rows of the view: evenly in time, with the peaks of displacement and axial force."""
     time = result.time
     even = np.linspace(0, len(time) - 1, min(len(time), max(count, min(FEWEST, len(time)))))
-    peaks = [int(np.hypot(*bearing.displacement[:, :2].T).argmax()) for bearing in result.bearings]
+    peaks = [int(bearing.history.horizontal.argmax()) for bearing in result.bearings]
     least = result.axial_force.argmin(axis=0).tolist()
     return np.unique([*even.round().astype(int), *peaks, *least])

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from msfp_gen.analysis.tables import transition_table
-from msfp_gen.common.tables import Table, yes
+from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.results.files import COUNTER, PROVENANCE, without
 from msfp_gen.results.note import by_importance
+from msfp_gen.results.run_data import BearingData
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.result import BuildingResult
-    from msfp_gen.result import Result
+    from msfp_gen.analysis.any_result import AnyResult
+    from msfp_gen.results.history import Event
     from msfp_gen.scene.bearing import Bearing
-
-    AnyResult = Result | BuildingResult
 
 MILLI, KILO = 1e3, 1e-3
 MACHINE_KEYS = ("build_seconds",)  # keys of the provenance that depend on the machine
@@ -78,26 +76,12 @@ def kind_of(bearing: Bearing) -> str:
     return f"{kind} friction pendulum, {surfaces}" if kind else f"friction pendulum of {surfaces}"
 
 
-class SummaryNumber(str):
-    """A number of `Result.summary` as formatted text.
-
-    Attributes:
-        key: dotted path of the number in the summary.
-        value: its value in SI units.
-    """
-
-    key: str
-    value: float
-
-
-def summary_page(result: Result) -> list[Table]:
-    """Tables of peaks, surfaces, transitions and events, as in `msfp-gen run`, without times of the machine."""
-    tables = [_run_table(result), result.verdict.table, _surface_table(result)]
-    if "transitions" in result.summary:
-        tables.append(transition_table(result.summary["transitions"]))
-    if result.events:
-        tables.append(_event_table(result))
-    return tables
+def summary_page(result: AnyResult) -> list[Table]:
+    """Tables of the run as in `msfp-gen run`, without times of the machine, and of the events of one bearing."""
+    first, *others = result.tables()
+    rows = [("time simulated", f"{result.summary['duration']:.6g} s"), *(row for row in first.rows if row[0] != "time")]
+    events = result.events if isinstance(result, BearingData) else ()
+    return [Table("the run", (), rows), *others, *([_event_table(events)] if events else [])]
 
 
 def note_tables(result: AnyResult) -> list[Table]:
@@ -134,59 +118,9 @@ def outcome(result: AnyResult) -> str:
     return ends[result.status] + (f", {verdict.text}." if verdict.ok else f". Limits of the device {verdict.text}.")
 
 
-def _run_table(result: Result) -> Table:
-    rows: list[tuple[str, str]] = [("status", result.status)]
-    entries = {
-        "duration": ("time simulated", 1.0, "s"),
-        "peak_displacement.radial": ("peak horizontal displacement", MILLI, "mm"),
-        "peak_displacement.E1": ("peak displacement along E1", MILLI, "mm"),
-        "peak_displacement.E2": ("peak displacement along E2", MILLI, "mm"),
-        "peak_force.radial": ("peak horizontal force on the top", KILO, "kN"),
-        "peak_force.E1": ("peak force along E1", KILO, "kN"),
-        "peak_force.E2": ("peak force along E2", KILO, "kN"),
-        "axial_load": ("axial load", KILO, "kN"),
-        "peak_force_ratio": ("peak horizontal force over axial load", 1.0, ""),
-        "energy.peak_input": ("peak input energy", KILO, "kJ"),
-        "energy.dissipated_share": ("dissipated energy over peak input", 100.0, "%"),
-        "energy.closure_error": ("error of the energy balance over peak input", 100.0, "%"),
-    }
-    for key, (name, scale, unit) in entries.items():
-        number = _summary_number(result, key, scale, unit)
-        if number is not None:
-            rows.append((name, number))
-    return Table("the run", (), rows)
-
-
-def _surface_table(result: Result) -> Table:
-    surfaces, met = result.scene.bearing.surfaces, result.summary["rims_met"]
-    columns = {
-        "friction [-]": ("friction", 1.0),
-        "friction at the pivot [-]": ("friction_at_pivot", 1.0),
-        "peak sliding [mm]": ("peak_sliding", MILLI),
-        "least gap [mm]": ("minimum_gap", MILLI),
-        "least normal force [kN]": ("minimum_normal_force", KILO),
-        "peak normal force [kN]": ("maximum_normal_force", KILO),
-        "peak rim force [kN]": ("peak_rim_force", KILO),
-        "least friction coefficient [-]": ("least_friction", 1.0),
-        "peak friction coefficient [-]": ("most_friction", 1.0),
-        "peak temperature [degC]": ("peak_temperature", 1.0),
-    }
-    columns = {name: column for name, column in columns.items() if result.summary.get(column[0])}
-    rows = [
-        (
-            str(index + 1),
-            f"{surface.capacity * MILLI:.5g}",
-            yes(index + 1 in met),
-            *(_summary_number(result, f"{key}.{index}", scale) or "-" for key, scale in columns.values()),
-        )
-        for index, surface in enumerate(surfaces)
-    ]
-    return Table("surfaces, bottom first", ("surface", "capacity [mm]", "rim met", *columns), rows)
-
-
-def _event_table(result: Result) -> Table:
-    shown = result.events[:EVENTS]
-    more = f", the first {EVENTS} of {len(result.events)}" if len(result.events) > EVENTS else ""
+def _event_table(events: Sequence[Event]) -> Table:
+    shown = events[:EVENTS]
+    more = f", the first {EVENTS} of {len(events)}" if len(events) > EVENTS else ""
     rows = [
         (
             f"{event.time:.4f}",
@@ -199,20 +133,3 @@ def _event_table(result: Result) -> Table:
     ]
     columns = ("time [s]", "event", "surface", "u1 [mm]", "u2 [mm]", "F1 [kN]", "F2 [kN]")
     return Table(f"events{more}", columns, rows)
-
-
-def _summary_number(result: Result, key: str, scale: float, unit: str = "") -> SummaryNumber | None:
-    """The number of the summary at a dotted path, formatted; None if it is not defined."""
-    value: Any = result.summary
-    for part in key.split("."):
-        value = value[int(part) if isinstance(value, list) else part]
-    if value is None:
-        return None
-    number = SummaryNumber(f"{value * scale:.5g} {unit}".rstrip())
-    number.key, number.value = key, float(value)
-    return number
-
-
-def summary_numbers(tables: list[Table]) -> Iterator[SummaryNumber]:
-    """All numbers of the summary in these tables."""
-    return (cell for table in tables for row in table.rows for cell in row if isinstance(cell, SummaryNumber))

@@ -88,12 +88,12 @@ def report_html(
         content = _of_building(result, frames, progress)
     else:
         content = _of_bearing(result, frames, progress)
-    content["summary"] += note_tables(result)
     scripts, data = content.pop("scripts"), content.pop("data")
     device = ", ".join(dict.fromkeys(map(kind_of, result.scene.every_bearing)))
     return render(
         "page.html.jinja",
         **content,
+        summary=[*summary_page(result), *note_tables(result)],
         characterisation=characterisation_page(result),
         settings=explain(result.scene),
         provenance=provenance_table(result),
@@ -121,7 +121,6 @@ def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[
         "stage": Markup(render("bearing.html.jinja")),
         "lead": _introduction(result),
         "terms": TERMS,
-        "summary": summary_page(result),
         "explanation": EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time)),
         "figures": list(_pictures(result, FIGURES, PLOTS, progress)),
         "data": data,
@@ -143,7 +142,6 @@ def _of_building(result: BuildingResult, frames: int, progress: Progress | None)
         "stage": Markup(stage),
         "lead": building.introduction(result),
         "terms": building.TERMS,
-        "summary": building.summary_page(result),
         "explanation": building.explanation(data["frames"]["time"]["shape"][0], len(result.time)),
         "figures": list(_pictures(result, building.FIGURES, BUILDING_FIGURES, progress)),
         "data": data,

@@ -14,8 +14,18 @@ from msfp_gen.errors import InputError
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import COUNTER, REMEDY, WORDS, attributes_of, motion_in, notes_in, without
 from msfp_gen.results.gradient import ERROR, EVENTS, SERIES, Gradients, energy_terms
-from msfp_gen.results.history import ENERGY, LABELS, STACK, Counters, Event, History, quantities
-from msfp_gen.results.run_data import RunData
+from msfp_gen.results.history import (
+    ENERGY,
+    ENERGY_BELOW,
+    LABELS,
+    STACK,
+    BearingRows,
+    Counters,
+    Event,
+    History,
+    quantities,
+)
+from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.stored_group import Attribute, StoredGroup
 from msfp_gen.results.variables import (
     Arrays,
@@ -58,16 +68,24 @@ VARIABLES = ROWS | {
     "event_top_force": Variable(("event", "axis"), "N", "F_top then", "event_top_force"),
 }
 OPTIONAL = {field.name for field in fields(History) if field.default is not MISSING}  # of effects
+BELOW = {  # of a bearing of a building
+    name: Variable(("time",), "J", meaning, name)
+    for name, meaning in ((f"energy_{name}", meaning) for name, meaning in ENERGY_BELOW.items())
+}
 DERIVED: dict[str, Any] = {}  # all variables are read
 
 
 def to_dataset(result: RunData) -> xr.Dataset:
     """The rows of `result` along `time`, its events along `event`; scene, status and provenance in the attributes."""
-    labels = labels_of(result.history.surfaces)
-    return dataset_of(VARIABLES, arrays_of(result), labelled(labels), _attributes(result))
+    return dataset_of_bearing(result, _attributes(result))
 
 
-def arrays_of(result: RunData) -> Arrays:
+def dataset_of_bearing(one: BearingData, attributes: dict[str, Attribute]) -> xr.Dataset:
+    """Rows and events of any bearing."""
+    return dataset_of(VARIABLES | BELOW, arrays_of(one), labelled(labels_of(one.history.surfaces)), attributes)
+
+
+def arrays_of(result: BearingData) -> Arrays:
     """The arrays of which the variables are parts."""
     return rows_of(result.history) | {
         name: np.array([getattr(event, name.removeprefix("event_")) for event in result.events], variable.kind).reshape(
@@ -78,7 +96,7 @@ def arrays_of(result: RunData) -> Arrays:
     }
 
 
-def rows_of(history: History) -> Arrays:
+def rows_of(history: BearingRows) -> Arrays:
     """Those of the rows."""
     return history.arrays() | {f"energy_{name}": values for name, values in history.energy.items()}
 

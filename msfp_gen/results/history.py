@@ -1,14 +1,15 @@
 """The rows of a run as NumPy arrays, its events and counters.
 
-The annotations of `History` give dimensions, unit and meaning of every quantity. The check of shapes here and the
-dataset in `dataset.py` are based on them.
+The annotations of `BearingRows` and `History` give dimensions, unit and meaning of every quantity. The check of shapes
+here and the dataset in `dataset.py` are based on them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Literal, get_origin, get_type_hints
+from typing import Annotated, ClassVar, Literal, get_origin, get_type_hints
 
 import numpy as np
 
@@ -24,6 +25,10 @@ LABELS: dict[str, tuple[str, ...]] = {
 }
 STACK = ("body", "surface")
 
+ENERGY_BELOW: dict[str, str] = {  # of a bearing of a building
+    "dissipated": "energy dissipated in the bearing",
+    "stored": "energy stored in the bearing and its interface",
+}
 ENERGY: dict[str, str] = {
     "input": "work done on the bearing and its top by the base motion and the loads",
     "kinetic": "kinetic energy relative to the base",
@@ -55,7 +60,7 @@ def first_peak(size: Array) -> int:
 
 @dataclass(frozen=True)
 class Rows:
-    """A quantity of `History`: dimensions after time, unit, meaning ({} stands for the name), names in the dataset.
+    """A quantity of the rows: dimensions after time, unit, meaning ({} stands for the name), names in the dataset.
 
     names: none for the name of the field itself; several for the components of the last dimension.
     """
@@ -66,11 +71,62 @@ class Rows:
     names: tuple[str, ...] = ()
 
 
-class HorizontalMotion:
-    """What follows from the displacement across a bearing, shape (T, 3) [m]."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BearingRows:
+    """The T rows of any bearing, alone or below a building.
 
-    if TYPE_CHECKING:  # a field of the subclasses, whose order is that of the dataset
-        displacement: Array
+    Every quantity has T entries along its first dimension. The dimensions `body` (bodies 2..n) and `surface` have n - 1
+    entries each, bottom first; `LABELS` gives the others. energy: by the names in `ENERGIES`, shape (T,) [J]. Raises
+    InputError where an array has another shape or an entry that is not finite, or where the time does not increase.
+    """
+
+    ENERGIES: ClassVar[Mapping[str, str]] = ENERGY_BELOW
+
+    time: Annotated[Array, Rows((), "s", "time t")]
+    normal_force: Annotated[Array, Rows(("surface",), "N", "normal force N on the surface")]
+    sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
+    gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
+    rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
+    lift: Annotated[Array, Rows(("surface",), "m", "clearance between separated faces; 0 while in contact")]
+    base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
+    displacement: Annotated[
+        Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
+    ]
+    top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
+    top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
+    # None where the friction does not depend on it.
+    temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
+    energy: dict[str, Array]
+
+    def __post_init__(self) -> None:
+        if not len(self.time):
+            raise InputError("history.time has no rows: give at least the start of the run")
+        if np.any(late := np.diff(self.time) <= 0):
+            row = int(np.argmax(late)) + 1
+            before, here = self.time[row - 1 : row + 1]
+            raise InputError(f"history.time[{row}] = {here:g} s follows {before:g} s: give rows in rising time")
+        for name, values in self.arrays().items():
+            self._check(name, values, self._shape(quantities()[name].dims, self.surfaces))
+        if set(self.energy) != set(self.ENERGIES):
+            raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(self.ENERGIES)}")
+        for name, values in self.energy.items():
+            self._check(f"energy[{name!r}]", values, (len(self.time),))
+
+    @property
+    def surfaces(self) -> int:
+        """Number of surfaces, n - 1."""
+        return int(self.normal_force.shape[1])
+
+    @property
+    def dissipated(self) -> Array:
+        """Energy dissipated since the start, ndarray, shape (T,) [J]."""
+        lost: Array = np.sum([values for name, values in self.energy.items() if name.endswith("dissipated")], axis=0)
+        return lost
+
+    def arrays(self) -> dict[str, Array]:
+        """The arrays of this run by field, without those that are None."""
+        found = {name: getattr(self, name, None) for name in quantities()}
+        return {name: values for name, values in found.items() if values is not None}
 
     @property
     def horizontal(self) -> Array:
@@ -96,75 +152,6 @@ class HorizontalMotion:
         along, across = (self.displacement[:, :2] @ np.array(axis) for axis in ([e1, e2], [-e2, e1]))
         return along, across
 
-
-@dataclass(frozen=True, eq=False)
-class History(HorizontalMotion):
-    """The T rows of a run.
-
-    Every quantity has T entries along its first dimension. The dimensions `body` (bodies 2..n) and `surface` have n - 1
-    entries each, bottom first; `LABELS` gives the others. Raises InputError where an array has another shape or an
-    entry that is not finite, or where the time does not increase.
-    """
-
-    time: Annotated[Array, Rows((), "s", "time t")]
-    tilt_angles: Annotated[Array, Rows(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
-    tilt_rates: Annotated[Array, Rows(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
-    tilt_accelerations: Annotated[
-        Array, Rows(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
-    ]
-    friction_state: Annotated[Array, Rows(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
-    normal_force: Annotated[Array, Rows(("surface",), "N", "normal force N on the surface")]
-    contact_angles: Annotated[Array, Rows(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")]
-    sliding: Annotated[Array, Rows(("surface",), "m", "distance s from the centre of the surface (3.20)")]
-    gap: Annotated[Array, Rows(("surface",), "m", "gap g to the rim (3.21)")]
-    rim_force: Annotated[Array, Rows(("surface",), "N", "force F_c of the rim (2.103)")]
-    separation: Annotated[
-        Array, Rows(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
-    ]
-    lift: Annotated[Array, Rows(("surface",), "m", "clearance between separated faces; 0 while in contact")]
-    interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
-    slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
-    base_displacement: Annotated[Array, Rows(("axis",), "m", "displacement u_g of the base")]
-    top_displacement: Annotated[Array, Rows(("axis",), "m", "position r_nn of the top plate in space")]
-    displacement: Annotated[
-        Array, Rows(("axis",), "m", "displacement u across the bearing, r_01 - r_nn less its start")
-    ]
-    top_force: Annotated[Array, Rows(("axis",), "N", "force F_top of the bearing on the top support")]
-    top_moment: Annotated[Array, Rows(("axis",), "N m", "moment of the bearing on the top support at r_nn")]
-    energy: dict[str, Array]
-    # None unless the model has a friction law, or one with temperature.
-    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")] = None
-    temperature: Annotated[Array | None, Rows(("surface",), "degC", "temperature at the centre of the surface")] = None
-    # None unless the top has a vertical stiffness or damping.
-    top_settlement: Annotated[
-        Array | None, Rows((), "m", "compression of the vertical spring of the top, settlement of a supported mass")
-    ] = None
-
-    def __post_init__(self) -> None:
-        if not len(self.time):
-            raise InputError("history.time has no rows: give at least the start of the run")
-        if np.any(late := np.diff(self.time) <= 0):
-            row = int(np.argmax(late)) + 1
-            before, here = self.time[row - 1 : row + 1]
-            raise InputError(f"history.time[{row}] = {here:g} s follows {before:g} s: give rows in rising time")
-        surfaces = self.normal_force.shape[-1]
-        for name, values in self.arrays().items():
-            self._check(name, values, self._shape(quantities()[name].dims, surfaces))
-        if set(self.energy) != set(ENERGY):
-            raise InputError(f"history.energy has {sorted(self.energy)}: give {sorted(ENERGY)}")
-        for name, values in self.energy.items():
-            self._check(f"energy[{name!r}]", values, (len(self.time),))
-
-    @property
-    def surfaces(self) -> int:
-        """Number of surfaces, n - 1."""
-        return int(self.normal_force.shape[1])
-
-    def arrays(self) -> dict[str, Array]:
-        """The arrays of this run by field, without those that are None."""
-        found = {name: getattr(self, name) for name in quantities()}
-        return {name: values for name, values in found.items() if values is not None}
-
     def _shape(self, dims: tuple[str, ...], surfaces: int) -> tuple[int, ...]:
         return (len(self.time), *(surfaces if dim in STACK else len(LABELS[dim]) for dim in dims))
 
@@ -175,6 +162,33 @@ class History(HorizontalMotion):
         if not np.isfinite(values).all():
             row = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise InputError(f"history.{name} is not finite in row {row}: leave out rows that were not computed")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class History(BearingRows):
+    """The T rows of the run of one bearing."""
+
+    ENERGIES: ClassVar[Mapping[str, str]] = ENERGY
+
+    tilt_angles: Annotated[Array, Rows(("body", "angle"), "rad", "psi, theta, phi of body k (2.27)", ("tilt",))]
+    tilt_rates: Annotated[Array, Rows(("body", "angle"), "rad/s", "rates of psi, theta, phi", ("tilt_rate",))]
+    tilt_accelerations: Annotated[
+        Array, Rows(("body", "angle"), "rad/s^2", "second derivatives of psi, theta, phi", ("tilt_acceleration",))
+    ]
+    friction_state: Annotated[Array, Rows(("surface", "direction"), "1", "Bouc-Wen variable {} (2.94)", ("Y", "Z"))]
+    contact_angles: Annotated[Array, Rows(("surface", "contact_angle"), "rad", "psi~, theta~ of the contact (2.86)")]
+    separation: Annotated[
+        Array, Rows(("surface", "axis"), "m", "separation delta of the two sphere centres of the surface")
+    ]
+    interface_force: Annotated[Array, Rows(("surface", "axis"), "N", "force P through the surface")]
+    slip_velocity: Annotated[Array, Rows(("surface", "direction"), "m/s", "slip velocity u~, v~ (2.98)")]
+    top_displacement: Annotated[Array, Rows(("axis",), "m", "position r_nn of the top plate in space")]
+    # None unless the model has a friction law.
+    friction_coefficient: Annotated[Array | None, Rows(("surface",), "1", "friction coefficient mu by its law")] = None
+    # None unless the top has a vertical stiffness or damping.
+    top_settlement: Annotated[
+        Array | None, Rows((), "m", "compression of the vertical spring of the top, settlement of a supported mass")
+    ] = None
 
 
 @cache

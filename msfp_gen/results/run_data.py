@@ -1,26 +1,77 @@
-"""`RunData`: the data of a run, from which its tables, figures and files are made."""
+"""`BearingData`: the data of the run of one bearing, alone or below a building; `RunData`: of a bearing alone.
+
+Summaries, tables, figures and files are made from them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.extremes import Extremes
 from msfp_gen.results.files import ResultFiles
-from msfp_gen.results.history import Counters, Event, History
+from msfp_gen.results.history import BearingRows, Counters, Event, History
 
 if TYPE_CHECKING:
     from msfp_gen.results.gradient import Gradients
     from msfp_gen.results.note import Note
+    from msfp_gen.scene.bearing import Bearing
     from msfp_gen.scene.scene import Scene
+    from msfp_gen.specification.layout import Effects
+
+
+class BearingData(ResultFiles):
+    """What the run of any bearing has, alone or below a building.
+
+    bearing: its values. effects: of its model at the start. axial_load: compression at rest [N]; None: it varies, or
+    there is none. history: its rows. events: none below a building, which does not record them. extremes: over all
+    steps. notes: of its monitors.
+    """
+
+    @property
+    def number(self) -> int:
+        """Below a building, from 1; 0: alone."""
+        return 0
+
+    @property
+    def label(self) -> str:
+        """What messages call it below a building; "": alone."""
+        return ""
+
+    if TYPE_CHECKING:  # fields of the subclasses, or properties
+
+        @property
+        def bearing(self) -> Bearing:
+            """Its values."""
+
+        @property
+        def effects(self) -> Effects:
+            """Those of its model at the start."""
+
+        @property
+        def axial_load(self) -> float | None:
+            """Compression at rest [N]."""
+
+        @property
+        def history(self) -> BearingRows:
+            """Its rows."""
+
+        @property
+        def events(self) -> tuple[Event, ...]:
+            """In order of time."""
+
+        @property
+        def extremes(self) -> Extremes:
+            """Over all steps."""
 
 
 @dataclass(frozen=True, eq=False)
-class RunData(ResultFiles):
+class RunData(BearingData):
     """Scene, rows, events and provenance of a run. `msfp_gen.Result` adds dataset and summary.
 
     status: "ok", "stopped" (the stop condition of the scene was met) or the name of a failure; message: one line of
@@ -41,6 +92,33 @@ class RunData(ResultFiles):
     notes: tuple[Note, ...] = ()
     recorded_extremes: Extremes | None = None
     gradients: Gradients | None = None
+
+    @property
+    def bearing(self) -> Bearing:
+        """The bearing of the scene."""
+        return self.scene.bearing
+
+    @property
+    def effects(self) -> Effects:
+        """The effects at the start."""
+        return self.scene.modelled
+
+    @property
+    def axial_load(self) -> float | None:
+        """The constant axial load on the top plate [N]; None if there is none, or it varies."""
+        scene = self.scene
+        loads: dict[str, Callable[[Any], float]] = {
+            "rig": lambda top: top.axial_load,
+            "prescribed": lambda top: -top.force[2],
+            "mass": lambda top: top.mass * scene.bearing.gravity,
+        }
+        load = loads[scene.top.kind](scene.top)
+        if scene.load is not None:
+            vertical = scene.load.coefficients[:, 2]
+            if np.any(vertical[:, 1:]) or np.any(vertical[:, 0] != vertical[0, 0]):
+                return None
+            load -= float(vertical[0, 0])
+        return load if load > 0 else None
 
     @cached_property
     def extremes(self) -> Extremes:

@@ -12,13 +12,12 @@ rim, do not slide. The definition has two forms:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
-from msfp_gen.results.history import Event, History
+from msfp_gen.results.history import BearingRows, Event, History
 
 SHARE = 0.05  # of the slip of all surfaces together, over an interval
 INSTANT_SHARE = 0.1  # the same at one instant
@@ -56,13 +55,13 @@ def sliding_surfaces(history: History) -> Flags:
     return flags
 
 
-def separated(history: History) -> Flags:
+def separated(history: BearingRows) -> Flags:
     """Whether each surface is separated in each row, ndarray of bool, shape (T, n-1); never without `uplift`."""
     flags: Flags = history.lift > 0
     return flags
 
 
-def rims_in_contact(history: History) -> Flags:
+def rims_in_contact(history: BearingRows) -> Flags:
     """Whether the rim of each surface is in contact in each row, ndarray of bool, shape (T, n-1)."""
     flags: Flags = history.rim_force != 0
     return flags
@@ -98,8 +97,8 @@ def openings(time: Array, lift: Array, events: Iterable[Event]) -> list[tuple[fl
     return spells if start is None else [*spells, (start, float(time[-1]) - start)]
 
 
-def open_times(history: Any, events: Iterable[Event]) -> list[list[tuple[float, float]]]:
-    """The openings of every surface, bottom first. history: with `time` and `lift`, shape (T, n-1) [m]."""
+def open_times(history: BearingRows, events: Iterable[Event]) -> list[list[tuple[float, float]]]:
+    """The openings of every surface, bottom first."""
     of_surfaces: list[list[Event]] = [[] for _ in range(history.lift.shape[1] + 1)]
     for event in events:
         of_surfaces[event.surface].append(event)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import pi, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,49 +20,58 @@ from msfp_gen.analysis.characterise.characterisation import (
 from msfp_gen.analysis.characterise.loops import Path
 from msfp_gen.analysis.characterise.stages import Branch, branch_of, signed_slip
 from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, surface_demands
-from msfp_gen.analysis.summary import axial_load
 from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
+from msfp_gen.results.run_data import BearingData, RunData
 
-if TYPE_CHECKING:
-    from msfp_gen.results.run_data import RunData
-
+NOT_RECORDED = (
+    "the rows of a building have no slip velocities: no sliding regimes, velocities and heat of surfaces; periods are "
+    "with N at rest"
+)
 NO_LOOP = "effective stiffness, damping, zero-displacement force and the sliding regimes of a cycle are not defined"
 
 
-def characterise(result: RunData) -> Characterisation:
-    """Characterise a run; docs/characterise.md gives the formulas and the clauses of codes.
+def characterise(one: BearingData) -> Characterisation:
+    """Characterise a run of one bearing; docs/characterise.md gives the formulas and the clauses of codes.
 
-    Raises InputError if the bearing did not move.
+    What the rows of a bearing below a building do not have is None, and the notes say so; its period is that with N at
+    rest. Raises InputError if the bearing did not move.
     """
-    history, load, scene = result.history, axial_load(result), result.scene
+    history, load, peaks = one.history, one.axial_load, one.extremes
     path = Path.of(history.time, history.displacement, history.top_force)
-    (u, force), (slip, plastic) = path.along, signed_slip(result, path.direction)
-
-    def branch(first: int, last: int) -> Branch:
-        rows = slice(first, last + 1)
-        return branch_of(u[rows], force[rows], slip[rows], plastic[rows], history.gap[rows])
-
-    def demands(rows: slice | None) -> tuple[SurfaceDemand, ...]:
-        return surface_demands(result, rows)
-
-    lost = [values for name, values in history.energy.items() if name.endswith("_dissipated")]
-    peaks = (result.extremes.displacement[3], result.extremes.top_force[3])
-    gravity = scene.bearing.gravity
-    found = characterised(scene.name, result.status, path, peaks, load, gravity, np.sum(lost, axis=0), demands, branch)
+    branch = _branches(one, path) if isinstance(one, RunData) else None
+    name = one.title if one.number else one.scene.name
+    largest = (float(peaks.displacement[3]), float(peaks.top_force[3]))
+    demands = partial(surface_demands, one)
+    found = characterised(
+        name, one.status, path, largest, load, one.bearing.gravity, history.dissipated, demands, branch
+    )
     notes = list(found.notes)
     if any(demand.maximum_uplift is None for demand in found.surfaces):
         notes.append("uplift is not modelled in this run")
     if load is None:
         notes.append("no constant axial load: no effective period")
-    monotonic, turning = not found.cycles and is_monotonic(result), path.turning
+    if branch is None:
+        return replace(found, notes=(*notes, NOT_RECORDED))
+    monotonic, turning = not found.cycles and is_monotonic(one), path.turning
     return replace(
         found,
         kind="monotonic" if monotonic else found.kind,
         first_loading=branch(turning[0], turning[1]) if len(turning) > 1 else None,
-        transitions=transitions(result, load) if monotonic else None,
+        transitions=transitions(one) if monotonic else None,
         notes=tuple(notes),
     )
+
+
+def _branches(result: RunData, path: Path) -> Callable[[int, int], Branch]:
+    """What gives the sliding regimes from one row to another."""
+    (u, force), (slip, plastic) = path.along, signed_slip(result, path.direction)
+
+    def branch(first: int, last: int) -> Branch:
+        rows = slice(first, last + 1)
+        return branch_of(u[rows], force[rows], slip[rows], plastic[rows], result.history.gap[rows])
+
+    return branch
 
 
 def characterised(

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msfp_gen.results.run_data import BearingData, RunData
 from msfp_gen.results.sliding import separated
 
 if TYPE_CHECKING:
     from msfp_gen.common.arrays import Array
-    from msfp_gen.results.run_data import RunData
     from msfp_gen.scene.bearing import Bearing
 
 
@@ -42,48 +42,38 @@ class SurfaceDemand:
     maximum_uplift: float | None
 
 
-def surface_demands(result: RunData, rows: slice | None = None) -> tuple[SurfaceDemand, ...]:
+def surface_demands(one: BearingData, rows: slice | None = None) -> tuple[SurfaceDemand, ...]:
     """Demands on every surface over `rows`, bottom first; over the whole run, its steps included, without them."""
-    whole, rows = rows is None, slice(None) if rows is None else rows
-    history, bearing, extremes = result.history, result.scene.bearing, result.extremes
-    speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
-    power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
-    heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
-    fastest = extremes.slip_speed if whole and extremes.slip_speed is not None else speed.max(axis=0)
-    has_uplift = result.scene.modelled.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
-    gap, lift = extremes.gap if whole else history.gap[rows].min(axis=0), history.lift[rows].max(axis=0)
-    demands = []
-    for i, basic in enumerate(capacity_demands(bearing, gap, lift if has_uplift else None)):
-        area = basic.contact_area
-        demands.append(
-            replace(
-                basic,
-                peak_velocity=float(fastest[i]),
-                peak_heat_flux=float(power[:, i].max()) / area if area else None,
-                heat=float(heat[i]) / area if area else None,
-            )
-        )
-    return tuple(demands)
-
-
-def capacity_demands(bearing: Bearing, gap: Array, lift: Array | None) -> tuple[SurfaceDemand, ...]:
-    """What least gaps and largest openings tell, shape (n-1,) [m]; velocity and heat are None.
-
-    lift: None without uplift.
-    """
+    history, extremes, whole = one.history, one.extremes, rows is None
+    rows = slice(None) if rows is None else rows
+    gap, lift = (values[rows] for values in (history.gap, history.lift))
+    least_gap = extremes.gap if whole else gap.min(axis=0)
+    most_lift = extremes.lift if whole and extremes.lift is not None else lift.max(axis=0)
+    has_uplift = one.effects.uplift or bool(history.lift.any())  # a monitor may add uplift during the run
+    slips = _slips(one, rows, whole) if isinstance(one, RunData) else None
     return tuple(
         SurfaceDemand(
             surface=i + 1,
-            capacity_left=float(gap[i]),
-            capacity_left_share=float(gap[i]) / surface.capacity,
-            peak_velocity=None,
-            peak_heat_flux=None,
-            heat=None,
-            contact_area=_contact_area(bearing, i),
-            maximum_uplift=None if lift is None else float(lift[i]),
+            capacity_left=float(least_gap[i]),
+            capacity_left_share=float(least_gap[i]) / surface.capacity,
+            peak_velocity=None if slips is None else float(slips[0][i]),
+            peak_heat_flux=float(slips[1][i]) / area if slips is not None and area else None,
+            heat=float(slips[2][i]) / area if slips is not None and area else None,
+            contact_area=area,
+            maximum_uplift=float(most_lift[i]) if has_uplift else None,
         )
-        for i, surface in enumerate(bearing.surfaces)
+        for i, surface in enumerate(one.bearing.surfaces)
+        for area in (_contact_area(one.bearing, i),)
     )
+
+
+def _slips(result: RunData, rows: slice, whole: bool) -> tuple[Array, Array, Array]:
+    """Largest slip velocity [m/s] and friction power [W], and its integral [J], of every surface, shape (n-1,) each."""
+    history, fastest = result.history, result.extremes.slip_speed
+    speed = np.where(separated(history), 0.0, np.linalg.norm(history.slip_velocity, axis=2))[rows]
+    power = result.friction_coefficient[rows] * history.normal_force[rows] * speed
+    heat = np.asarray(np.trapezoid(power, history.time[rows], axis=0))
+    return (fastest if whole and fastest is not None else speed.max(axis=0)), power.max(axis=0), heat
 
 
 def _contact_area(bearing: Bearing, surface: int) -> float | None:

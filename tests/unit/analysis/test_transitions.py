@@ -11,6 +11,7 @@ from support.synthetic import LOAD, contact, history, loops, ramp, scene
 
 from msfp_gen.analysis.transitions import is_monotonic, stopping_displacement, transitions
 from msfp_gen.result import Result
+from msfp_gen.scene.top import Top
 
 KEYS = {"u_star", "u_star_star", "u_dr1", "u_dr4", "F_dr1", "F_dr4", "resolution"}
 
@@ -46,13 +47,15 @@ def test_what_did_not_happen_is_none():
         history=dataclasses.replace(rows, **first, energy={name: e[:300] for name, e in rows.energy.items()}),
         events=(),
     )
-    found = transitions(short, LOAD)
+    found = transitions(short)
     assert found["u_star"] == pytest.approx(0.002, abs=1.2e-4)
     assert [found[key] for key in ("u_star_star", "u_dr1", "u_dr4", "F_dr1", "F_dr4")] == [None] * 5
 
 
 def test_without_a_load_forces_are_none_and_displacements_stay():
-    found = transitions(ramp(), None)
+    run = ramp()
+    unloaded = dataclasses.replace(run.scene, top=Top.rig(axial_load=0.0, stiffness=1e8))
+    found = transitions(dataclasses.replace(run, scene=unloaded))
     assert found["F_dr1"] is None and found["u_dr1"] is not None
 
 
@@ -106,7 +109,7 @@ def test_other_stacks_get_every_rim():
     run = _run(u, np.stack([u / 2, u / 2], axis=1))
     rows = dataclasses.replace(run.history, gap=0.05 - run.history.sliding)
     run = dataclasses.replace(run, history=rows, events=(contact(rows, 2),))
-    found = transitions(run, LOAD)
+    found = transitions(run)
     assert set(found) == {"u_dr1", "u_dr2", "F_dr1", "F_dr2"}
     assert found["u_dr2"] == pytest.approx(0.1) and found["u_dr1"] is None
 
@@ -114,7 +117,7 @@ def test_other_stacks_get_every_rim():
 def test_a_rim_met_again_counts_once():
     run = ramp()
     again = dataclasses.replace(run.events[0], displacement=np.array([0.14, 0, 0]))
-    assert transitions(dataclasses.replace(run, events=(*run.events, again)), LOAD)["u_dr1"] < 0.09
+    assert transitions(dataclasses.replace(run, events=(*run.events, again)))["u_dr1"] < 0.09
 
 
 def test_monotonic_by_name_or_by_displacement():

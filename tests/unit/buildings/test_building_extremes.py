@@ -49,7 +49,7 @@ def test_rims_push_with_their_stiffness():
         elastic = bearing.surfaces[0].rim_stiffness * np.maximum(0.0, sliding - capacity)
         assert elastic.max() > 6e3 and one.rim_force == pytest.approx(elastic, abs=1.0)
         assert not one.lift.any()
-    assert result.bearings[1].rim_force.max() == pytest.approx(result.extremes.rim_force[1, 0], rel=1e-3)
+    assert result.bearings[1].history.rim_force.max() == pytest.approx(result.extremes.rim_force[1, 0], rel=1e-3)
 
 
 def test_places_of_contacts_are_those_of_the_rows(monkeypatch: pytest.MonkeyPatch):

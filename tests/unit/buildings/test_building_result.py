@@ -17,8 +17,9 @@ from msfp_gen import Effects, InputError, RunError, Solver, characterise, simula
 from msfp_gen.analysis.characterise.characterisation import csv_rows
 from msfp_gen.analysis.characterise.loops import Path as Motions
 from msfp_gen.analysis.characterise.report import characterised
+from msfp_gen.analysis.summary import summary_of_bearing
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import plot_loops
+from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
 from msfp_gen.results.files import table_of
 from msfp_gen.results.note import Note
 from msfp_gen.results.resample import at_times
@@ -63,11 +64,11 @@ def test_summary_is_that_of_the_rows():
 def test_bearings_have_the_signs_of_a_run_of_one_bearing():
     """u is base less top, and F, the force of the bearing on what stands on it, has the sign of u while sliding on."""
     for index, one in enumerate(pushed().bearings):
-        assert one.displacement == pytest.approx(-pushed().bearing_displacement[:, index], abs=1e-15)
-        row = int(np.hypot(*one.displacement[:, :2].T).argmax())
-        assert one.top_force[row, :2] @ one.displacement[row, :2] > 0
-        assert one.axial_force == pytest.approx(one.top_force[:, 2])
-    total = sum(one.top_force for one in pushed().bearings)
+        assert one.history.displacement == pytest.approx(-pushed().bearing_displacement[:, index], abs=1e-15)
+        row = int(np.hypot(*one.history.displacement[:, :2].T).argmax())
+        assert one.history.top_force[row, :2] @ one.history.displacement[row, :2] > 0
+        assert pushed().axial_force[:, index] == pytest.approx(one.history.top_force[:, 2])
+    total = sum(one.history.top_force for one in pushed().bearings)
     inertia = pushed().base_reaction
     assert np.abs(total - inertia)[:, :2].max() < 0.02 * np.abs(inertia).max()  # inertia of the bearings themselves
 
@@ -76,20 +77,19 @@ def test_a_bearing_has_what_a_run_of_one_bearing_has(tmp_path: Path):
     """Variables, units and meanings of its dataset, keys of its summary, quantities of its characterisation, files."""
     one, alone = pushed().bearings[1], loops_of_one()
     for name, variable in one.dataset.data_vars.items():
-        assert name in alone.dataset or name in ("axial_force", "dissipated", "stored", "temperature")
+        assert name in alone.dataset or name in ("energy_dissipated", "energy_stored")
         if name in alone.dataset:
             assert variable.dims == alone.dataset[name].dims and variable.attrs == alone.dataset[name].attrs
-    assert np.array_equal(one.dataset["top_force"], one.top_force) and one.dataset.sizes["surface"] == 4
-    shared = {"peak_displacement", "peak_force", "peak_force_ratio", "axial_load", "peak_sliding", "minimum_gap"}
-    shared |= {"rims_met", "minimum_normal_force", "maximum_normal_force"}
-    assert shared <= one.summary.keys() & alone.summary.keys()
+    assert np.array_equal(one.dataset["top_force"], one.history.top_force) and one.dataset.sizes["surface"] == 4
+    assert summary_of_bearing(alone).keys() <= one.summary.keys() & alone.summary.keys()
     found = characterise(one)
     assert found.as_dict().keys() == alone.characterise().as_dict().keys()
     assert found.peak_force == one.summary["peak_force"]["radial"] and found.secant_stiffness > 0
     assert found.surfaces[0].capacity_left == one.summary["minimum_gap"][0] and "slip velocities" in found.notes[-1]
     assert all(table.text for table in found.tables()) and csv_rows(found)
     path = one.save(tmp_path / "one.csv")
-    assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top") and plot_loops(one)
+    assert path.read_text().startswith("# bearing 2 (B) of frame, status ok; u = base - top")
+    assert all(plot(one) for plot in (plot_result, plot_loops, plot_orbit, plot_sliding))
     file = one.save(tmp_path / "one.nc")
     assert opened(file).identical(one.dataset.assign_attrs(digest=opened(file).attrs["digest"]))
     with pytest.raises(InputError, match="one bearing of a building; read the file of the building"):
@@ -275,10 +275,10 @@ def test_motions_of_supports_come_back_from_a_file(tmp_path: Path):
 
 def test_a_bearing_at_other_times():
     one = pushed().bearings[1]
-    between = at_times(one, 0.5 * (one.time[3] + one.time[4]))
-    assert between.label == one.label and between.displacement.shape == (1, 3)
-    np.testing.assert_allclose(between.displacement[0], one.displacement[3:5].mean(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(between.sliding[0], one.sliding[3:5].mean(axis=0), rtol=1e-12)
+    between = at_times(one, 0.5 * (one.history.time[3] + one.history.time[4]))
+    assert between.label == one.label and between.history.displacement.shape == (1, 3)
+    np.testing.assert_allclose(between.history.displacement[0], one.history.displacement[3:5].mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(between.history.sliding[0], one.history.sliding[3:5].mean(axis=0), rtol=1e-12)
 
 
 def test_every_quantity_of_the_catalogue_is_in_a_pushed():

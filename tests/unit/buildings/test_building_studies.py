@@ -173,7 +173,7 @@ def test_a_study_takes_a_building(path: Path, tmp_path: Path):
     assert rows["bearing_displacement_3"][1] == wanted["bearings"][2]["peak_displacement"]["radial"]
     assert rows["slab"][1] == np.abs(run.node("base")[:, 2, 0]).max() / 9.81
     assert rows["corner"][1] == run.axial_force[-1, 1] - run.axial_force[:, 1].min() > 0
-    assert rows["left"][1] == run.sliding[:, 2, 3].min() + run.bearings[2].displacement[:, 0].max() > 0
+    assert rows["left"][1] == run.sliding[:, 2, 3].min() + run.bearings[2].history.displacement[:, 0].max() > 0
     assert rows["ratio"][1] == pytest.approx(rows["peak_force"][1] / 441000)
 
 

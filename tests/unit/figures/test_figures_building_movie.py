@@ -33,7 +33,7 @@ def test_rows_between_rows():
     shown, time = at_times(result(), TIMES), result().time
     assert isinstance(shown, BuildingResult) and np.array_equal(shown.time, TIMES)
     wanted = np.interp(TIMES, time, result().axial_force[:, 2])
-    assert shown.axial_force[:, 2] == pytest.approx(wanted) and shown.bearings[3].sliding.shape == (3, 4)
+    assert shown.axial_force[:, 2] == pytest.approx(wanted) and shown.bearings[3].history.sliding.shape == (3, 4)
     with pytest.raises(InputError, match=r"time = 0\.9 s: the run holds 0 to 0\.8 s"):
         at_times(result(), [0.1, 0.9])
 
@@ -44,7 +44,9 @@ def test_the_frame_stands_on_its_bearings():
     below = shown.points(0, shown.upper_ends)
     assert below == pytest.approx(shown.uppers, abs=1e-12)
     moved = shown.uppers[:, 1] - shown.upper_ends[1]
-    u = np.stack([np.interp(TIMES, result().time, column) for column in result().bearings[1].displacement.T], axis=1)
+    u = np.stack(
+        [np.interp(TIMES, result().time, column) for column in result().bearings[1].history.displacement.T], axis=1
+    )
     assert np.abs(u).max() > 0.01 and moved[:, :2] == pytest.approx(-20.0 * u[:, :2], abs=1e-9)
     assert np.array_equal(shown.lowers - shown.upper_ends, np.broadcast_to([0.0, 0.0, -shown.depth], (3, 4, 3)))
     # Columns end at the floors: their lower end in the first storey is the upper end of the bearing below.

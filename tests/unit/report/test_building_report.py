@@ -47,7 +47,7 @@ def test_the_view_holds_the_motion_of_the_frame():
     assert data["frames"]["time"]["shape"] == [len(result().time)]
     assert data["frames"]["node"]["shape"] == [len(result().time), 4, 6] and data["plates"]
     assert json.dumps(data, allow_nan=False)
-    mean = np.mean([np.hypot(*each.displacement[:, :2].T) for each in result().bearings], axis=0)
+    mean = np.mean([np.hypot(*each.history.displacement[:, :2].T) for each in result().bearings], axis=0)
     assert data["peak"] == int(mean.argmax()) and data["scale"] == scale_of(result()) >= 1
     assert data["places"][1] == [-3.0, 2.0, 0.0] and data["loads"] == result().scene.axial_loads.tolist()
 
@@ -70,7 +70,7 @@ def test_a_browser_draws_it(tmp_path: Path):
     assert [row[0] for row in rows] == ["1", "2", "3", "4"]
     peak = building_view(result(), 1500)["peak"]
     shown = float(re.findall(r"<td>([^<]*)</td>", rows[0][1])[0].replace("−", "-"))
-    assert shown == pytest.approx(1e3 * result().bearings[0].displacement[peak, 0], abs=0.06)
+    assert shown == pytest.approx(1e3 * result().bearings[0].history.displacement[peak, 0], abs=0.06)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to draw the page")

@@ -215,14 +215,6 @@ def test_numbers_under_the_cursor_are_those_of_the_file(browser, saved):
 
 
 @pytest.mark.slow
-def test_summary_shows_what_its_cells_hold(browser, saved):
-    cell = browser.find_element("css selector", "[data-key='peak_displacement.radial']")
-    peak = Result.from_netcdf(saved).summary["peak_displacement"]["radial"]
-    assert float(cell.get_attribute("data-value")) == peak
-    assert cell.text == f"{peak * 1e3:.5g} mm"
-
-
-@pytest.mark.slow
 def test_keys_move_the_cursor_and_say_the_time(browser):
     from selenium.webdriver.common.keys import Keys
 

@@ -61,7 +61,7 @@ def test_flat_files_hold_every_quantity_to_the_last_digit(result, suffix, tmp_pa
 def test_csv_says_where_it_came_from_and_holds_a_scene_that_runs(result, tmp_path):
     lines = result.to_csv(tmp_path / "run.csv").read_text().splitlines()
     comments = [line[2:] for line in lines if line.startswith("#")]
-    assert lines[0].startswith("# fenz-test5, status ok; ") and lines[1].startswith("time [s],tilt_2_psi [rad],")
+    assert lines[0].startswith("# fenz-test5, status ok; ") and lines[1].startswith("time [s],normal_force_1 [N],")
     assert not any(line.startswith("#") for line in lines[1 : 2 + len(result.history.time)])
     assert "source: msfp-gen" in comments and "status: ok" in comments and "provenance_version: 0" in comments
     scene = "\n".join(comments[comments.index("scene:") + 1 :])
