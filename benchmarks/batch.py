@@ -17,7 +17,7 @@ from plain import plain_scene
 from quick import parser, pick
 
 from msfp_gen import Scene, simulate, simulate_batch
-from msfp_gen.buildings.load import changed_scene
+from msfp_gen.buildings.file import changed_scene
 from msfp_gen.common.cores import usable_cores
 
 STUDIES = {

@@ -18,7 +18,7 @@ from quick import installed, parser, pick
 
 from msfp_gen import Effects, Scene, simulate
 from msfp_gen.result import Result
-from msfp_gen.studies.accuracy.opensees import run_opensees
+from msfp_gen.studies.accuracy.models import run_opensees
 
 Array = NDArray[np.float64]
 FULL = Effects()

@@ -26,7 +26,7 @@ from quick import installed, parser, pick
 import msfp_gen
 from msfp_gen import simulate
 from msfp_gen.common.cores import usable_cores
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import fragility, load_study, read_study
 
 KILLS = pick(5, 2)

@@ -17,7 +17,7 @@ from quick import parser, pick
 from scipy.optimize import brentq
 
 from msfp_gen import Effects, Motion, RunError, Scene, Solver, Top, load_scene, presets, simulate
-from msfp_gen.results.geometry.shape import contact_offsets
+from msfp_gen.results.geometry import contact_offsets
 
 GRAVITY = 9.8
 SHAKE = 2 * np.pi * 2.0  # [rad/s]

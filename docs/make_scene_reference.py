@@ -12,14 +12,12 @@ from typing import Any
 
 from msfp_gen.buildings import file as buildings
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene
-from msfp_gen.buildings.soil import Soil
-from msfp_gen.buildings.storey import BaseSlab, Storey
+from msfp_gen.buildings.storey import BaseSlab, Soil, Storey
 from msfp_gen.common.fields import Choice, Quantity, Rule, ruled_fields
 from msfp_gen.motions.records import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables, schema
-from msfp_gen.scene.file.motion_tables import Components, Paths
-from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS, Components, Paths
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop

@@ -13,12 +13,12 @@ from msfp_gen.version import __version__
 if TYPE_CHECKING:
     from msfp_gen.analysis.any_result import characterise as characterise
     from msfp_gen.buildings.building import Building as Building
-    from msfp_gen.buildings.load import changed_scene as changed_scene
-    from msfp_gen.buildings.load import load_scene as load_scene
+    from msfp_gen.buildings.file import changed_scene as changed_scene
+    from msfp_gen.buildings.file import load_scene as load_scene
     from msfp_gen.buildings.scene import BuildingBearing as BuildingBearing
     from msfp_gen.buildings.scene import BuildingScene as BuildingScene
-    from msfp_gen.buildings.soil import Soil as Soil
     from msfp_gen.buildings.storey import BaseSlab as BaseSlab
+    from msfp_gen.buildings.storey import Soil as Soil
     from msfp_gen.buildings.storey import Storey as Storey
     from msfp_gen.coupling.two_port import TwoPort as TwoPort
     from msfp_gen.errors import CompileError as CompileError
@@ -73,7 +73,7 @@ _MODULES = {
     "Rotation": "motions.prescribed",
     "RunError": "errors",
     "Scene": "scene.scene",
-    "Soil": "buildings.soil",
+    "Soil": "buildings.storey",
     "Solver": "scene.solver",
     "Stop": "scene.scene_fields",
     "Storey": "buildings.storey",
@@ -82,10 +82,10 @@ _MODULES = {
     "TwoPort": "coupling.two_port",
     "bound": "studies.bounding",
     "build_model": "model.model",
-    "changed_scene": "buildings.load",
+    "changed_scene": "buildings.file",
     "characterise": "analysis.any_result",
     "fit": "studies.calibration",
-    "load_scene": "buildings.load",
+    "load_scene": "buildings.file",
     "presets": "scene.file.presets",
     "simulate": "simulation.run_any",
     "simulate_batch": "studies.batch",

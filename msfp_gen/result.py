@@ -7,8 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from msfp_gen.analysis.any_result import OneBearing, Rows
-from msfp_gen.analysis.summary import summarise, summarise_gradients
-from msfp_gen.analysis.tables import work_rows
+from msfp_gen.analysis.summary import summarise, summarise_gradients, time_row, work_rows
 from msfp_gen.results import dataset
 from msfp_gen.results.history import Counters, Event, History
 from msfp_gen.results.run_data import RunData
@@ -37,9 +36,7 @@ class Result(OneBearing, RunData):
 
     def main_results(self) -> Rows:
         """Label and value of the main results."""
-        steps, wall_time = self.counters.steps, self.counters.wall_time
-        time = f"{self.history.time[-1]:.6g} s in {steps} steps, {wall_time:.3g} s"
-        return [("time", time), *super().main_results()]
+        return [time_row(self.summary), *super().main_results()]
 
     def work_rows(self) -> Rows:
         """Label and value of its energy and of the work of the solver."""

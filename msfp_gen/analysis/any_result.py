@@ -12,8 +12,7 @@ import numpy as np
 
 from msfp_gen.analysis.characterise import Characterisation
 from msfp_gen.analysis.characterise import characterise as characterise_bearing
-from msfp_gen.analysis.summary import rows_of_bearing
-from msfp_gen.analysis.tables import surface_table, transition_table
+from msfp_gen.analysis.summary import rows_of_bearing, surface_table, transition_table
 from msfp_gen.analysis.verdict import Verdict, verdict_of
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table

@@ -32,10 +32,9 @@ from msfp_gen.results.variables import (
     labelled,
     stored_fields,
 )
-from msfp_gen.scene.file.loader import bearing_table, plain_table, toml_table
+from msfp_gen.scene.file.loader import bearing_table, dumps, plain_table, toml_table
 from msfp_gen.scene.file.stored_motion import GROUP as MOTION
 from msfp_gen.scene.file.stored_motion import PIECES, to_pieces
-from msfp_gen.scene.file.toml_text import dumps
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.solver import Solver
 

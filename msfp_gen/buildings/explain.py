@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msfp_gen.buildings.plausibility import building_doubts
+from msfp_gen.buildings.notes import building_doubts
 from msfp_gen.buildings.scene import BuildingScene, remaining_loads, standing_below
 from msfp_gen.common.fields import Choice, Quantity, ruled_fields
 from msfp_gen.common.tables import Table, vector, yes
@@ -27,7 +27,7 @@ from msfp_gen.scene.standing import unsteady
 from msfp_gen.specification.layout import Effects
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.motions.motion import Motion
     from msfp_gen.motions.prescribed import Prescribed
     from msfp_gen.scene.bearing import Bearing

@@ -1,16 +1,23 @@
-"""The notes of the run of a building: of the monitors of its bearings, of its values and of its energy balance."""
+"""The notes of a building: values that are hardly meant, its energy balance, those of the monitors of its bearings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
-from msfp_gen.buildings.plausibility import building_doubts
+import numpy as np
+
 from msfp_gen.buildings.scene import BuildingBearing, BuildingScene, standing_below
+from msfp_gen.common.arrays import Array
 from msfp_gen.results.note import RISING, Note
-from msfp_gen.scene.effect_selection import doubtful_values
+from msfp_gen.scene.effect_selection import LEAST_DAMPING, USUAL_DAMPING, doubtful_values, ringing
 from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import unsteady
+
+if TYPE_CHECKING:
+    from msfp_gen.buildings.building import Building
 
 ENERGY_LIMIT = 0.02  # error of the energy balance of the building over its largest term, above which a note is written
 GATHERED = ("heat", "law_speed", "law_load", "law_temperature")  # kinds
@@ -65,3 +72,142 @@ def value_notes(one: BuildingBearing, load: float) -> tuple[Note, ...]:
 def _energy(error: float, time: float) -> Iterator[Note]:
     if error > ENERGY_LIMIT:
         yield Note(time, "energy", 0, error, ENERGY.format(value=error))
+
+
+LIGHT = 0.005  # mass of a floor over the mean of all floors
+GYRATION = 1.0  # radius of gyration of a floor over the largest distance between two bearings
+SHARE = 0.1  # lateral acceleration over gravity, at which drifts are compared
+DRIFT = 0.05  # largest drift over the height of the storey
+HEIGHT = 20.0  # of a storey [m]
+OF_INTERFACES = 0.2  # share of the strain energy of a mode above which the interfaces can damp it
+SAG = 0.05  # of a bearing on the vertical spring of its interface at rest [m]
+
+
+class Floor(NamedTuple):
+    """A floor: mass [kg], centre of mass in plan, shape (2,) [m], and its radius of gyration about E3 [m]."""
+
+    mass: float
+    centre: Array
+    gyration: float
+
+
+def building_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+    """Values that are unlikely: 0 (no surface), the value, and the text of the doubt with the likely unit."""
+    yield from _floor_doubts(scene)
+    yield from _storey_doubts(scene.building, scene.gravity)
+    springs = np.array([one.interface.vertical_stiffness for one in scene.bearings])
+    sags = scene.axial_loads / springs
+    index = int(sags.argmax())
+    if sags[index] > SAG:
+        text = (
+            f"building.bearing[{index}].interface.vertical_stiffness = {springs[index]:g} N/m: the building settles by "
+            f"{sags[index]:.3g} m at rest; is it in N/m, not in kN/m?"
+        )
+        yield 0, float(springs[index]), text
+    yield from _undamped(scene)
+
+
+def floors(building: Building) -> list[Floor]:
+    """The floors of a shear frame, the base first; none where the building was given by matrices.
+
+    The columns of each storey state the inertia of all floors above it; a floor is the difference of two of them.
+    """
+    if not building.columns:
+        return []
+    motions = building.rigid_motions
+    groups = [_group(motions.T @ building.mass @ motions)]
+    groups += [_group(columns.inertia @ motions) for columns in building.columns]
+    of_frame = []
+    for (mass, centre, inertia), (above, centre_above, inertia_above) in pairwise([*groups, (0.0, np.zeros(2), 0.0)]):
+        own = mass - above
+        own_centre = (mass * centre - above * centre_above) / own
+        left = inertia - inertia_above
+        left -= own * np.sum((own_centre - centre) ** 2) + above * np.sum((centre_above - centre) ** 2)
+        of_frame.append(Floor(own, own_centre, float(np.sqrt(max(left, 0.0) / own))))
+    return of_frame
+
+
+def _group(inertia: Array) -> tuple[float, Array, float]:
+    """Mass, centre of mass in plan and moment of inertia about E3 through it, from the 6 x 6 inertia of rigid bodies.
+
+    The rows may be about any point, the columns are motions about the origin: a rotation about the centre of mass
+    needs no force, so its moment is the same about every point.
+    """
+    mass = float(inertia[0, 0])
+    x, y = inertia[1, 5] / mass, -inertia[0, 5] / mass
+    turning = inertia[:, 5] + y * inertia[:, 0] - x * inertia[:, 1]
+    return mass, np.array([x, y]), float(turning[5])
+
+
+def _path(index: int) -> str:
+    return "building.base" if index == 0 else f"building.storey[{index - 1}]"
+
+
+def _floor_doubts(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+    of_frame = floors(scene.building)
+    if not of_frame:
+        return
+    mean = float(np.mean([floor.mass for floor in of_frame]))
+    places = scene.places
+    widest = float(np.linalg.norm(places[:, None] - places, axis=-1).max())
+    for index, floor in enumerate(of_frame):
+        if floor.mass < LIGHT * mean:
+            text = f"{_path(index)}.mass = {floor.mass:g} kg is {floor.mass / mean:.2g} of the mean of all floors"
+            yield 0, floor.mass, f"{text}; is it in kg, not in t?"
+        elif widest > 0 and floor.gyration > GYRATION * widest:
+            text = (
+                f"{_path(index)}.inertia: about E3 the radius of gyration is {floor.gyration:.3g} m, the bearings are "
+                f"at most {widest:.3g} m apart; is it mass times radius squared [kg m^2]?"
+            )
+            yield 0, floor.gyration, text
+
+
+def _storey_doubts(building: Building, gravity: float) -> Iterator[tuple[int, float, str]]:
+    if not building.columns:
+        return
+    levels = [float(node.position[2]) for node in building.nodes]
+    drifts = _drifts(building, SHARE * gravity)
+    for index, (below, above) in enumerate(pairwise(levels)):
+        height = above - below
+        if height > HEIGHT:
+            yield 0, height, f"{_path(index + 1)}.height = {height:g} m is unusually high; is it in m, not in mm?"
+        elif drifts[index] > DRIFT * height:
+            text = (
+                f"{_path(index + 1)}.stiffness: under {SHARE:g} g the storey drifts by {drifts[index] / height:.0%} of "
+                "its height; is it in N/m, not in kN/m?"
+            )
+            yield 0, float(drifts[index]), text
+
+
+def _drifts(building: Building, acceleration: float) -> Array:
+    """Largest drift of every storey on a fixed base under a lateral acceleration along E1 or E2 [m].
+
+    ndarray, shape (storeys,).
+    """
+    fixed = building.fixed
+    rows = np.stack([columns.deformation[:2] for columns in building.columns])[..., fixed.inner]
+    forces = [building.uniform_acceleration(acceleration * axis)[fixed.inner] for axis in np.eye(3)[:2]]
+    bent = fixed.modes @ (fixed.modes.T @ np.transpose(forces) / fixed.frequencies[:, None] ** 2)
+    drifts: Array = np.linalg.norm(rows @ bent, axis=1).max(axis=1)
+    return drifts
+
+
+def _undamped(scene: BuildingScene) -> Iterator[tuple[int, float, str]]:
+    """A doubt where a mode that the interfaces could damp has less than `LEAST_DAMPING` of critical damping.
+
+    Yields 0 (no surface), the least damping ratio and the text with the damping that cures it.
+    """
+    modes = scene.vertical_modes
+    on_springs = modes.shares > OF_INTERFACES
+    if not on_springs.any():
+        return
+    turns = np.sqrt(modes.squares[on_springs])
+    ratios = modes.rates[on_springs] / (2 * turns)
+    least, interface = int(ratios.argmin()), scene.bearings[0].interface
+    if ratios[least] < LEAST_DAMPING:
+        missing = 2 * (USUAL_DAMPING - ratios) / (turns * modes.shares[on_springs])  # damping over stiffness [s]
+        given = interface.vertical_damping
+        cure = given + float(missing.max()) * interface.vertical_stiffness
+        what = "the building vibrates on the vertical springs of its interfaces"
+        name = "building.interface.vertical_damping"
+        yield 0, float(ratios[least]), ringing(name, given, what, turns[least], ratios[least], cure)

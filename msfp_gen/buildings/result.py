@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from msfp_gen.analysis.any_result import AnyResult, Curve, OneBearing, Rows
-from msfp_gen.analysis.summary import summary_of_bearing
+from msfp_gen.analysis.summary import summary_of_bearing, time_row
 from msfp_gen.buildings import dataset as building_dataset
 from msfp_gen.buildings import summary as summaries
-from msfp_gen.buildings.characterise import BuildingCharacterisation
 from msfp_gen.buildings.extremes import CONTACT, OF_SURFACES, BuildingExtremes, corners, heated, overturning
 from msfp_gen.buildings.notes import notes_of
 from msfp_gen.buildings.scene import BuildingScene
+from msfp_gen.buildings.summary import BuildingCharacterisation
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
@@ -229,7 +229,7 @@ class BuildingResult(AnyResult):
         moved, force, acceleration = s["peak_displacement"], s["peak_force"], s["peak_floor_acceleration"]
         drift = "" if s["peak_drift_ratio"] is None else f", drift {100 * s['peak_drift_ratio']:.3g} % of the height"
         return [
-            ("time", f"{self.time[-1]:.6g} s in {self.counters['steps']} steps, {self.wall_time:.3g} s"),
+            time_row(s),
             ("bearings", f"{len(self.bearings)}, peak displacement {1e3 * moved['radial']:.4g} mm"),
             ("base shear", f"{1e-6 * force['radial']:.4g} MN ({s['peak_force_ratio']:.3f} of the weight)"),
             (

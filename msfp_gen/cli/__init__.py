@@ -13,9 +13,7 @@ from msfp_gen.cli import (
     bench_commands,
     export_commands,
     figure_commands,
-    fit_commands,
     model_commands,
-    page_commands,
     record_commands,
     run_commands,
     study_commands,
@@ -39,7 +37,7 @@ app = typer.Typer(
 # This order is the order of the commands in the help text.
 for group in (
     run_commands, batch_commands, study_commands, export_commands, figure_commands, assessment_commands,
-    fit_commands, bench_commands, page_commands, record_commands, model_commands,
+    bench_commands, record_commands, model_commands,
 ):  # fmt: skip
     app.add_typer(group.app)
 

@@ -8,11 +8,22 @@ from typing import Annotated
 
 import typer
 
-from msfp_gen.cli.console import SignOption, building, note, say, scenes, show, whole_number, with_effects
-from msfp_gen.cli.inputs import load_source, of_building, result_of
+from msfp_gen.cli.console import (
+    SignOption,
+    building,
+    load_source,
+    note,
+    of_building,
+    result_of,
+    say,
+    scenes,
+    show,
+    whole_number,
+    with_effects,
+)
 from msfp_gen.common.output import check_output
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.jit.platforms import TARGETS
+from msfp_gen.jit.library import TARGETS
 from msfp_gen.results.sign import DEFAULT, sign_of
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -140,7 +151,7 @@ def fmu(
     ] = "cs",
 ) -> None:
     """Write a bearing as a unit (FMU) for Co-Simulation: a rig takes motion and gives wrenches, a mass takes forces."""
-    from msfp_gen.buildings.load import load_bearing_scene
+    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.common.tables import Table
     from msfp_gen.fmu import write_fmu
 
@@ -178,7 +189,7 @@ def serve(
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
 ) -> None:
     """Serve bearings to `element genericClient` of OpenSees: every element is a bearing of its own."""
-    from msfp_gen.buildings.load import load_bearing_scene
+    from msfp_gen.buildings.file import load_bearing_scene
     from msfp_gen.coupling.server import Server
     from msfp_gen.coupling.two_port import TwoPort
 

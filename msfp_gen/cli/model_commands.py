@@ -12,7 +12,7 @@ from msfp_gen.errors import InputError
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 if TYPE_CHECKING:
-    from msfp_gen.jit.pruning import CachedModel
+    from msfp_gen.jit.cache import CachedModel
 
 app = typer.Typer()
 
@@ -54,7 +54,7 @@ def generate(
 def explain(scene: SceneName) -> None:
     """Describe a scene: bearing, motion, top, or building; what is modelled and how it is solved."""
     from msfp_gen.buildings.explain import explain as describe
-    from msfp_gen.buildings.load import load_scene
+    from msfp_gen.buildings.file import load_scene
 
     show(describe(load_scene(scene)))
 
@@ -93,15 +93,15 @@ def cache(
     ] = False,
 ) -> None:
     """List the compiled models, their size and last use; remove old ones."""
-    from msfp_gen.jit import pruning
+    from msfp_gen.jit import cache
 
     if clear and prune is not None:
         raise InputError(f"--prune = {prune:g}: --clear removes everything; give one of them")
     if not clear and prune is None:
-        _list(pruning.cached_models())
+        _list(cache.cached_models())
         return
-    removed, held = pruning.prune(0.0 if clear or prune is None else prune)
-    say(f"removed {_count(removed)}, {_megabytes(pruning.total(removed))}")
+    removed, held = cache.prune(0.0 if clear or prune is None else prune)
+    say(f"removed {_count(removed)}, {_megabytes(cache.total(removed))}")
     if held:
         say(f"kept {_count(held)} in use by another process")
 
@@ -109,8 +109,7 @@ def cache(
 def _list(items: list[CachedModel]) -> None:
     """Print one row per model of this version, and one row per kind of other entries."""
     from msfp_gen.common.tables import Table
-    from msfp_gen.jit.cache import cache_root
-    from msfp_gen.jit.pruning import total
+    from msfp_gen.jit.cache import cache_root, total
 
     rows = [
         (item.spec, item.state, _megabytes(item.size), f"{item.days:.1f}") for item in items if item.state == "current"

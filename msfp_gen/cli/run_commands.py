@@ -15,24 +15,27 @@ from msfp_gen.cli.console import (
     Output,
     Progress,
     SceneName,
+    build,
     choices_of,
+    figures_of,
     note,
     note_exceeded,
     note_written,
     number,
+    one_bearing,
     parser_of,
+    run_scene,
     say,
     show,
 )
-from msfp_gen.cli.inputs import build, figures_of, one_bearing, run_scene
 from msfp_gen.common.output import DATASET_SUFFIXES, FIGURE_SUFFIXES, check_output
 from msfp_gen.common.quantities import to_si
 from msfp_gen.errors import InputError, RunError
 from msfp_gen.scene.solver import Solver
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.load import AnyScene
-    from msfp_gen.cli.inputs import AnyResult
+    from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.cli.console import AnyResult
     from msfp_gen.scene.scene import Scene
     from msfp_gen.studies.accuracy.error_target import Within
 
@@ -228,7 +231,7 @@ def run(
         raise InputError("--stream: rows go to a netCDF file; give --output FILE.nc")
     if plot is not None:
         check_output(plot, FIGURE_SUFFIXES, "--plot")
-    from msfp_gen.buildings.load import load_scene
+    from msfp_gen.buildings.file import load_scene
 
     chosen = _with_options(load_scene(scene), duration, method=method, rtol=rtol, max_step=max_step)
     note_written(_run(chosen, output, plot, as_json, checkpoints, target, strict, stream))
@@ -241,7 +244,7 @@ def demo(
     ),
 ) -> None:
     """Run an earthquake and a laboratory test; write figures and data."""
-    from msfp_gen.buildings.load import load_scene
+    from msfp_gen.buildings.file import load_scene
     from msfp_gen.common.output import make_folder
 
     scenes = [load_scene(name) for name in DEMO]

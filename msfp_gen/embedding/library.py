@@ -1,24 +1,28 @@
-"""The C library of `msfp-gen export`: headers, libraries, package files, sources and examples below a prefix."""
+"""The C library of `export`: its folder, its example and headers from templates; the README of a generated folder."""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from msfp_gen.common.output import write_bytes
 from msfp_gen.embedding import values
-from msfp_gen.embedding.rendering import render
-from msfp_gen.embedding.tree import Link, Tree, check_prefix, install
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.generator.interface import ABI_VERSION, CALL_ERRORS, effects_text, model_name, surface_values
+from msfp_gen.jit.build import ENTRY
 from msfp_gen.jit.compiler import FLAGS
-from msfp_gen.jit.library import STATIC, BuiltLibrary, build_library
-from msfp_gen.jit.platforms import Platform, find_platform
-from msfp_gen.specification import contract
+from msfp_gen.jit.library import STATIC, BuiltLibrary, Platform, build_library, find_platform
+from msfp_gen.specification import contract, rows
 from msfp_gen.specification.layout import ModelSpec
 from msfp_gen.version import __version__
 
@@ -58,7 +62,7 @@ def export_library(
     """Build the models of `specs` and write the C library with all that its users need below `prefix`.
 
     progress: called with a text and the completed share, 0 to 1. target: the platform, a key of
-    `msfp_gen.jit.platforms.TARGETS`; None: that of this machine. Raises InputError: two models of one layout, an
+    `msfp_gen.jit.library.TARGETS`; None: that of this machine. Raises InputError: two models of one layout, an
     unknown target, a prefix that is no folder or holds files of the user under these names; CompileError. Nothing is
     written after an error.
     """
@@ -92,8 +96,8 @@ def _tree(models: dict[str, ModelSpec], built: BuiltLibrary, platform: Platform,
     pages = PAGES | (PORT_PAGES if content["port"] else {})
     texts = {path: render(name, content) for name, path in pages.items()}
     texts |= {f"include/{name}": text for name, text in built.public.items()}
-    for model, files in built.sources.items():
-        texts |= {f"{SHARE}/src/{model}/{name}": text for name, text in files.items()}
+    for model, sources in built.sources.items():
+        texts |= {f"{SHARE}/src/{model}/{name}": text for name, text in sources.items()}
     tree: Tree = {path: text.encode() for path, text in texts.items()}
     tree |= {f"lib/{STATIC}": built.static.read_bytes(), platform.shared: built.shared.read_bytes()}
     imports = built.imports.read_bytes() if built.imports is not None else Link(built.shared.name)
@@ -140,3 +144,188 @@ def _has_ports(spec: ModelSpec) -> bool:
     effects = spec.effects
     spatial = effects.dimension == "spatial" and effects.spin == "locked"
     return spatial and effects.top_rotation and not effects.uplift
+
+
+def render(name: str, content: dict[str, Any], package: str = __package__) -> str:
+    """Text of the template `assets/<name>.jinja` of a package; a name that `content` lacks is an error."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+        block_start_string="[%", block_end_string="%]", variable_start_string="[[", variable_end_string="]]",
+        comment_start_string="[#", comment_end_string="#]",
+    )  # fmt: skip
+    environment.filters["c"] = _number
+    environment.filters["fortran"] = _fortran_number
+    environment.filters["fortran_list"] = _fortran_list
+    text = files(package).joinpath("assets", f"{name}.jinja").read_text(encoding="utf-8")
+    return environment.from_string(text).render(content)
+
+
+def _number(value: float) -> str:
+    """A number as C and Fortran read it: with a point or an exponent."""
+    text = repr(float(value))
+    return text.replace("e+0", "e").replace("e-0", "e-")
+
+
+def _fortran_number(value: float) -> str:
+    """A number of double precision."""
+    text = _number(value)
+    return text.replace("e", "d") if "e" in text else f"{text}d0"
+
+
+def _fortran_list(values: Iterable[float]) -> str:
+    """An array constructor, eight numbers on a line."""
+    texts = [_fortran_number(value) for value in values]
+    lines = [", ".join(texts[i : i + 8]) for i in range(0, len(texts), 8)]
+    return "[real(c_double) :: " + ", &\n         ".join(lines) + "]"
+
+
+MANIFEST = "share/msfp/manifest.json"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A symbolic link to a file in the same folder."""
+
+    to: str
+
+
+Tree = dict[str, bytes | Link]  # path below the prefix -> content
+
+
+def check_prefix(prefix: Path) -> None:
+    """Raise InputError if `prefix` is a file, cannot be written to, or has a damaged manifest."""
+    existing = next(path for path in (prefix, *prefix.parents) if path.exists())
+    if not existing.is_dir():
+        raise InputError(f"--prefix = {str(prefix)!r}: {existing} is a file; give a folder")
+    if not os.access(existing, os.W_OK):
+        raise InputError(f"--prefix = {str(prefix)!r}: {existing} cannot be written to; give another folder")
+    _written(prefix)
+
+
+def install(tree: Tree, prefix: Path) -> None:
+    """Write the files below `prefix`, each in one rename, and delete what only an earlier export wrote.
+
+    Raises InputError, and writes nothing, where a file of the user has the name of one of them.
+    """
+    written = _written(prefix)
+    digests = {name: _digest_of(content) for name, content in tree.items()}
+    for name, digest in digests.items():
+        if (present := _digest_at(prefix / name)) is not None and present not in (digest, *written.get(name, ())):
+            raise InputError(
+                f"--prefix = {str(prefix)!r}: {name} is not as msfp-gen wrote it: move it away or give another folder"
+            )
+    # While files are replaced the old and the new ones are ours, so that an export that was stopped can be repeated.
+    names = sorted({*written, *digests})
+    _write_manifest(prefix, {name: [*written.get(name, ()), *filter(None, [digests.get(name)])] for name in names})
+    for name, content in tree.items():
+        _put(prefix / name, content)
+    for name in set(written) - set(tree):
+        if _digest_at(prefix / name) in written[name]:
+            _remove(prefix, name)
+    _write_manifest(prefix, {name: [digest] for name, digest in sorted(digests.items())})
+
+
+def _written(prefix: Path) -> dict[str, list[str]]:
+    """Files that msfp-gen wrote below a prefix, with their digests; of none where there is no manifest."""
+    path = prefix / MANIFEST
+    try:
+        files = dict(json.loads(path.read_text(encoding="utf-8"))["files"])
+        if all(_inside(name) and isinstance(digests, list) for name, digests in files.items()):
+            return files
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        pass
+    raise InputError(
+        f"--prefix = {str(prefix)!r}: {MANIFEST} is damaged; give another folder, or delete it with its files"
+    )
+
+
+def _inside(name: str) -> bool:
+    """Whether a path of a manifest stays below the prefix."""
+    path = Path(name)
+    return not path.is_absolute() and ".." not in path.parts
+
+
+def _write_manifest(prefix: Path, files: dict[str, list[str]]) -> None:
+    path = prefix / MANIFEST
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, [json.dumps({"files": files}, indent=1).encode() + b"\n"])
+
+
+def _digest_of(content: bytes | Link) -> str:
+    return f"link to {content.to}" if isinstance(content, Link) else hashlib.sha256(content).hexdigest()
+
+
+def _digest_at(path: Path) -> str | None:
+    """Digest of what lies at a path; None where there is nothing."""
+    if path.is_symlink():
+        return f"link to {path.readlink()}"
+    if not path.exists():
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "no file"
+
+
+def _put(path: Path, content: bytes | Link) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(content, bytes):
+        write_bytes(path, [content])
+    elif _digest_at(path) != _digest_of(content):
+        path.unlink(missing_ok=True)
+        path.symlink_to(content.to)
+
+
+def _remove(prefix: Path, name: str) -> None:
+    """Delete a file, and the folders that are then empty."""
+    (prefix / name).unlink()
+    with suppress(OSError):  # not empty
+        for parent in Path(name).parents[:-1]:
+            (prefix / parent).rmdir()
+
+
+README = "README.md"
+STAMP = "written by msfp-gen"  # in the first line: a file without it belongs to the user
+
+
+def check_guide(folder: Path) -> None:
+    """Raise InputError where `folder` has a README.md that msfp-gen did not write."""
+    path = folder / README
+    if path.exists() and STAMP not in _first_line(path):
+        raise InputError(
+            f"output folder {folder}: msfp-gen did not write {README}: move it away or name another folder"
+        )
+
+
+def write_guide(spec: ModelSpec, folder: Path, module: str) -> Path:
+    """Write README.md into a folder of generated sources; returns its path.
+
+    module: name of the Python module in the folder. Raises InputError as `check_guide`.
+    """
+    check_guide(folder)
+    write_bytes(folder / README, [render("generated.md", _guide_content(spec, folder, module)).encode()])
+    return folder / README
+
+
+def _guide_content(spec: ModelSpec, folder: Path, module: str) -> dict[str, Any]:
+    return {
+        "stamp": f"{STAMP} {__version__} for {spec.key}",
+        "spec": spec,
+        "effects": effects_text(spec),
+        "module": module,
+        "sources": sorted(path.name for path in folder.glob("*.c") if path.name != ENTRY),
+        "private": sorted({path.name for path in folder.glob("*.h")} - {"msfp.h", f"{module}.h"}),
+        "body": contract.BODY,
+        "surface": surface_values(spec),
+        "top": contract.TOP,
+        "row": rows.row(spec.effects),
+        "works": contract.WORKS,
+        "kinds": contract.EVENT_KINDS,
+        "statuses": [status for status in contract.STATUSES if status.compiled],
+    }
+
+
+def _first_line(path: Path) -> str:
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return file.readline()

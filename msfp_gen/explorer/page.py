@@ -23,8 +23,8 @@ from msfp_gen.figures.style import COLOURS
 from msfp_gen.jit.build import runtime_sources
 from msfp_gen.jit.compiler import FLAGS, Log, Step, zig_program
 from msfp_gen.model.model import Model
+from msfp_gen.report.content import script_data
 from msfp_gen.report.frames import pieces
-from msfp_gen.report.template import script_data
 from msfp_gen.scene.top import RigTop
 from msfp_gen.simulation.segment import start_run
 from msfp_gen.specification import contract, rows

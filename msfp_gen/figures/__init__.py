@@ -9,6 +9,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msfp_gen.figures.bearing import (
+    moving_axes,
+    plot_energy,
+    plot_force_path,
+    plot_loops,
+    plot_orbit,
+    plot_result,
+    plot_sliding,
+    plot_stages,
+)
 from msfp_gen.figures.building import (
     plot_axial_forces,
     plot_building,
@@ -16,14 +26,9 @@ from msfp_gen.figures.building import (
     plot_plan,
     plot_profile,
 )
-from msfp_gen.figures.energy import plot_energy
-from msfp_gen.figures.force_path import plot_force_path
-from msfp_gen.figures.loops import moving_axes, plot_loops, plot_orbit
 from msfp_gen.figures.movie import MOVIE_SUFFIXES, animate, check_movie
-from msfp_gen.figures.overview import plot_result
 from msfp_gen.figures.records import plot_correction, plot_response_spectrum
 from msfp_gen.figures.section import plot_section
-from msfp_gen.figures.sliding import plot_sliding, plot_stages
 from msfp_gen.figures.style import (
     COLOURS,
     FAINT,

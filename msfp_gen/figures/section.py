@@ -24,9 +24,9 @@ from msfp_gen.figures.style import (
     page,
     subscript,
 )
-from msfp_gen.results.geometry.section import Section, sections
-from msfp_gen.results.geometry.shape import friction_circles as circle_radii
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.geometry import Section, sections
+from msfp_gen.results.geometry import friction_circles as circle_radii
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.results.sliding import rims_in_contact, separated, sliding_surfaces
 

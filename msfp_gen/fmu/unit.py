@@ -19,7 +19,7 @@ from typing import Any
 
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.coupling.two_port import REST, check_parts, parts_of_rig, scene_at_rest
-from msfp_gen.embedding.rendering import render
+from msfp_gen.embedding.library import render
 from msfp_gen.errors import CompileError, InputError
 from msfp_gen.fmu.description import Unit, build_description, model_description
 from msfp_gen.fmu.variables import Block, Variable, top_names, variables

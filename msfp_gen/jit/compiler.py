@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import platform
 import re
 import shlex
 import shutil
@@ -183,7 +184,7 @@ def compile_extension(
     progress
         Called with the number of compiled C files and the number of all.
     processor
-        Flags of the C files that select a processor; see `msfp_gen.jit.processor`.
+        Flags of the C files that select a processor; see `msfp_gen.jit.compiler`.
     libraries
         Options of the linker beside those of every extension.
     kept
@@ -340,3 +341,42 @@ def _version(command: Sequence[str]) -> str:
     except OSError:  # a file that is no program
         return ""
     return done.stdout.partition("\n")[0].strip() if done.returncode == 0 else ""
+
+
+CPUINFO = Path("/proc/cpuinfo")
+# Level of x86-64 -> the flags that Linux reports for what it adds to the level below (x86-64 psABI, table 3.1).
+LEVELS = {
+    2: "cx16 lahf_lm popcnt pni sse4_1 sse4_2 ssse3",
+    3: "abm avx avx2 bmi1 bmi2 f16c fma movbe xsave",
+    4: "avx512bw avx512cd avx512dq avx512f avx512vl",
+}
+
+
+def x86_64_level() -> int | None:
+    """Level of this processor, 1 to 4; None if it is not an x86-64 or does not say."""
+    if platform.machine() != "x86_64":
+        return None
+    try:
+        lines = CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return None
+    flags = next((set(line.partition(":")[2].split()) for line in lines if line.startswith("flags")), None)
+    if flags is None:
+        return None
+    reached = 1
+    for level, needed in LEVELS.items():
+        if not flags.issuperset(needed.split()):
+            break
+        reached = level
+    return reached
+
+
+def processor_flags(user: Sequence[str] = ()) -> tuple[str, ...]:
+    """Flags with which C code is compiled for this processor alone.
+
+    None where the processor is not known, or where `user`, the user's own flags, select one, as -march=native does.
+    """
+    level = x86_64_level()
+    if level is None or any(flag.startswith("-m") for flag in user):
+        return ()
+    return (f"-DMSFP_X86_64_LEVEL={level}",)

@@ -14,8 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from msfp_gen.jit import cache
-from msfp_gen.jit.compiler import CFLAGS, COMPILER, words
-from msfp_gen.jit.processor import x86_64_level
+from msfp_gen.jit.compiler import CFLAGS, COMPILER, words, x86_64_level
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
 SUFFIX = ".abi3.so"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msfp_gen.figures.frame import DEPTH, height_of, level_of, plan_of, size_of
+from msfp_gen.figures.building import DEPTH, height_of, level_of, plan_of, size_of
 from msfp_gen.report.content import TERMS as BEARING_TERMS
 from msfp_gen.report.frames import FEWEST, packed
 from msfp_gen.version import __version__

@@ -9,8 +9,7 @@ import numpy as np
 
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.common.tables import Table
-from msfp_gen.report.content import KILO, MILLI
-from msfp_gen.report.template import picture, render
+from msfp_gen.report.content import KILO, MILLI, picture, render
 from msfp_gen.studies.calibration.fit_result import correlation_table, estimate_table, residual_table
 from msfp_gen.studies.calibration.intervals import lag_one
 from msfp_gen.version import __version__
@@ -55,7 +54,7 @@ def fit_html(fit: Fit) -> str:
     """The page of a fit as text."""
     from msfp_gen.buildings.explain import explain
     from msfp_gen.scene.file.loader import scene_text
-    from msfp_gen.studies.calibration.figure import plot_fit, plot_residuals
+    from msfp_gen.studies.calibration.fit_result import plot_fit, plot_residuals
 
     limits = {"What the tests do not tell": fit.unidentified, "Notes": fit.notes}
     return render(

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from msfp_gen.common.arrays import Array
 from msfp_gen.figures import COLOURS
-from msfp_gen.results.geometry.outline import POINTS, outline
-from msfp_gen.results.geometry.shape import Poses, friction_circles, poses
+from msfp_gen.results.geometry import POINTS, Poses, friction_circles, outline, poses
 from msfp_gen.results.history import History
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.sliding import separated, sliding_surfaces
 
 if TYPE_CHECKING:

@@ -12,15 +12,18 @@ from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.report.content import (
     TERMS,
     TitleBlock,
+    asset,
     characterisation_page,
     kind_of,
     note_tables,
     outcome,
+    picture,
     provenance_table,
+    render,
+    script_data,
     summary_page,
 )
 from msfp_gen.report.frames import FRAMES, view
-from msfp_gen.report.template import asset, picture, render, script_data
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:

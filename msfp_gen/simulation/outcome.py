@@ -11,19 +11,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msfp_gen.results.extremes import Extremes
-from msfp_gen.results.note import monitor_notes
+from msfp_gen.results.geometry import contact_offsets
+from msfp_gen.results.note import Note, monitor_notes
+from msfp_gen.results.sliding import intervals, sliding_surfaces
+from msfp_gen.scene.effect_selection import rigid_mass_limit, scene_doubts
 from msfp_gen.scene.effect_switching import JAM_STATUSES
+from msfp_gen.scene.fidelity import UNSEEN
 from msfp_gen.scene.standing import MARGIN, standing_of
 from msfp_gen.scene.top import MassTop, RigTop
 from msfp_gen.specification.contract import STATUSES
+from msfp_gen.specification.hysteresis import is_plastic
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
     from msfp_gen.model.compiled import Run
     from msfp_gen.model.model import Model
+    from msfp_gen.results.history import Event, History
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.simulation.segment import Segment
+    from msfp_gen.specification.layout import Effects
 
 
 def message_of(scene: Scene, segment: Segment) -> str:
@@ -112,3 +119,149 @@ def _state(scene: Scene, model: Model, run: Run) -> str:
         text += f"; the top plate has tilted by {top:.2g} rad: give it a rotational_stiffness of several times "
         text += f"{standing[2]:.4g} N m/rad, with which it stands at rest"
     return text
+
+
+ENERGY_LIMIT = 0.02  # error of the energy closure, over the largest term, above which a note is written
+DAMPING_LIMIT = 0.01  # energy dissipated by contact damping, over that dissipated by friction, likewise
+FOOTPRINT_LOAD = 0.05  # N over its median above which the contact position is checked against the face of the slider
+LANDINGS, LANDING_TIME = 20, 0.1  # landings of a surface within a time [s] above which a note is written
+TOLERANCE_LIMIT = 0.05  # force of the top's spring at the tolerance of angles, over the peak force, likewise
+CREEP_TIME = 10.0  # time stuck off the centre [s] after which creep is looked for
+CREEP_SHARE = 0.01  # creep over the peak displacement above which a note is written
+TEXTS = {
+    "peak": "the normal force of surface {surface} rises to {value:.4g} N: mass and contacts are rigid, such peaks do "
+    "not converge; give vertical_stiffness",
+    "energy": "the energy closure has an error of {value:.1%} of the largest energy: vibrations are not resolved; "
+    "give a smaller solver.rtol",
+    "tolerance": "the tolerance of angles is {value:.3g} N in the spring of the top, {share:.2g} of the peak force: "
+    "vibrations after a change of the load may be filtered; give a smaller solver.rtol",
+    "damping": "contact damping dissipates {value:.1%} of what friction does: it changes sliding itself; "
+    "give a smaller contact_damping",
+    "creep": "the displacement that remains may be wrong by {value:.3g} m or more, by which the bearing moved while no "
+    "surface slid: Bouc-Wen friction creeps under small cycles; give effects.bouc_wen = 'plastic'",
+    "footprint": "the normal force of surface {surface} acts {value:.3g} m from the axis of its slider, outside the "
+    "face: a real slider would tip; give effects.uplift = true",
+    "rattle": "surface {surface} landed {value:d} times: loose sliders rattle, and their path depends on every "
+    "disturbance; compare a smaller solver.rtol, or give the seat_damping of the device",
+}
+
+
+def history_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """The notes that follow from the rows of a whole run; `effects`: of its last segment."""
+    unseen = (Note(0.0, "fidelity", 0, 0.0, UNSEEN[scene.fidelity]),) if scene.fidelity in UNSEEN else ()
+    doubted = () if scene.fidelity == "equivalent" else scene_doubts(scene)
+    doubts = unseen + tuple(Note(0.0, "value", *doubt) for doubt in doubted)
+    physics = footprint_notes(scene, effects, history) + creep_notes(scene, effects, history)
+    physics += peak_notes(scene, effects, history)
+    numerics = energy_notes(scene, history) + tolerance_notes(scene, effects, history)
+    return doubts + numerics + damping_notes(scene, history) + physics
+
+
+def damping_notes(scene: Scene, history: History) -> tuple[Note, ...]:
+    """A note where contact damping dissipates more than `DAMPING_LIMIT` of what friction dissipates.
+
+    A run that hardly slides, by less than ten times the yield displacements, gets none.
+    """
+    damped, lost = (float(history.energy[f"{name}_dissipated"][-1]) for name in ("contact", "friction"))
+    normal = np.median(history.normal_force, axis=0)
+    elastic = [s.friction * s.yield_displacement for s in scene.bearing.surfaces]
+    if lost < 10 * float(normal @ np.array(elastic)) or not damped > DAMPING_LIMIT * lost:
+        return ()
+    share = damped / lost
+    return (Note(float(history.time[-1]), "damping", 0, share, TEXTS["damping"].format(value=share)),)
+
+
+def tolerance_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where a lateral load excites vibrations through a spring so stiff that the tolerance hides their force.
+
+    An L-stable method filters vibrations that are smaller than its tolerance. Massless sliders do not vibrate.
+    """
+    filtered = scene.solver.method != "dopri5" and effects.sliders == "inertial"
+    if scene.load is None or not filtered or not scene.load.coefficients[:, :2].any():
+        return ()
+    radius = max(surface.radius for surface in scene.bearing.surfaces)
+    force = getattr(scene.top, "stiffness", 0.0) * scene.solver.angle_tolerance * radius
+    across = np.hypot(history.top_force[:, 0], history.top_force[:, 1])
+    row = int(across.argmax())
+    if not force > TOLERANCE_LIMIT * across[row] > 0:
+        return ()
+    text = TEXTS["tolerance"].format(value=force, share=force / across[row])
+    return (Note(float(history.time[row]), "tolerance", 0, force, text),)
+
+
+def peak_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where N under a rigid mass exceeds `rigid_mass_limit`."""
+    limit = rigid_mass_limit(scene)
+    row, surface = np.unravel_index(int(history.normal_force.argmax()), history.normal_force.shape)
+    peak = float(history.normal_force[row, surface])
+    if effects.uplift or not 0 < limit < peak:
+        return ()
+    text = TEXTS["peak"].format(surface=surface + 1, value=peak)
+    return (Note(float(history.time[row]), "peak", int(surface) + 1, peak, text),)
+
+
+def landing_notes(events: tuple[Event, ...]) -> tuple[Note, ...]:
+    """A note for each surface that landed more than `LANDINGS` times within `LANDING_TIME`: it rattles."""
+    notes = []
+    for surface in sorted({event.surface for event in events if event.kind == "landing"}):
+        times = np.array([event.time for event in events if event.kind == "landing" and event.surface == surface])
+        if (times[LANDINGS:] - times[:-LANDINGS] < LANDING_TIME).any():
+            text = TEXTS["rattle"].format(surface=surface, value=len(times))
+            notes.append(Note(float(times[0]), "rattle", surface, float(len(times)), text))
+    return tuple(notes)
+
+
+def footprint_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note for each surface whose contact point (3.14) leaves the face of its slider, which then would tip.
+
+    With uplift the slider stands on its edge instead (docs/uplift.md). Without a `rim_radius` no face is known.
+    """
+    if effects.uplift:
+        return ()
+    bearing, notes = scene.bearing, []
+    loaded = history.normal_force > FOOTPRINT_LOAD * np.median(history.normal_force, axis=0)
+    offsets = np.where(loaded, contact_offsets(bearing, history), 0.0)
+    faces = bearing.arrays()["rim_radius"][[bearing.slider(j) for j in range(history.surfaces)]]
+    for j in np.flatnonzero((offsets.max(axis=0) > faces) & (faces > 0)):
+        row, surface = int(offsets[:, j].argmax()), int(j) + 1
+        text = TEXTS["footprint"].format(surface=surface, value=offsets[row, j])
+        notes.append(Note(float(history.time[row]), "footprint", surface, float(offsets[row, j]), text))
+    return tuple(notes)
+
+
+def creep_notes(scene: Scene, effects: Effects, history: History) -> tuple[Note, ...]:
+    """A note where a bearing with a Bouc-Wen law was stuck off its centre for long and moved nevertheless.
+
+    Stuck surfaces deform by up to twice their yield displacements, each time they stick; movement beyond that is creep.
+    """
+    across = np.linalg.norm(history.displacement[:, :2], axis=1)
+    off_centre = across > max(CREEP_SHARE * float(across.max()), 1e-12)
+    stuck = intervals(history.time, off_centre & ~sliding_surfaces(history).any(axis=1))
+    long = [(start, start + length) for start, length in stuck if length > 1.0]
+    if is_plastic(effects.bouc_wen) or sum(end - start for start, end in long) < CREEP_TIME:
+        return ()
+    moves = [float(np.abs(np.diff(np.interp(pair, history.time, across)))[0]) for pair in long]
+    elastic = 2 * sum(surface.yield_displacement for surface in scene.bearing.surfaces)
+    moved = sum(move for move in moves if move > elastic)
+    if moved <= CREEP_SHARE * float(across.max()):
+        return ()
+    return (Note(long[0][0], "creep", 0, moved, TEXTS["creep"].format(value=moved)),)
+
+
+def energy_notes(scene: Scene, history: History) -> tuple[Note, ...]:
+    """A note where the error of the energy closure exceeds `ENERGY_LIMIT` of the largest term.
+
+    One of the terms is the work of the vertical load along the spherical surfaces, which the input contains only as a
+    difference. The limit is raised by the work of friction over the tolerance of angles, which no run can resolve.
+    """
+    energy, surfaces = history.energy, scene.bearing.surfaces
+    terms = [float(np.abs(values).max()) for name, values in energy.items() if name != "numerical"]
+    height = sum(float(s.max()) ** 2 / (2 * x.radius) for s, x in zip(history.sliding.T, surfaces, strict=True))
+    unresolved_slip = 3 * scene.solver.angle_tolerance * max(x.friction * x.radius for x in surfaces)
+    unresolved = float(history.normal_force.max()) * unresolved_slip
+    scale = max(*terms, float(np.median(history.normal_force)) * height) + unresolved / ENERGY_LIMIT
+    row = int(np.abs(energy["numerical"]).argmax())
+    error = abs(float(energy["numerical"][row])) / scale if scale else 0.0
+    if not error > ENERGY_LIMIT:
+        return ()
+    return (Note(float(history.time[row]), "energy", 0, error, TEXTS["energy"].format(value=error)),)

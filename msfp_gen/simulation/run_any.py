@@ -13,7 +13,7 @@ from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.errors import InputError, RunError
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation import simulate as bearings
 from msfp_gen.simulation.checkpoint import EVERY, Checkpoint, Identity, require_no_checkpoint

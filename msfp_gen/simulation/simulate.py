@@ -41,8 +41,7 @@ from msfp_gen.simulation.gradients import (
     with_gradient_errors,
 )
 from msfp_gen.simulation.memory import outgrown, require_room
-from msfp_gen.simulation.notes import history_notes, landing_notes
-from msfp_gen.simulation.outcome import extremes_of, message_of, provenance_of
+from msfp_gen.simulation.outcome import extremes_of, history_notes, landing_notes, message_of, provenance_of
 from msfp_gen.simulation.row_file import ROWS_HELD, RowFile
 from msfp_gen.simulation.segment import Segment, start_run, start_temperatures
 from msfp_gen.simulation.settling import (

@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from typing import Any
 
-from msfp_gen.buildings.load import AnyScene
+from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.errors import InputError, RunError

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from msfp_gen.buildings.scene import BuildingScene
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.buildings.file import AnyScene
 
 
 class Quantity(NamedTuple):

@@ -10,7 +10,7 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msfp_gen.buildings.load import AnyScene, with_absolute_paths
+from msfp_gen.buildings.file import AnyScene, with_absolute_paths
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.errors import InputError, RunError

@@ -154,14 +154,14 @@ def test_options_change_the_scene(simulated):
 
 
 def test_options_not_given_leave_the_scene(simulated):
-    from msfp_gen.buildings.load import load_scene
+    from msfp_gen.buildings.file import load_scene
 
     assert main(["run", "fenz-test2", "--json"]) == 0
     assert simulated == [load_scene("fenz-test2")]
 
 
 def test_scene_files_are_read(simulated, tmp_path):
-    from msfp_gen.buildings.load import load_scene
+    from msfp_gen.buildings.file import load_scene
     from msfp_gen.scene.file.loader import scene_text
 
     path = tmp_path / "scene.toml"

@@ -18,7 +18,7 @@ from support import hearing
 from support.study_tables import cheap_study, rows_of
 
 from msfp_gen.cli import main
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 
 

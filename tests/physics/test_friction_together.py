@@ -22,7 +22,7 @@ from msfp_gen.cli import main
 from msfp_gen.common.fields import Quantity, ruled_fields
 from msfp_gen.generator.heat import HEAT_KERNEL
 from msfp_gen.result import Result
-from msfp_gen.results.geometry.shape import friction_circles, poses
+from msfp_gen.results.geometry import friction_circles, poses
 from msfp_gen.scene.file.loader import scene_from_table
 from msfp_gen.simulation import simulate as simulation
 from msfp_gen.specification.formula import FUNCTIONS

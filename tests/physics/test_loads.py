@@ -18,7 +18,7 @@ from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.simulation.settling import needs_settling, settling_scene
 from msfp_gen.simulation.simulate import settle
 from msfp_gen.studies.accuracy.methods import run_library
-from msfp_gen.studies.accuracy.opensees import run_opensees
+from msfp_gen.studies.accuracy.models import run_opensees
 from msfp_gen.studies.accuracy.series import run_series
 
 STILL = Motion(np.array([0.0, 12.0]), np.zeros((1, 6, ORDER)))

@@ -21,7 +21,7 @@ from msfp_gen import (
     simulate,
 )
 from msfp_gen.model.evaluation import bodies_and_surfaces, top_values
-from msfp_gen.results.geometry.shape import contact_offsets
+from msfp_gen.results.geometry import contact_offsets
 
 
 def swayed(effects):

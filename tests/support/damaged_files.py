@@ -72,7 +72,7 @@ def emptied_heaps(whole: bytes) -> Iterator[bytes]:
 
 def read(path: Path) -> object:
     """What identifies the result in a file."""
-    from msfp_gen.cli.inputs import load_source
+    from msfp_gen.cli.console import load_source
 
     result = load_source(str(path))
     return result.dataset.drop_attrs(deep=False), result.provenance, result.status, repr(result.scene)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from msfp_gen.figures import film, page
+from msfp_gen.figures import movie, page
 
 
 class Drawn(NamedTuple):
@@ -23,9 +23,9 @@ def drawn_twice(shown: Any, width: float, height: float) -> Drawn:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with page(width, height) as figure:
-        pictures = list(film.pictures(figure, shown, None))
+        pictures = list(movie.pictures(figure, shown, None))
     with page(width, height) as figure:
-        figure.set_dpi(film.DOTS)
+        figure.set_dpi(movie.DOTS)
         canvas = FigureCanvasAgg(figure)
         update, moving = shown.layout(figure)
         canvas.draw()

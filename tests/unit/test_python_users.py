@@ -15,7 +15,7 @@ from support import ROOT, preset_run
 
 from msfp_gen import CompileError, Effects, InputError, Layout, RunError, build_model, load_scene, presets
 from msfp_gen.motions.records import ScaleTo, baseline_corrected, bundled, response_spectrum
-from msfp_gen.results.geometry.shape import poses
+from msfp_gen.results.geometry import poses
 from msfp_gen.scene.file.loader import scene_from_table, scene_text
 from msfp_gen.studies.bounding import load_factors
 

@@ -11,8 +11,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from msfp_gen.analysis.characterise.loops import Loop
-from msfp_gen.analysis.characterise.stages import Branch
-from msfp_gen.analysis.characterise.surfaces import SurfaceDemand
+from msfp_gen.analysis.characterise.surfaces import Branch, SurfaceDemand
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_rows
 

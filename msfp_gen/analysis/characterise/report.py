@@ -18,8 +18,7 @@ from msfp_gen.analysis.characterise.characterisation import (
     loop_quantity,
 )
 from msfp_gen.analysis.characterise.loops import Path
-from msfp_gen.analysis.characterise.stages import Branch, branch_of, signed_slip
-from msfp_gen.analysis.characterise.surfaces import SurfaceDemand, surface_demands
+from msfp_gen.analysis.characterise.surfaces import Branch, SurfaceDemand, branch_of, signed_slip, surface_demands
 from msfp_gen.analysis.transitions import is_monotonic, transitions
 from msfp_gen.common.arrays import Array
 from msfp_gen.results.run_data import BearingData, RunData

@@ -9,6 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from msfp_gen.common.fields import errors_at, ruled_fields
 from msfp_gen.common.identity import fingerprint
 from msfp_gen.common.inputs import Kept, is_input, read_input
@@ -17,9 +19,7 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file import catalogue, schema
-from msfp_gen.scene.file.motion_tables import KINDS, Pieces, located
-from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS, history_from, table_of
-from msfp_gen.scene.file.toml_text import dumps, plain_values
+from msfp_gen.scene.file.motion_tables import KINDS, LOADS, ROTATIONS, Pieces, history_from, located, table_of
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop
@@ -220,3 +220,22 @@ def plain_table(value: Any) -> Table:
     """Fields of a part as a table. `top_rotation` is omitted: it follows from the table `[top_rotation]`."""
     names = [name for name, _, _ in ruled_fields(type(value)) if name != "top_rotation"]
     return {field.name: getattr(value, field.name) for field in fields(value) if field.name in names}
+
+
+def dumps(table: Mapping[str, Any]) -> str:
+    """TOML text of a table of texts, numbers, booleans, lists and tables; numbers read back exactly.
+
+    Entries that are None are left out: TOML has no null. Raises TypeError for any other type.
+    """
+    import tomli_w
+
+    return tomli_w.dumps(plain_values(table))
+
+
+def plain_values(value: Any) -> Any:
+    """`value` without entries that are None, and with NumPy scalars as Python numbers."""
+    if isinstance(value, Mapping):
+        return {key: plain_values(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [plain_values(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value

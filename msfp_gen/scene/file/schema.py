@@ -31,7 +31,7 @@ from msfp_gen.motions.records.scaling import ScaleTo
 from msfp_gen.scene.bearing import Bearing, Body, Surface
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import suggestion
-from msfp_gen.scene.file.prescribed_tables import LOADS, ROTATIONS
+from msfp_gen.scene.file.motion_tables import LOADS, ROTATIONS
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.scene_fields import InitialState, Stop

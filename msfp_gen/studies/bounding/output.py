@@ -12,7 +12,7 @@ from msfp_gen.common.arrays import Array
 from msfp_gen.common.output import check_output
 from msfp_gen.common.tables import Table, write_columns
 from msfp_gen.figures import COLOURS, INK, displacement, displacement_label, engineering, force, page
-from msfp_gen.figures.loops import axes_along
+from msfp_gen.figures.bearing import axes_along
 from msfp_gen.figures.style import THIN, headline, subscript
 from msfp_gen.results.sign import shown_sign
 from msfp_gen.studies.bounding.factors import RULES, FactorTable

@@ -22,7 +22,7 @@ from msfp_gen.studies.columns import Counts, Source, catalogue
 
 if TYPE_CHECKING:
     from msfp_gen.analysis.characterise import Characterisation
-    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.buildings.file import AnyScene
     from msfp_gen.buildings.result import BuildingResult
     from msfp_gen.result import Result
     from msfp_gen.scene.bearing import Bearing

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.buildings.file import AnyScene
 
 # Quantities of the figure; those that a run does not have are left out.
 DRAWN = ("peak_displacement", "peak_force", "peak_floor_acceleration", "peak_drift_ratio", "capacity_left")

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.buildings.load import AnyScene, located_value, scene_of
+from msfp_gen.buildings.file import AnyScene, located_value, scene_of
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table

@@ -24,8 +24,7 @@ from msfp_gen.common.output import clear_all_leftovers, write_bytes
 from msfp_gen.common.tables import Table
 from msfp_gen.errors import InputError
 from msfp_gen.jit.cache import digest_sources
-from msfp_gen.scene.file.loader import toml_file
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps, toml_file
 from msfp_gen.studies.study.definition import Study, Task
 from msfp_gen.version import __version__
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from msfp_gen.buildings import dataset as building_dataset
-from msfp_gen.buildings.load import AnyScene
+from msfp_gen.buildings.file import AnyScene
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.common.arrays import Array
 from msfp_gen.common.fields import Quantity, check_fields

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from msfp_gen.buildings.load import with_absolute_paths
+from msfp_gen.buildings.file import with_absolute_paths
 from msfp_gen.common.fields import Choice, Quantity, check_fields, ruled_fields
 from msfp_gen.common.inputs import is_input, recording
 from msfp_gen.errors import InputError

@@ -22,7 +22,7 @@ from msfp_gen.studies.study.loader import load_study
 from msfp_gen.studies.study.quantities import Column, Keep
 
 if TYPE_CHECKING:
-    from msfp_gen.buildings.load import AnyScene
+    from msfp_gen.buildings.file import AnyScene
 
 Progress = Callable[[int, int], None]
 BAD_SCENE, OUT_OF_TIME = "input", "limit"  # statuses of a study, beside those of a run

@@ -13,7 +13,7 @@ from msfp_gen import Motion, Solver, simulate
 from msfp_gen.buildings import compiled_run
 from msfp_gen.buildings.compiled_run import start_run, unpacked
 from msfp_gen.buildings.extremes import BuildingExtremes
-from msfp_gen.results.geometry.shape import contact_offsets
+from msfp_gen.results.geometry import contact_offsets
 
 ROUNDING = 1e-12  # of sums of some ten terms that differ in the order of addition
 EVENTFUL = scene(frame(), duration=0.8)

@@ -27,8 +27,7 @@ from msfp_gen import (
     load_scene,
     presets,
 )
-from msfp_gen.buildings.file import building_from_table
-from msfp_gen.buildings.load import load_bearing_scene, with_absolute_paths
+from msfp_gen.buildings.file import building_from_table, load_bearing_scene, with_absolute_paths
 
 TEXT = """
 name = "one storey"

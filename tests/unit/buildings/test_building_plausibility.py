@@ -10,7 +10,7 @@ import pytest
 from support import ROOT
 
 from msfp_gen import InputError, Scene, changed_scene, load_scene, presets
-from msfp_gen.buildings.plausibility import building_doubts, floors
+from msfp_gen.buildings.notes import building_doubts, floors
 from msfp_gen.buildings.scene import BuildingScene
 from msfp_gen.scene.effect_selection import scene_doubts
 

@@ -21,8 +21,8 @@ from msfp_gen.analysis.summary import summary_of_bearing
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import plot_loops, plot_orbit, plot_result, plot_sliding
 from msfp_gen.results.files import table_of
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.note import Note
-from msfp_gen.results.resample import at_times
 from msfp_gen.studies.columns import Counts, catalogue
 
 

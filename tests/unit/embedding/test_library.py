@@ -32,8 +32,7 @@ from msfp_gen.embedding import export_library, values
 from msfp_gen.errors import CompileError
 from msfp_gen.generator.interface import ABI_VERSION, model_name
 from msfp_gen.jit.compiler import find_compiler
-from msfp_gen.jit.library import BuiltLibrary
-from msfp_gen.jit.platforms import Platform
+from msfp_gen.jit.library import BuiltLibrary, Platform
 from msfp_gen.simulation.segment import start_run
 from msfp_gen.specification import contract
 from msfp_gen.specification.layout import ModelSpec
@@ -414,7 +413,7 @@ def test_an_export_that_was_stopped_can_be_repeated(
         path.write_bytes(b"".join(parts))
 
     with monkeypatch.context() as patch:
-        patch.setattr("msfp_gen.embedding.tree.write_bytes", stopped)
+        patch.setattr("msfp_gen.embedding.library.write_bytes", stopped)
         assert cli.main(["export", "3", "1", "1", "--prefix", str(tmp_path)]) == 130
     assert cli.main(["export", "3", "1", "1", "--prefix", str(tmp_path)]) == 0
     assert (tmp_path / "include/msfp_3_1_1.h").exists() and not (tmp_path / "include/msfp_5_2_2.h").exists()

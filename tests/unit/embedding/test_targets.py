@@ -18,7 +18,7 @@ from support.replay import REPLAY, inputs
 
 from msfp_gen import Scene, build_model, cli, load_scene
 from msfp_gen.errors import CompileError
-from msfp_gen.jit import platforms
+from msfp_gen.jit import library as platforms
 from msfp_gen.simulation.segment import start_run
 
 LAYOUT = ("5", "2", "2")

@@ -12,10 +12,10 @@ from support.films import drawn_twice
 
 from msfp_gen import Building, BuildingScene, InputError, simulate
 from msfp_gen.buildings.result import BuildingResult
-from msfp_gen.figures import animate, film
-from msfp_gen.figures.building_movie import Elevation, building_film
-from msfp_gen.figures.frame import MovingFrame
-from msfp_gen.results.resample import at_times
+from msfp_gen.figures import animate, movie
+from msfp_gen.figures.building import MovingFrame
+from msfp_gen.figures.movie import Elevation, building_film
+from msfp_gen.results.joining import at_times
 
 TIMES = np.array([0.1, 0.355, 0.6])
 
@@ -75,7 +75,7 @@ def test_states_of_bearings():
 
 def test_a_frame_of_the_movie_is_what_a_complete_drawing_shows():
     shown = building_film(result(), TIMES, None)
-    drawn = drawn_twice(shown, film.WIDE, shown.height)
+    drawn = drawn_twice(shown, movie.WIDE, shown.height)
     assert np.abs(drawn.pictures[0].astype(int) - drawn.pictures[2]).max() > 100
     assert drawn.differs < 2e-3
     assert {artist.axes for artist in drawn.moving} == set(drawn.figure.axes)
@@ -94,8 +94,8 @@ def test_a_building_of_matrices_shows_nodes_and_links(tmp_path):
     assert shown.members[:, :, 1] == pytest.approx(shown.uppers)
     path, told = tmp_path / "m.gif", []
     animate(found, path, seconds=0.5, frames_per_second=6, azimuth=0.3, progress=lambda *at: told.append(at))
-    with Image.open(path) as movie:
-        assert movie.n_frames == 3 and movie.size[0] == 800 and movie.size[1] % 2 == 0
+    with Image.open(path) as images:
+        assert images.n_frames == 3 and images.size[0] == 800 and images.size[1] % 2 == 0
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 

@@ -11,7 +11,7 @@ from support import preset_run
 from support.films import drawn_twice
 
 from msfp_gen.errors import InputError
-from msfp_gen.figures import animate, film, movie, page
+from msfp_gen.figures import animate, movie, page
 
 SHORT = {"seconds": 0.5, "frames_per_second": 6}
 
@@ -45,7 +45,7 @@ def test_the_section_spans_the_movie():
     """No half of the picture is white: bodies cover most columns of the upper part."""
     shown = movie.stack_film(preset_run("fenz-test5"), np.linspace(0, 300, 7), None)
     with page(10.0, shown.height) as figure:
-        pictures = np.array(list(film.pictures(figure, shown, None)))[..., :3]
+        pictures = np.array(list(movie.pictures(figure, shown, None)))[..., :3]
     height = pictures.shape[1]
     drawn = (pictures.min(axis=(0, 3)) < 235)[round(0.25 * height) : round(0.5 * height)]
     assert drawn.any(axis=0).mean() > 0.8

@@ -12,12 +12,11 @@ from support.synthetic import loops
 
 from msfp_gen.errors import InputError
 from msfp_gen.figures import FIGURES, engineering, plot_energy, plot_force_path, plot_section, plot_stages
-from msfp_gen.figures.force_path import eccentricity
+from msfp_gen.figures.bearing import eccentricity
 from msfp_gen.figures.section import peak_time
-from msfp_gen.results.geometry.section import azimuth_of, sections
-from msfp_gen.results.geometry.shape import friction_circles
+from msfp_gen.results.geometry import azimuth_of, friction_circles, sections
 from msfp_gen.results.history import ENERGY
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.joining import at_times
 
 PNG = b"\x89PNG"
 RUNS = ("fenz-test5", "becker-circle-125", "unusual-tfp")

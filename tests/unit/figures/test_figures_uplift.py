@@ -13,12 +13,10 @@ from support.flights import shaken
 
 from msfp_gen import simulate
 from msfp_gen.figures import animate, plot_force_path, plot_section
-from msfp_gen.figures.force_path import eccentricity
-from msfp_gen.figures.sliding import draw_bars
+from msfp_gen.figures.bearing import draw_bars, eccentricity
 from msfp_gen.report.frames import STATES, instants, view
-from msfp_gen.results.geometry.section import sections
-from msfp_gen.results.geometry.shape import poses
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.geometry import poses, sections
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.sliding import separated, sliding_surfaces
 
 SMOOTH = 1e-3  # friction so small that the footprint of the seat is the slider's face

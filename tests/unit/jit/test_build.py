@@ -17,7 +17,7 @@ from support import fake_model
 from support.fake_model import run_child
 
 from msfp_gen.errors import CompileError, InputError
-from msfp_gen.jit import build, cache, compiler, pruning
+from msfp_gen.jit import build, cache, compiler
 from msfp_gen.model import model
 from msfp_gen.specification.layout import Effects, Layout, ModelSpec
 
@@ -161,10 +161,10 @@ def test_flags_of_the_processor_reach_the_compiler(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=2",))
     info = build.prepare(SPEC)
     assert "-DMSFP_X86_64_LEVEL=2" in (info.folder / "build.log").read_text()
-    assert pruning.cached_models()[0].state == "current"
+    assert cache.cached_models()[0].state == "current"
     monkeypatch.setattr(cache, "processor_flags", lambda _: ("-DMSFP_X86_64_LEVEL=3",))
     assert cache.Entry.of(SPEC).find() is None
-    assert pruning.cached_models()[0].state == "current", "of this version, though not for this processor"
+    assert cache.cached_models()[0].state == "current", "of this version, though not for this processor"
 
 
 # --- the wrapper

@@ -19,7 +19,7 @@ from support.fake_model import run_child
 
 from msfp_gen.cli import main
 from msfp_gen.errors import InputError
-from msfp_gen.jit import build, cache, compiler, pruning
+from msfp_gen.jit import build, cache, compiler
 from msfp_gen.specification.layout import Layout, ModelSpec
 
 SPEC = ModelSpec(Layout.dfp())
@@ -215,7 +215,7 @@ def test_a_builder_that_came_second_leaves_no_folder(house: Path, tmp_path: Path
 
 
 def aged(folder: Path, days: float) -> None:
-    then = time.time() - days * pruning.DAY
+    then = time.time() - days * cache.DAY
     for path in (folder / cache.MANIFEST_NAME, folder):
         if path.exists():
             os.utime(path, (then, then))
@@ -250,22 +250,22 @@ def stock(entry: cache.Entry, house: Path) -> Callable[[], dict[str, str]]:
         names["lanes"]: "other version",
         names["empty"]: "unfinished",
     }
-    assert {item.folder.name: item.state for item in pruning.cached_models()} == states
+    assert {item.folder.name: item.state for item in cache.cached_models()} == states
     return lambda: {path.name: states.get(path.name, "") for path in sorted(root.iterdir())}
 
 
 def test_only_what_was_not_used_goes(stock: Callable[[], dict[str, str]], entry: cache.Entry) -> None:
-    for item in pruning.cached_models():
+    for item in cache.cached_models():
         aged(item.folder, 40.0)
     assert entry.find() is not None, "to be found is to be used"
-    removed, held = pruning.prune(30.0)
+    removed, held = cache.prune(30.0)
     assert {item.state for item in removed} == {"damaged or old", "other version", "unfinished"}
     assert len(removed) == 5 and not held
     left = {entry.folder.name, f"{entry.folder.name}.lock", kept_wrapper().name}
     assert set(stock()) == left | {"thesis", "msfp_notes.txt"}
-    then = time.time() - 40.0 * pruning.DAY
+    then = time.time() - 40.0 * cache.DAY
     os.utime(kept_wrapper(), (then, then))
-    assert pruning.prune(30.0) == ([], []) and not kept_wrapper().exists()
+    assert cache.prune(30.0) == ([], []) and not kept_wrapper().exists()
     assert_works()
 
 
@@ -301,4 +301,4 @@ def test_bad_options_remove_nothing(options: str, entry: cache.Entry, capsys: py
     assert capsys.readouterr().err.count("\n") == 1
     assert entry.find() is not None
     with pytest.raises(InputError):
-        pruning.prune(-1.0)
+        cache.prune(-1.0)

@@ -16,8 +16,7 @@ from support import ROOT, Array
 
 from msfp_gen import Effects, Layout, Motion, Scene, Solver, Top, build_model, cli, presets, simulate
 from msfp_gen.embedding import README
-from msfp_gen.jit.compiler import FLAGS, find_compiler
-from msfp_gen.jit.processor import x86_64_level
+from msfp_gen.jit.compiler import FLAGS, find_compiler, x86_64_level
 from msfp_gen.motions.piecewise import hermite5
 from msfp_gen.specification import contract, rows
 

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from msfp_gen.jit import processor
-from msfp_gen.jit.processor import LEVELS, processor_flags, x86_64_level
+from msfp_gen.jit import compiler
+from msfp_gen.jit.compiler import LEVELS, processor_flags, x86_64_level
 
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The file in which an x86-64 machine describes itself; it is not there yet."""
-    monkeypatch.setattr(processor.platform, "machine", lambda: "x86_64")
-    monkeypatch.setattr(processor, "CPUINFO", tmp_path / "cpuinfo")
+    monkeypatch.setattr(compiler.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(compiler, "CPUINFO", tmp_path / "cpuinfo")
     return tmp_path / "cpuinfo"
 
 
@@ -49,7 +49,7 @@ def test_a_processor_that_is_not_known_gets_all_versions(text: str | None, machi
 
 def test_other_architectures_have_no_level(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     machine.write_text(f"flags : {flags_of(2, 3)}\n")
-    monkeypatch.setattr(processor.platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(compiler.platform, "machine", lambda: "aarch64")
     assert processor_flags() == ()
 
 

@@ -13,7 +13,7 @@ from support import scene_of
 from msfp_gen import InputError
 from msfp_gen.report import fit_html, write_fit_report
 from msfp_gen.studies.calibration import Estimate, Fit, FittedTest, Measurement
-from msfp_gen.studies.calibration.figure import ACROSS, DRAWN, plot_fit, plot_residuals
+from msfp_gen.studies.calibration.fit_result import ACROSS, DRAWN, plot_fit, plot_residuals
 
 RNG = np.random.default_rng(0)
 

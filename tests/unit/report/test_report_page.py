@@ -23,7 +23,7 @@ from msfp_gen.report.content import TERMS, provenance_table
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
 from msfp_gen.report.page import FIGURES
 from msfp_gen.result import Result
-from msfp_gen.results.geometry.shape import poses
+from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
 
 ALL = dict(FIGURES)

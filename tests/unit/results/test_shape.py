@@ -13,10 +13,19 @@ from reference.kinematics import rotation
 from support import bearing_of, preset_run
 
 from msfp_gen.errors import InputError
-from msfp_gen.results.geometry.outline import dish_radius, outline, slider_face, slider_radius
-from msfp_gen.results.geometry.section import Plane, azimuth_of, cut
-from msfp_gen.results.geometry.shape import body_bases, body_positions, poses
-from msfp_gen.results.resample import at_times
+from msfp_gen.results.geometry import (
+    Plane,
+    azimuth_of,
+    body_bases,
+    body_positions,
+    cut,
+    dish_radius,
+    outline,
+    poses,
+    slider_face,
+    slider_radius,
+)
+from msfp_gen.results.joining import at_times
 from msfp_gen.results.sliding import intervals, rims_in_contact, sliding_surfaces
 
 RUNS = ("fenz-monotonic", "fenz-test5", "becker-circle-125", "unusual-tfp")

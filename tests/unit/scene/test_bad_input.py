@@ -6,10 +6,9 @@ import pytest
 from support.malformed_scenes import GOOD, ROWS, broken
 
 from msfp_gen import presets
-from msfp_gen.buildings.load import load_scene
+from msfp_gen.buildings.file import load_scene
 from msfp_gen.errors import InputError
-from msfp_gen.scene.file.loader import scene_from_table
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps, scene_from_table
 
 
 def line(error):

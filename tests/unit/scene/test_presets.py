@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from msfp_gen import presets, simulate
-from msfp_gen.buildings.load import load_scene
+from msfp_gen.buildings.file import load_scene
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Body, Surface

@@ -34,8 +34,8 @@ def test_rows_that_cannot_fit_are_refused_before_anything_runs(
     words = r"output_step = 1e-06: 5\.6e\+07 rows need 256 GB of memory and 8 GB are available; give at least 3\.4e-05"
     with pytest.raises(InputError, match=words):
         simulate(scene)
-    monkeypatch.setattr("msfp_gen.cli.inputs.build", None)  # not even built
-    monkeypatch.setattr("msfp_gen.buildings.load.load_scene", lambda _: scene)
+    monkeypatch.setattr("msfp_gen.cli.console.build", None)  # not even built
+    monkeypatch.setattr("msfp_gen.buildings.file.load_scene", lambda _: scene)
     assert main(["run", "fenz-test2", "-o", str(tmp_path / "run.nc")]) == 2
     assert "give at least 3.4e-05 [s], a shorter duration, or stream the rows to disk" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,7 @@ from support import preset_run
 from msfp_gen import Effects, Load, Solver
 from msfp_gen.results.history import History
 from msfp_gen.scene.scene import Scene
-from msfp_gen.simulation.notes import energy_notes, tolerance_notes
+from msfp_gen.simulation.outcome import energy_notes, tolerance_notes
 
 SLID, NORMAL, WORK = 0.05, 2e5, 700.0
 

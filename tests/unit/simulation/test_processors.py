@@ -9,7 +9,7 @@ import sys
 
 from support.digests import digests, wide_features
 
-from msfp_gen.jit.processor import x86_64_level
+from msfp_gen.jit.compiler import x86_64_level
 
 
 def test_inputs_and_rows_do_not_depend_on_the_vectors_of_the_processor() -> None:

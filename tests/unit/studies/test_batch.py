@@ -36,7 +36,7 @@ from msfp_gen import (
     simulate,
     simulate_batch,
 )
-from msfp_gen.buildings.load import changed_scene
+from msfp_gen.buildings.file import changed_scene
 from msfp_gen.cli import main
 from msfp_gen.common.cores import usable_cores
 from msfp_gen.model import model as models

@@ -20,7 +20,7 @@ from msfp_gen.common.identity import fingerprint
 from msfp_gen.result import Result
 from msfp_gen.scene.file import motion_tables
 from msfp_gen.scene.file.catalogue import scene_table
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 from msfp_gen.studies.bounding.factors import factor_text
 from msfp_gen.studies.study.chunks import Chunks

@@ -13,7 +13,7 @@ from support.study_tables import cheap_study
 
 from msfp_gen import InputError
 from msfp_gen.cli import main
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import Goals, pareto
 from msfp_gen.studies.assessment import pareto as module
 from msfp_gen.studies.assessment.pareto import not_dominated

@@ -28,7 +28,7 @@ from support.study_tables import cheap_study, rows_of, write_record
 import msfp_gen
 from msfp_gen import InputError, simulate
 from msfp_gen.scene.file.catalogue import scene_table
-from msfp_gen.scene.file.toml_text import dumps
+from msfp_gen.scene.file.loader import dumps
 from msfp_gen.studies import load_study
 
 LAUNCHER = shutil.which("mpiexec")

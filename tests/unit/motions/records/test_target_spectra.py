@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from msfp_gen import InputError, load_scene
-from msfp_gen.buildings.load import with_absolute_paths
+from msfp_gen.buildings.file import with_absolute_paths
 from msfp_gen.motions.records import baseline_corrected, bundled, response_spectrum
-from msfp_gen.motions.records.scaling import ScaleTo
+from msfp_gen.motions.records.scaling import EN1998, ScaleTo, en1998_spectrum, read_spectrum, tabulated_spectrum
 from msfp_gen.motions.records.spectrum import measure_index
-from msfp_gen.motions.records.target import EN1998, en1998_spectrum, read_spectrum, tabulated_spectrum
 from msfp_gen.scene.file.loader import toml_file
 from msfp_gen.scene.file.suite import load_suite
 
