@@ -50,6 +50,18 @@ TERMS = (
     ("energy balance", "work of the ground and the loads, less all energy stored and dissipated; what remains is the "
      "error of the computation."),
 )  # fmt: skip
+BUILDING_TERMS = (
+    TERMS[0],
+    ("u", "horizontal displacement across a bearing: base less top, less its value at the start."),
+    ("N", "compression between a bearing and the building; at rest its share of the weight. Where it falls to zero, "
+     "the bearing would lift off."),
+    ("base shear", "horizontal force of the ground on all bearings."),
+    ("drift", "horizontal displacement of a floor relative to that below, tilt of the floors taken out."),
+    ("storey shear", "force that accelerates the floors above."),
+    ("floor spectrum", "largest response of oscillators of a period that stand on a floor, with 5 % damping."),
+    ("left", "capacity of a surface less its sliding: what remains until the slider meets the rim of its dish."),
+    ("rim", "the raised edge of a dish. Inner sliders of a triple pendulum meet theirs in strong motion."),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msfp_gen.buildings.explain import explain
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.common.output import check_output, write_bytes
 from msfp_gen.report.content import (
+    BUILDING_TERMS,
     TERMS,
     TitleBlock,
     asset,
@@ -23,35 +24,86 @@ from msfp_gen.report.content import (
     script_data,
     summary_page,
 )
-from msfp_gen.report.frames import FRAMES, view
+from msfp_gen.report.frames import FRAMES, SCALES, building_view, view
 from msfp_gen.version import __version__
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from msfp_gen.result import Result
 
 NO_TITLE = TitleBlock()
 Progress = Callable[[float, float], None]
 REPORT_SUFFIXES = (".html", ".htm")
-SCRIPTS = (
-    "three.min.js", "dom.js", "canvas.js", "data.js", "chart.js", "section.js", "scene.js", "player.js", "page.js",
-)  # fmt: skip
+SCRIPTS = ("three.min.js", "dom.js", "canvas.js", "data.js", "chart.js")  # of every page, before its own
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
-FIGURES = {
-    "overview": "Loops and sliding",
-    "stages": "Sliding regimes over time",
-    "force-path": "Path of the force",
-    "energy": "Energy balance",
-    "section": "Section at the largest displacement",
-}
-EXPLANATION = (
+
+
+class Kind(NamedTuple):
+    """What differs between the pages of a bearing and of a building.
+
+    name: of what moves, and of its template. introduction: the begin of one sentence about it. explanation: of its
+    view. figures: name -> title. scripts: after those of every page. view: data for the scripts, of about so many
+    instants.
+    """
+
+    name: str
+    introduction: Callable[[Any], str]
+    explanation: str
+    terms: tuple[tuple[str, str], ...]
+    figures: Mapping[str, str]
+    scripts: tuple[str, ...]
+    view: Callable[[Any, int], dict[str, Any]]
+
+
+def _of_bearing(result: Result) -> str:
+    layout = result.scene.bearing.layout
+    return (
+        f"Simulation of a friction pendulum bearing of {layout.n} bodies, with {layout.m} sliding surfaces concave up "
+        f"and {layout.p} concave down"
+    )
+
+
+def _of_building(result: BuildingResult) -> str:
+    scene = result.scene
+    storeys = f"{len(scene.building.columns)} storeys" if scene.building.columns else "a structure"
+    return (
+        f"Simulation of {storeys} on {len(scene.bearings)} friction pendulum bearings, weight "
+        f"{1e-6 * scene.weight:.4g} MN"
+    )
+
+
+BEARING = Kind(
+    "bearing",
+    _of_bearing,
     "Bodies are drawn to scale with the radii, heights and capacities of the bearing; the height and thickness of rims "
     "are chosen for the drawing, as they are not part of the data. The force through a surface acts along a straight "
     "line. Where a surface slides, the line is tangent to its friction circle, of radius μR/√(1 + μ²) about its sphere "
     "centre; where it sticks, the line crosses the circle. Where the line is outside the circle, a rim carries a part "
-    "of the force. Charts and views show {frames} instants of {rows} rows; the summary uses all rows. Click a chart to "
-    "move to an instant."
+    "of the force.",
+    TERMS,
+    {
+        "overview": "Loops and sliding",
+        "stages": "Sliding regimes over time",
+        "force-path": "Path of the force",
+        "energy": "Energy balance",
+        "section": "Section at the largest displacement",
+    },
+    ("section.js", "scene.js", "player.js", "page.js"),
+    view,
+)
+BUILDING = Kind(
+    "building",
+    _of_building,
+    "The frame moves relative to the ground unless the box is cleared; displacements are drawn larger than the frame "
+    "by the chosen factor.",
+    BUILDING_TERMS,
+    {
+        "plan": "Plan with the orbits of all bearings",
+        "profile": "Peaks over the height",
+        "spectra": "Floor spectra",
+        "axial": "Axial force of every bearing",
+    },
+    ("frame.js", "player.js", "building.js"),
+    building_view,
 )
 
 
@@ -87,15 +139,19 @@ def report_html(
     """
     from markupsafe import Markup
 
-    if isinstance(result, BuildingResult):
-        content = _of_building(result, frames, progress)
-    else:
-        content = _of_bearing(result, frames, progress)
-    scripts, data = content.pop("scripts"), content.pop("data")
+    kind = BUILDING if isinstance(result, BuildingResult) else BEARING
+    data = kind.view(result, frames)
+    shown, rows = data["frames"]["time"]["shape"][0], len(result.bearings[0].history.time)
     device = ", ".join(dict.fromkeys(map(kind_of, result.scene.every_bearing)))
     return render(
         "page.html.jinja",
-        **content,
+        moving=f"The {kind.name} in motion",
+        stage=Markup(render(f"{kind.name}.html.jinja", scales=SCALES, chosen=data.get("scale"))),
+        lead=f"{kind.introduction(result)}, by msfp-gen {result.provenance.get('msfp_gen', __version__)}.",
+        terms=kind.terms,
+        explanation=f"{kind.explanation} Charts and views show {shown} instants of {rows} rows; the summary uses all "
+        "rows. Click a chart to move to an instant.",
+        figures=list(_pictures(result, kind.figures, progress)),
         summary=[*summary_page(result), *note_tables(result)],
         characterisation=characterisation_page(result),
         settings=explain(result.scene),
@@ -108,63 +164,15 @@ def report_html(
         good=result.verdict.ok,
         speeds=SPEEDS,
         data=script_data(data),
-        scripts=[Markup(asset(name)) for name in scripts],
+        scripts=[Markup(asset(name)) for name in (*SCRIPTS, *kind.scripts)],
     )
 
 
-def _of_bearing(result: Result, frames: int, progress: Progress | None) -> dict[str, Any]:
-    """What the page of one bearing shows."""
-    from markupsafe import Markup
-
-    from msfp_gen.figures import FIGURES as PLOTS
-
-    data = view(result, frames)
-    return {
-        "moving": "The bearing in motion",
-        "stage": Markup(render("bearing.html.jinja")),
-        "lead": _introduction(result),
-        "terms": TERMS,
-        "explanation": EXPLANATION.format(frames=data["frames"]["time"]["shape"][0], rows=len(result.history.time)),
-        "figures": list(_pictures(result, FIGURES, PLOTS, progress)),
-        "data": data,
-        "scripts": SCRIPTS,
-    }
-
-
-def _of_building(result: BuildingResult, frames: int, progress: Progress | None) -> dict[str, Any]:
-    """What the page of a building shows."""
-    from markupsafe import Markup
-
-    from msfp_gen.figures import BUILDING_FIGURES
-    from msfp_gen.report import building
-
-    data = building.building_view(result, frames)
-    stage = render("building.html.jinja", scales=building.SCALES, chosen=data["scale"])
-    return {
-        "moving": "The building in motion",
-        "stage": Markup(stage),
-        "lead": building.introduction(result),
-        "terms": building.TERMS,
-        "explanation": building.explanation(data["frames"]["time"]["shape"][0], len(result.time)),
-        "figures": list(_pictures(result, building.FIGURES, BUILDING_FIGURES, progress)),
-        "data": data,
-        "scripts": building.SCRIPTS,
-    }
-
-
-def _introduction(result: Result) -> str:
-    """One sentence about the bearing and the program."""
-    layout = result.scene.bearing.layout
-    return (
-        f"Simulation of a friction pendulum bearing of {layout.n} bodies, with {layout.m} sliding surfaces concave up "
-        f"and {layout.p} concave down, by msfp-gen {result.provenance.get('msfp_gen', __version__)}."
-    )
-
-
-def _pictures(
-    result: Any, titles: Mapping[str, str], plots: Mapping[str, Callable[..., Figure]], progress: Progress | None
-) -> Iterator[dict[str, str]]:
+def _pictures(result: Any, titles: Mapping[str, str], progress: Progress | None) -> Iterator[dict[str, str]]:
     """Every figure of the report, for its template."""
+    from msfp_gen.figures import BUILDING_FIGURES, FIGURES
+
+    plots: Mapping[str, Any] = BUILDING_FIGURES if isinstance(result, BuildingResult) else FIGURES
     for done, (name, title) in enumerate(titles.items(), start=1):
         drawn = picture(title, plots[name](result, None))
         if progress is not None:

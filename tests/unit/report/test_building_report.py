@@ -18,7 +18,7 @@ from msfp_gen import BaseSlab, Building, BuildingBearing, BuildingScene, Effects
 from msfp_gen.buildings.result import BuildingResult
 from msfp_gen.figures import BUILDING_FIGURES
 from msfp_gen.report import TitleBlock, report_html
-from msfp_gen.report.building import building_view, scale_of
+from msfp_gen.report.frames import building_view, scale_of
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage")

@@ -21,19 +21,17 @@ from msfp_gen.motions.motion import Motion
 from msfp_gen.report import TitleBlock, report_html, write_report
 from msfp_gen.report.content import TERMS, provenance_table
 from msfp_gen.report.frames import instants, main_direction, packed, pieces, selected_rows, states, view
-from msfp_gen.report.page import FIGURES
+from msfp_gen.report.page import BEARING
 from msfp_gen.result import Result
 from msfp_gen.results.geometry import poses
 from msfp_gen.results.note import Note
-
-ALL = dict(FIGURES)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def few_figures():
     """One picture a page: drawing them all takes seconds."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("msfp_gen.report.page.FIGURES", {"overview": ALL["overview"]})
+        patch.setattr("msfp_gen.report.page.BEARING", BEARING._replace(figures={"overview": "Loops and sliding"}))
         yield
 
 
@@ -221,9 +219,9 @@ def test_data_cannot_end_its_script():
 
 @pytest.mark.slow
 def test_size_of_a_long_record_with_all_figures_is_bounded(monkeypatch):
-    monkeypatch.setattr("msfp_gen.report.page.FIGURES", ALL)
+    monkeypatch.setattr("msfp_gen.report.page.BEARING", BEARING)
     text = report_html(preset_run("ridgecrest-clc"))
-    assert text.count("data:image/png") == len(ALL) == 5 and len(text.encode()) < 10e6
+    assert text.count("data:image/png") == len(BEARING.figures) == 5 and len(text.encode()) < 10e6
 
 
 def test_a_bearing_that_rests_and_a_run_that_failed_have_a_report():
