@@ -63,6 +63,8 @@ static inline int msfp_slider(int j)
  * temperatures. seed: NULL outside of a step. */
 void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, const msfp_seed *seed, msfp_work *w,
                      msfp_blocks *s);
+/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
+void msfp_inertial_frame(const msfp_point *at, double *body);
 /* Of these what acts on the top plate from outside: load, the block `foot_stage`, axis of a rotating support. */
 void msfp_set_loads(const msfp_parameters *p, const msfp_point *at, msfp_blocks *s);
 /* Motion of all bodies alone, into `w`. */

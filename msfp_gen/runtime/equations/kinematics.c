@@ -67,8 +67,7 @@ MSFP_INLINE void load_coordinates(double *x, const double *q, const double *v, c
 #endif
 }
 
-/* The inertial frame at r_01 as the block of a body, the parent of body 0. */
-static void inertial_frame(const msfp_point *at, double *body)
+void msfp_inertial_frame(const msfp_point *at, double *body)
 {
     static const double e[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     memset(body, 0, MSFP_BODY_SIZE * sizeof *body);
@@ -96,7 +95,7 @@ MSFP_WIDE void msfp_set_inputs(const msfp_parameters *p, const msfp_point *at, c
     s->at = at;
     s->seed = seed;
     if (!(seed && seed->same_base)) {
-        inertial_frame(at, s->frame);
+        msfp_inertial_frame(at, s->frame);
         load_coordinates(w->x[0], at->base[0] + 3, at->base[1] + 3, at->base[2] + 3, 0);
     }
     for (int k = 1; k <= NB; ++k)

@@ -43,6 +43,7 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
         msfp_put_polar(ds->frame + MSFP_BODY_CX * C, dat->base[0]);
         msfp_put_polar(ds->frame + MSFP_BODY_VX * C, dat->base[1]);
         msfp_put_polar(ds->frame + MSFP_BODY_AX * C, dat->base[2]);
+        msfp_inertial_frame(s->at, s->frame);
         msfp_base_directions(p, dp, w, d, s, ds);
     } else if (d->base_moves)
         memset(d->body[0], 0, sizeof d->body[0]);
