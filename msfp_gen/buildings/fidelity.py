@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def building_at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Scene:
-    """The scene at a level of fidelity: "exact" (as it is), "loose", "massless", "rigid", or "equivalent".
+    """The scene at a level of fidelity: "exact" (as it is), "backbone", "loose", "massless", "rigid", or "equivalent".
 
-    The last one is the scene of one bearing that carries the whole building. Raises InputError of one line.
+    The last is the scene of one bearing that carries the whole building. Raises InputError of one line.
     """
-    if word == "exact":
-        return scene
+    if word in ("exact", "backbone"):  # the label alone says how studies run the latter
+        return replace(scene, fidelity=word)
     if word == "equivalent":
         return _equivalent(scene)
     if word == "loose" and scene.solver.rtol >= LOOSE:

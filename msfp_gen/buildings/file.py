@@ -19,12 +19,14 @@ from msfp_gen.common.inputs import Kept, digest_of, expecting
 from msfp_gen.errors import InputError
 from msfp_gen.motions.motion import Motion
 from msfp_gen.scene.bearing import Bearing
+from msfp_gen.scene.fidelity import at_fidelity
 from msfp_gen.scene.file.changes import changed_table, keys_of
 from msfp_gen.scene.file.loader import bearing_from_table, effects_from_table, scene_from_table, scene_table
 from msfp_gen.scene.file.motion_tables import KINDS, Paths, located, paths_in, resolved, with_spectrum
 from msfp_gen.scene.file.schema import EFFECTS, MOTION, PARTS, model_of, rows_of, validate
 from msfp_gen.scene.limits import Limits
 from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.scene_fields import FIDELITIES
 from msfp_gen.scene.solver import Solver
 from msfp_gen.scene.top import NodeTop
 
@@ -255,6 +257,13 @@ def changed_scene(source: str | Path, changes: Mapping[str, Any]) -> AnyScene:
 def scene_of(table: Mapping[str, Any], folder: Path | None = None, **given: Any) -> AnyScene:
     """The scene of a plain table, as in a file; folder, given: as in `scene_from_table`. Raises InputError."""
     return (building_from_table if "building" in table else scene_from_table)(table, folder, **given)
+
+
+def reduced(scene: AnyScene, word: str) -> AnyScene:
+    """The scene at a level of fidelity. Raises InputError: an unknown one, or one that it does not have."""
+    if word not in FIDELITIES:
+        raise InputError(f"fidelity = {word!r}: give one of {', '.join(map(repr, FIDELITIES))}")
+    return at_fidelity(scene, word) if isinstance(scene, Scene) else building_at_fidelity(scene, word)
 
 
 def with_absolute_paths(table: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:

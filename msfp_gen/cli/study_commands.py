@@ -19,6 +19,7 @@ from msfp_gen.errors import InputError
 
 if TYPE_CHECKING:
     from msfp_gen.common.tables import Table
+    from msfp_gen.studies.study.definition import Study
     from msfp_gen.studies.study.run import Outcome
 
 app = typer.Typer()
@@ -69,7 +70,8 @@ Threads = Annotated[bool, typer.Option("--threads", help="Threads in place of pr
 @group.command(
     epilog="Examples:\n\n\b\n  msfp-gen study study.toml -o out --workers 8\n"
     "  msfp-gen study study.toml -o out --shard $SLURM_ARRAY_TASK_ID/16\n"
-    "  msfp-gen study study.toml -o out --dask tcp://10.0.0.1:8786"
+    "  msfp-gen study study.toml -o out --dask tcp://10.0.0.1:8786\n"
+    "  msfp-gen study study.toml -o out --estimate peak_displacement --target 2%"
 )
 def run(
     source: Annotated[Path | None, typer.Argument(metavar="FILE", help="A study file (TOML).")] = None,
@@ -86,9 +88,24 @@ def run(
         str | None, typer.Option(metavar="I/N", help="Only every N-th chunk, from the I-th; for arrays of jobs.")
     ] = None,
     example: Annotated[bool, typer.Option("--example", help="Print a small study file, to start from.")] = False,
+    estimate: Annotated[
+        str | None,
+        typer.Option(metavar="COLUMN", help="Estimate a statistic of this quantity with few exact runs ([accuracy])."),
+    ] = None,
+    statistic: Annotated[
+        str | None, typer.Option(metavar="mean|variance|probability|quantile|fragility", help="Of the estimate.")
+    ] = None,
+    threshold: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Of a probability or fragility; the share of a quantile.")
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(metavar="SHARE", help="Half width of the interval over the value, such as 2%.")
+    ] = None,
+    budget: Annotated[str | None, typer.Option(metavar="TIME", help="Of all runs of the estimate: 10min.")] = None,
+    plot: Plot = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run what is missing of a study. Ctrl-C at any time: the same command continues."""
+    """Run what is missing of a study, or estimate a statistic of it. Ctrl-C at any time: the same command continues."""
     from msfp_gen.studies.study.loader import example_text, load_study
     from msfp_gen.studies.study.run import parsed_shard
     from msfp_gen.studies.study.run import study as run_study
@@ -103,6 +120,17 @@ def run(
     part = (1, 1) if shard is None else parsed_shard(shard)
     with Progress("records") as progress:
         definition = load_study(source, progress)
+    question = {
+        "quantity": estimate, "statistic": statistic, "threshold": threshold, "target": target, "budget": budget,
+    }  # fmt: skip
+    if "accuracy" in definition.table or any(value is not None for value in question.values()):
+        if shard is not None:
+            raise InputError("--shard: the runs of an estimate depend on those before; give --workers or --dask")
+        engine = {"workers": workers, "threads": threads, "dask": dask, "mpi": mpi}
+        _estimate(definition, output, question, engine, plot, as_json)
+        return
+    if plot is not None:
+        raise InputError("--plot: it draws an estimate; give --estimate too")
     try:
         with Progress(f"{definition.runs} runs") as progress:
             done = run_study(
@@ -113,6 +141,27 @@ def run(
         raise
     judged = any(column.name == "limits_exceeded" for column in definition.keep.columns())
     _report(done, output, as_json, judged)
+
+
+def _estimate(
+    definition: Study, output: Path, question: dict[str, Any], engine: dict[str, Any], plot: Path | None, as_json: bool
+) -> None:
+    """Estimate a statistic of a study and print it, in ten lines."""
+    from msfp_gen.studies import estimate
+    from msfp_gen.studies.estimation.figure import estimate_table, plot_estimate
+
+    _check(plot, None)
+    try:
+        found = estimate(definition, output, **question, **engine)
+    except KeyboardInterrupt:
+        note(f"what is done is kept in {output}; the same command continues")
+        raise
+    answer(found.as_dict(), [estimate_table(found)], as_json)
+    for line in found.notes:
+        note(line)
+    if plot is not None:
+        plot_estimate(found, plot)
+        note(f"wrote {plot}")
 
 
 def _report(done: Outcome, output: Path, as_json: bool, judged: bool) -> None:

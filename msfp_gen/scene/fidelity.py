@@ -6,6 +6,7 @@ Each is a scene like any other, which the generator derives and compiles; nobody
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,10 @@ def at_fidelity(scene: Scene, word: str) -> Scene:
     if word not in _REDUCTIONS:
         levels = ", ".join(map(repr, ("exact", *_REDUCTIONS)))
         raise InputError(f"fidelity = {word!r}: one bearing has no such model; give one of {levels}")
+    if word == "backbone":  # the label alone says how studies run it; nothing is checked again
+        labelled = copy(scene)
+        object.__setattr__(labelled, "fidelity", word)
+        return labelled
     return replace(_REDUCTIONS[word](scene), fidelity=word)
 
 
@@ -144,4 +149,9 @@ def equivalent_pendulum(bearings: Sequence[Bearing], shares: Sequence[float]) ->
     )
 
 
-_REDUCTIONS: dict[str, Callable[[Scene], Scene]] = {"loose": _loose, "massless": _massless, "equivalent": _equivalent}
+_REDUCTIONS: dict[str, Callable[[Scene], Scene]] = {
+    "loose": _loose,
+    "massless": _massless,
+    "equivalent": _equivalent,
+    "backbone": lambda scene: scene,
+}

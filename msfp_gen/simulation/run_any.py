@@ -63,6 +63,8 @@ def simulate(scene: Scene | BuildingScene, *, progress: bearings.Progress | None
 
 def simulate(scene: Scene | BuildingScene, **options: Any) -> Result | BuildingResult:
     """As `simulation.simulate.simulate`, whose text is shown; a `BuildingScene` gives a `BuildingResult`."""
+    if getattr(scene, "fidelity", "") == "backbone":
+        raise InputError("fidelity = 'backbone': only studies run it, it keeps no history; give 'equivalent'")
     if not isinstance(scene, BuildingScene):
         if not isinstance(scene, Scene):
             raise InputError(f"scene: a {type(scene).__name__} is no scene; give what load_scene returns")

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from msfp_gen.studies.assessment.rows import read_study as read_study
     from msfp_gen.studies.assessment.sensitivity import sobol as sobol
     from msfp_gen.studies.assessment.sensitivity import tornado as tornado
+    from msfp_gen.studies.estimation.estimate import Estimate as Estimate
+    from msfp_gen.studies.estimation.estimate import estimate as estimate
+    from msfp_gen.studies.estimation.figure import plot_estimate as plot_estimate
     from msfp_gen.studies.study.chunks import Status as Status
     from msfp_gen.studies.study.chunks import study_status as study_status
     from msfp_gen.studies.study.loader import load_study as load_study
@@ -28,6 +31,9 @@ if TYPE_CHECKING:
 _MODULES = {
     "Outcome": "study.run",
     "Goals": "assessment.pareto",
+    "Estimate": "estimation.estimate",
+    "estimate": "estimation.estimate",
+    "plot_estimate": "estimation.figure",
     "fragility": "assessment.fragility",
     "ida": "assessment.ida",
     "read_study": "assessment.rows",

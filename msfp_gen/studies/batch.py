@@ -17,6 +17,7 @@ from msfp_gen.scene.scene import Scene
 from msfp_gen.simulation.memory import require_memory
 from msfp_gen.simulation.run_any import simulate
 from msfp_gen.simulation.simulate import RunSequence
+from msfp_gen.studies.estimation.backbone_run import run_backbone
 from msfp_gen.studies.pool import SharedProgress, local_pool, raise_if_stopped, worker_count
 
 Proceed = Callable[[float, float], None]
@@ -133,7 +134,7 @@ def _completed(
 
 def check_method(scene: AnyScene) -> None:
     """Raise InputError where the method of a scene does not support its effects; that of a building always does."""
-    if isinstance(scene, Scene):
+    if isinstance(scene, Scene) and scene.fidelity != "backbone":  # which selects no effects
         check(scene, scene.modelled)
 
 
@@ -148,6 +149,8 @@ def run_to_end(scene: AnyScene, strict: bool = False, proceed: Proceed = raise_i
 
     threads: for the bearings of a building; other runs have the other cores. Raises RunError: failed at its start.
     """
+    if scene.fidelity == "backbone":
+        return run_backbone(scene)
     if isinstance(scene, Scene):
         sequence = RunSequence.of(scene, strict)
         while sequence.effects is not None:

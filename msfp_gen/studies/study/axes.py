@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from msfp_gen.buildings.file import AnyScene, located_value, scene_of
+from msfp_gen.buildings.file import AnyScene, located_value, reduced, scene_of
 from msfp_gen.errors import InputError
 from msfp_gen.scene.file.catalogue import suggestion
 from msfp_gen.scene.file.changes import changed_table, keys_of, multiplied_table
@@ -218,7 +218,10 @@ class SceneFactory:
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
-        self.base = scene_of(recipe.scene)
+        self._fidelity = recipe.scene.get("fidelity", "exact")
+        base = {key: value for key, value in recipe.scene.items() if key != "fidelity"}
+        self.base = scene_of(base)
+        reduced(self.base, self._fidelity)  # raises its errors
         self._setting = sorted(  # a table before its fields
             (len(keys_of(path)), index, path)
             for index, axis in enumerate(recipe.axes)
@@ -231,7 +234,7 @@ class SceneFactory:
             self._given["motion"] = self.base.motion
             if isinstance(self.base, Scene):
                 self._given["motion_table"] = self.base.motion_table
-        self._table = {key: value for key, value in recipe.scene.items() if key not in self._given}
+        self._table = {key: value for key, value in base.items() if key not in self._given}
 
     def scene(self, values: Sequence[Any]) -> AnyScene:
         """The scene of one value for each axis, in their order. Raises InputError."""
@@ -249,7 +252,7 @@ class SceneFactory:
         for axis, value in chosen:
             if axis.change == "factors":
                 scene = bounded_scene(scene, self.recipe.factors[axis.paths[0]], value)
-        return scene
+        return reduced(scene, self._fidelity)
 
     def _scaled(self, name: str, factor: float) -> Table:
         """The `[motion]` table of a record times a factor."""

@@ -129,9 +129,20 @@ class Study:
         return np.zeros((1, 0)) if self.sampling is None else self.sampling.drawn(self.distributions)
 
     @cached_property
+    def grid(self) -> tuple[int, ...]:
+        """Numbers of values of the axes that have some, slowest first."""
+        return tuple(len(axis.values) for axis in self.axes if axis.values is not None)
+
+    @cached_property
+    def cells(self) -> np.ndarray[Any, np.dtype[np.intp]] | None:
+        """The combination of values that each sample has, from 0; None: every sample has all of them."""
+        cells = None if self.sampling is None else self.sampling.cells
+        return None if cells is None else np.array(cells, dtype=np.intp) - 1
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Lengths of the grid of runs, slowest first: one for each axis with values, then the samples."""
-        return (*(len(axis.values) for axis in self.axes if axis.values is not None), len(self.samples))
+        return (len(self.samples),) if self.cells is not None else (*self.grid, len(self.samples))
 
     @property
     def runs(self) -> int:
@@ -155,6 +166,8 @@ class Study:
         """The runs of a chunk, numbered from 0."""
         first = number * self.chunk
         *codes, sample = np.unravel_index(np.arange(first, min(first + self.chunk, self.runs)), self.shape)
+        if self.cells is not None:
+            codes = list(np.unravel_index(self.cells[sample], self.grid)) if self.grid else []
         return Task(number, first, tuple(codes), self.samples[sample])
 
     def scene(self, run: int) -> AnyScene:
@@ -177,6 +190,8 @@ def check_study(study: Study) -> Study:
     """
     if study.runs > MOST_RUNS:
         raise InputError(f"axes: {study.runs} runs; give at most {MOST_RUNS}")
+    if study.cells is not None and study.cells.max() >= prod(study.grid):
+        raise InputError(f"sampling.cells has {study.cells.max() + 1}: the axes have {prod(study.grid)} combinations")
     with recording() as files:
         study = _tried_study(replace(study, files=files))
     reserved = [INTENSITY] if study.recipe.intensities else []

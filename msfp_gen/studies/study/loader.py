@@ -38,6 +38,7 @@ KEYS = {
     "keep": "a list of quantities",
     "quantities": "a table of names and formulas",
     "limits": "a table",
+    "accuracy": "a table: what is estimated, and how well",
     "chunk": "a number of runs",
     "about": "written by msfp-gen",
 }
@@ -266,7 +267,7 @@ def _beside(source: str, folder: Path | None) -> str:
 
 def _sampling(table: Table, axes: tuple[Axis, ...]) -> Sampling | None:
     drawn = [axis.name for axis in axes if axis.random]
-    if not drawn:
+    if not drawn and "cells" not in table.get("sampling", {}):
         if "sampling" in table:
             raise InputError("sampling: no axis has a distribution; leave it out")
         return None

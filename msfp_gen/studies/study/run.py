@@ -139,7 +139,10 @@ def _run(chunks: Chunks, pool: Pool, shard: tuple[int, int], progress: Progress 
     if progress is not None:
         progress(before, total)
     done = 0
-    order = Order(chunks.identity, chunks.digest, study.recipe, study.files, study.keep, study.limits.run_seconds)
+    timed = "listed" in study.table.get("accuracy", {})
+    order = Order(
+        chunks.identity, chunks.digest, study.recipe, study.files, study.keep, study.limits.run_seconds, timed
+    )  # fmt: skip
     calls = ((task, (order, task)) for task in map(study.task, missing))
     for task, (part, bad) in pool.results(run_chunk, calls):
         write_bytes(chunks.path(task), [part], tidy=False)
@@ -164,7 +167,7 @@ class Order(NamedTuple):
     """What workers need for any chunk of a study.
 
     identity: of the whole study. digest: of what its parts have in common. files: path -> sha256 of those that its
-    scenes open.
+    scenes open. timed: whether parts state their seconds, for an estimate; otherwise equal rows have equal bytes.
     """
 
     identity: str
@@ -173,6 +176,7 @@ class Order(NamedTuple):
     files: Files
     keep: Keep
     run_seconds: float | None
+    timed: bool = False
 
 
 class _OutOfTimeError(Exception):
@@ -192,6 +196,7 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
 
 
 def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
+    begin = time.thread_time()
     factory = _factories.get(order.identity)
     if factory is None:
         factory = SceneFactory(order.recipe)
@@ -206,7 +211,8 @@ def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
         status, message, kept = _row(partial(factory.scene, values), order, numbers)
         rows.append({"run": task.first + offset, **at, "status": status, "message": message, **intensity, **kept})
     failed = sum(row["status"] not in ENDED for row in rows)
-    return _part(order, rows, failed), failed
+    seconds = time.thread_time() - begin
+    return _part(order, rows, failed, {"seconds": f"{seconds:.4g}"} if order.timed else {}), failed
 
 
 def _row(make: Callable[[], AnyScene], order: Order, at: dict[str, float]) -> tuple[str, str, dict[str, Any]]:
@@ -238,12 +244,12 @@ def _result(scene: AnyScene, seconds: float | None) -> Any:
     return run_to_end(scene, proceed=proceed)
 
 
-def _part(order: Order, rows: list[dict[str, Any]], failed: int) -> bytes:
-    """The columns of every part: run, axes, status, message, intensity, quantities."""
+def _part(order: Order, rows: list[dict[str, Any]], failed: int, more: dict[str, str]) -> bytes:
+    """The columns of every part: run, axes, status, message, intensity, quantities. more: metadata."""
     axes = [Column(axis.name, "", not axis.numeric) for axis in order.recipe.axes]
     intensity = [Column(INTENSITY, "m/s^2")] if order.recipe.intensities else []
     texts = [Column("status", "", text=True), Column("message", "", text=True)]
     columns = [*axes, *texts, *intensity, *order.keep.columns()]
     types = {"run": "int64", **{name: "string" if text else "double" for name, _, text in columns}}
     values = {(name, unit): [row.get(name) for row in rows] for name, unit, _ in (Column("run", ""), *columns)}
-    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed)})
+    return parquet_bytes(values, types, {"digest": order.digest, "failed": str(failed), **more})

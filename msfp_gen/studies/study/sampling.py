@@ -94,7 +94,9 @@ class Sampling:
     """How the values of the random axes are drawn, together.
 
     method: a key of METHODS. samples: their number; for one-at-a-time it follows from the axes. seed: equal seeds give
-    equal values. quantiles: of each axis, for one-at-a-time. values: of every sample, for listed. Raises InputError.
+    equal values. quantiles: of each axis, for one-at-a-time. values: of every sample, for listed.
+    cells: with listed, the combination of the values of all other axes that each sample has, from 1, the last axis
+    fastest; None: every sample has all of them. Raises InputError.
     """
 
     method: Annotated[str, Choice(METHODS)] = "latin-hypercube"
@@ -102,6 +104,7 @@ class Sampling:
     seed: Annotated[int, Quantity("", least=0, whole=True)] = 0
     quantiles: Annotated[tuple[float, float], Quantity("", above=0.0, shape=(2,))] = (0.1, 0.9)
     values: Annotated[tuple[tuple[float, ...], ...] | None, Quantity("", shape=(None, None))] = None
+    cells: Annotated[tuple[int, ...] | None, Quantity("", least=1, whole=True, shape=(None,))] = None
 
     def __post_init__(self) -> None:
         check_fields(self, "sampling")
@@ -113,8 +116,13 @@ class Sampling:
             raise InputError(f"sampling.samples {fact}: {rule}, with method = {self.method!r}")
         if not self.quantiles[0] < self.quantiles[1] < 1:
             raise InputError(f"sampling.quantiles = {list(self.quantiles)}: give two, rising, between 0 and 1")
-        if bool(self.values) != (self.method == "listed"):
+        listed = self.values or self.cells
+        if bool(listed) != (self.method == "listed"):
             raise InputError("sampling.values: give one row for each sample, with method = 'listed' only")
+        if self.values and self.cells and len(self.values) != len(self.cells):
+            raise InputError(
+                f"sampling.cells: {len(self.cells)} of them and {len(self.values)} rows of values; give one each"
+            )
 
     def drawn(self, distributions: Sequence[Distribution]) -> Array:
         """Values of the axes with these distributions, ndarray, shape (samples, axes). Raises InputError."""
@@ -125,6 +133,10 @@ class Sampling:
                     f"sampling.values: give {count} values in each row, one for each axis with a distribution"
                 )
             return np.array(self.values)
+        if self.cells is not None:
+            if count:
+                raise InputError(f"sampling.values: give {count} values for each sample, one for each random axis")
+            return np.zeros((len(self.cells), 0))
         return values_at(self.shares(count), distributions)
 
     def shares(self, axes: int) -> Array:

@@ -1,0 +1,271 @@
+"""What cheap models save in a study: `python benchmarks/fidelity.py`, the tables of docs/fidelity.md.
+
+A triple pendulum under a mass, with uncertain friction, azimuth and intensity, under synthetic records and the two bundled
+ones, none of which was used to choose anything. Every draw is run once by each model (`table`); estimates are then repeated
+with draws from this table, so that the truth is its mean and hundreds of repetitions cost nothing. Seconds are those that
+the runs of the table took, and what it takes to make a scene in a study. `--folder DIR` keeps the tables.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from msfp_gen import load_scene
+from msfp_gen.buildings.file import reduced
+from msfp_gen.motions.motion import Motion
+from msfp_gen.scene.scene import Scene
+from msfp_gen.studies.batch import run_to_end
+from msfp_gen.studies.estimation.crossing import crossings
+from msfp_gen.studies.estimation.estimate import Estimate, Question, estimated, fragility_of
+from msfp_gen.studies.study.axes import SceneFactory
+from msfp_gen.studies.study.loader import example_text, load_study
+
+sys.path.append(str(Path(__file__).parent))
+from quick import parser, pick
+
+LEVELS = ("exact", "backbone")
+REPETITIONS = pick(400, 2)
+COUNTS = pick((400, 600, 100), (40, 40, 20))  # draws of design, beyond it, and of searches
+MEDIANS = {"design": 0.55, "beyond": 1.0, "searches": None}  # of the scale of motions
+SEEDS = {"design": 13, "beyond": 11, "searches": 12}
+SCALES = np.linspace(0.5, 3.2, 10)
+CAPACITY = 0.22  # displacement of the fragility [m]
+STEP, DURATION = 0.01, pick(30.0, 8.0)
+NAMES = ("displacement", "shear", "rim_use", "seconds", "ok")
+
+
+def noise(rng: np.random.Generator) -> Motion:
+    """A record that never was: two horizontal components of noise through the filter of Kanai and Tajimi (1957-60).
+
+    The ground has a frequency of 0.8 to 2.5 Hz and a damping of 0.6, the envelope rises in 4 s and decays after 12 s,
+    frequencies below 0.15 Hz are cut off, and the peak is 3 m/s^2.
+    """
+    times = np.arange(0.0, DURATION + STEP / 2, STEP)
+    frequencies = np.fft.rfftfreq(len(times), STEP)
+    ground, damping = rng.uniform(0.8, 2.5), 0.6
+    ratio = frequencies / ground
+    gain = (1 + 2j * damping * ratio) / (1 - ratio**2 + 2j * damping * ratio) * (frequencies / 0.15) ** 2
+    gain /= 1 - (frequencies / 0.15) ** 2 + 1.4j * frequencies / 0.15
+    envelope = np.minimum(times / 4, 1) * np.exp(-np.maximum(times - 12, 0) / 5)
+    parts = [np.fft.irfft(np.fft.rfft(rng.standard_normal(len(times))) * gain, len(times)) * envelope for _ in range(2)]
+    parts = [part - np.mean(part) * envelope / np.mean(envelope) for part in parts]
+    acceleration = np.stack([*parts, np.zeros(len(times))], axis=1)
+    return Motion.from_acceleration(times, 3.0 * acceleration / np.abs(acceleration).max())
+
+
+def draws(seed: int, count: int, median: float | None) -> Iterator[Scene]:
+    """Random scenes: each third one under a bundled record, turned at random, the others under noise.
+
+    median: of the scale of the motion, which is lognormal with 0.35; None: each draw at all SCALES.
+    """
+    rng = np.random.default_rng(seed)
+    bundled = [load_scene(name) for name in ("ridgecrest-clc", "ridgecrest-ccc")]
+    for number in range(count):
+        factor, azimuth, scale = (
+            np.exp(0.2 * rng.standard_normal()),
+            rng.uniform(0, np.pi),
+            np.exp(0.35 * rng.standard_normal()),
+        )
+        base = bundled[number % 2]
+        motion = noise(rng) if number % 3 else base.motion.rotated(float(azimuth))
+        horizontal = motion.coefficients.copy()
+        horizontal[:, 2] = 0.0
+        bearing = base.bearing.replace(friction=[factor * surface.friction for surface in base.bearing.surfaces])
+        bearing = bearing.replace(reference_pressure=None)
+        effects = replace(base.effects, friction="constant")
+        solver = replace(base.solver, rtol=1e-3)
+        for each in SCALES if median is None else [median * scale]:
+            yield replace(
+                base, motion=replace(motion, coefficients=float(each) * horizontal), motion_table=None, bearing=bearing,
+                effects=effects, solver=solver,
+            )  # fmt: skip
+
+
+def row(scene: Scene, level: str) -> list[float]:
+    """The quantities of a run, the seconds that it took, and whether it reached its end."""
+    begin = time.perf_counter()
+    result = run_to_end(reduced(scene, level))
+    summary = result.summary
+    capacities = [surface.capacity for surface in scene.bearing.surfaces]
+    use = 1 - min(gap / capacity for gap, capacity in zip(summary["minimum_gap"], capacities, strict=True))
+    seconds = time.perf_counter() - begin
+    ended = float(result.status == "ok")
+    return [summary["peak_displacement"]["radial"], summary["peak_force"]["radial"], use, seconds, ended]
+
+
+def table(path: Path, seed: int, count: int, levels: tuple[str, ...], median: float | None) -> dict[str, np.ndarray]:
+    """Rows of every level, shape (scenes, NAMES), computed unless the file has them."""
+    if path.is_file():
+        with np.load(path) as kept:
+            return {level: kept[level] for level in levels}
+    rows: dict[str, list[list[float]]] = {level: [] for level in levels}
+    for scene in draws(seed, count, median):
+        for level in levels:
+            rows[level].append(row(scene, level))
+    arrays = {level: np.array(each) for level, each in rows.items()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez(path, **arrays)
+    return arrays
+
+
+class Table:
+    """A source of an estimate: draws of rows of a table, with replacement.
+
+    scales: the rows of a draw are those of the scales, one after the other.
+    """
+
+    population = None
+
+    def __init__(self, rows: dict[str, np.ndarray], column: int, seed: int, making: float, scales: int = 1) -> None:
+        self.levels = tuple(rows)
+        self._rows, self._column, self._scales = rows, column, scales
+        self._place = np.random.default_rng([seed, 1]).integers(len(rows["exact"]) // scales, size=200_000)
+        self._costs = {level: float(np.mean(each[:, 3])) + making for level, each in rows.items()}
+        self._done = {level: np.zeros((200_000, scales), dtype=bool) for level in rows}
+
+    def values(self, level: str, draws: np.ndarray, scales: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """As of `Source`."""
+        at = np.zeros(len(draws), dtype=int) if scales is None else scales
+        self._done[level][draws, at] = True
+        rows = self._rows[level][self._place[draws] * self._scales + at]
+        return rows[:, self._column], rows[:, 4] == 0
+
+    def cost(self, level: str) -> float:
+        """As of `Source`."""
+        return self._costs[level]
+
+    def spent(self) -> tuple[float, dict[str, int]]:
+        """As of `Source`."""
+        runs = {level: int(done.sum()) for level, done in self._done.items() if done.any()}
+        return sum(self._costs[level] * count for level, count in runs.items()), runs
+
+
+def making() -> float:
+    """Seconds in which a study makes a scene."""
+    study = load_study(tomllib.loads(example_text()))
+    factory = SceneFactory(study.recipe)
+    rows = study.task(0).rows(study.axes)
+    for values, _ in rows:
+        factory.scene(values)
+    begin = time.process_time()
+    for values, _ in rows:
+        factory.scene(values)
+    return (time.process_time() - begin) / len(rows)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One line of the table: population, column of its rows, and the question."""
+
+    about: str
+    population: str
+    column: int
+    question: Question
+
+    def truth(self, rows: np.ndarray) -> float:
+        """The statistic of the whole table."""
+        values, threshold = rows[:, self.column], self.question.threshold
+        outcomes = np.where(rows[:, 4] == 0, np.inf, values)
+        if self.question.statistic == "probability":
+            return float(np.mean(np.where(values >= threshold, True, np.isinf(outcomes))))
+        if self.question.statistic == "quantile":
+            return float(np.quantile(outcomes, threshold, method="inverted_cdf"))
+        return float(values.mean())
+
+
+CASES = (
+    Case("mean of peak displacement", "design", 0, Question("u", target=0.03)),
+    Case("mean of base shear", "design", 1, Question("V", target=0.02)),
+    Case("mean of peak displacement", "beyond", 0, Question("u", target=0.03)),
+    Case("mean of base shear", "beyond", 1, Question("V", target=0.05)),
+    Case("probability of meeting a rim", "beyond", 2, Question("rim", "probability", 1.0, target=0.03)),
+    Case("fragility of 0.22 m", "searches", 0, Question("u", "fragility", CAPACITY, target=0.04)),
+    Case("0.9 quantile of peak displacement", "design", 0, Question("u", "quantile", 0.9, target=0.05)),
+)
+
+
+def once(case: Case, rows: dict[str, np.ndarray], seed: int, scene: float) -> Estimate:
+    """One repetition of an estimate."""
+    question = replace(case.question, seed=seed)
+    if question.statistic != "fragility":
+        return estimated(Table(rows, case.column, seed, scene), question)
+    source = Table(rows, case.column, seed, scene, len(SCALES))
+    return fragility_of(source, question, SCALES, lambda numbers: np.zeros(len(numbers)))
+
+
+def known_median(rows: dict[str, np.ndarray]) -> float:
+    """The median of the fragility from the crossings of all draws of the table."""
+    source = Table(rows, 0, 0, 0.0, len(SCALES))
+    source._place = np.arange(len(rows["exact"]) // len(SCALES))
+    found = crossings(source, "exact", source._place, SCALES, CAPACITY, np.zeros(len(source._place)))
+    return float(np.exp(found.logarithms.mean()))
+
+
+def line_of(case: Case, rows: dict[str, np.ndarray], scene: float) -> str:
+    """The line of a case."""
+    fragile = case.question.statistic == "fragility"
+    truth = known_median(rows) if fragile else case.truth(rows["exact"])
+    found = [once(case, rows, seed, scene) for seed in range(REPETITIONS)]
+    held = np.mean([one.interval[0] <= truth <= one.interval[1] for one in found])
+    gain = np.median([one.plain_seconds / one.seconds for one in found])
+    exact = int(np.median([one.runs["exact"] for one in found]))
+    rho = np.median([one.correlation["backbone"] for one in found])
+    plain = "" if fragile else f"{100 * plain_coverage(case, rows['exact'], truth, found):.1f} %"
+    word = {"probability": f"{case.question.target:g}"}.get(
+        case.question.statistic, f"{100 * case.question.target:g} %"
+    )
+    return f"| {case.about} | {case.population} | {word} | {rho:.3f} | {exact} | {gain:.1f} | {100 * held:.1f} % | {plain} |"
+
+
+def plain_coverage(case: Case, rows: np.ndarray, truth: float, found: list[Estimate]) -> float:
+    """How often intervals of as many plain runs as the estimates replace hold the truth, by the usual formulas."""
+    rng = np.random.default_rng(3)
+    values = np.where(rows[:, 4] == 0, np.inf, rows[:, case.column])
+    held = []
+    for one in found:
+        count = max(int(one.plain_seconds / one.costs["exact"]), 8)
+        drawn = values[rng.integers(len(values), size=count)]
+        if case.question.statistic == "quantile":
+            share, spread = case.question.threshold, 1.96 * np.sqrt(0.09 / count)
+            low, high = np.quantile(drawn, np.clip([share - spread, share + spread], 0, 1), method="inverted_cdf")
+            held.append(low <= truth <= high)
+            continue
+        if case.question.statistic == "probability":
+            drawn = (drawn >= case.question.threshold).astype(float)
+        else:
+            drawn = rows[rng.integers(len(values), size=count), case.column]
+        held.append(abs(drawn.mean() - truth) <= 1.96 * drawn.std(ddof=1) / np.sqrt(count))
+    return float(np.mean(held))
+
+
+def main() -> None:
+    """Make the tables, repeat the estimates, and print the lines."""
+    options = parser(__doc__)
+    options.add_argument("--folder", type=Path, help="where the tables of runs are kept")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = given.folder or Path(scratch)
+        scene = making()
+        print("| statistic | population | target | correlation | exact runs | times faster | coverage | of plain |")
+        print("|---|---|---|---|---|---|---|---|", flush=True)
+        populations = {}
+        for name, count in zip(MEDIANS, COUNTS, strict=True):
+            populations[name] = table(folder / f"{name}.npz", SEEDS[name], count, LEVELS, MEDIANS[name])
+        for case in CASES:
+            print(line_of(case, populations[case.population], scene), flush=True)
+        for name, rows in populations.items():
+            costs = ", ".join(f"{level} {1e3 * (each[:, 3].mean() + scene):.3g} ms" for level, each in rows.items())
+            early = 100 * float((rows["exact"][:, 4] == 0).mean())
+            print(f"\n{name}: {costs}; {early:.1f} % of exact runs ended early")
+
+
+if __name__ == "__main__":
+    main()

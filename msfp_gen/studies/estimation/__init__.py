@@ -1,0 +1,1 @@
+"""Estimates of a study from cheap and exact runs together (docs/fidelity.md)."""

@@ -1,0 +1,185 @@
+"""The cheapest level: a mass on the published backbones of its bearings, in fixed steps of compiled code.
+
+The backbone up to its regime of least slope is one of elastic and plastic elements in parallel, which reverse as the
+stack does; the regimes after it, in which rims carry, are springs beyond a gap. Force and load act in both directions.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msfp_gen.buildings.fidelity import load_shares
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError
+from msfp_gen.jit.driver import load_driver
+from msfp_gen.scene.backbone import Backbone
+from msfp_gen.scene.scene import Scene
+from msfp_gen.scene.top import MassTop
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from msfp_gen.buildings.file import AnyScene
+    from msfp_gen.buildings.scene import BuildingScene
+    from msfp_gen.motions.motion import Motion
+    from msfp_gen.scene.bearing import Bearing
+
+STEP = 0.005  # [s], at most
+STABLE = 0.5  # largest circular frequency times step
+# Quantities of its runs, without the number of a surface.
+QUANTITIES = (
+    "status", "message", "duration", "peak_displacement", "peak_force", "peak_force_ratio", "rims_met", "wall_time",
+)  # fmt: skip
+OF_SURFACES = ("peak_sliding", "minimum_gap", "capacity_used")  # of one bearing only
+
+
+class _NoHistory:
+    """What a run without rows has of a history: nothing."""
+
+    def columns(self, _: object) -> dict[str, Any]:
+        """No columns."""
+        return {}
+
+    def arrays_of(self, _: object) -> dict[str, Any]:
+        """No arrays."""
+        return {}
+
+
+@dataclass(frozen=True)
+class BackboneRun:
+    """A run of the cheapest level: its scene and the quantities of its summary; there are no rows.
+
+    Sliding of surfaces is that of the published backbone at the largest displacement.
+    """
+
+    scene: AnyScene
+    status: str
+    message: str
+    summary: dict[str, Any]
+
+    def storage(self) -> _NoHistory:
+        """Nothing is stored of a run without rows."""
+        return _NoHistory()
+
+    def characterise(self) -> Any:
+        """Raises InputError: there are no rows."""
+        raise InputError("fidelity = 'backbone': it keeps no history; give 'equivalent'")
+
+
+def run_backbone(scene: AnyScene) -> BackboneRun:
+    """Run a scene at the cheapest level. Raises InputError: what it is not for, as `check_backbone` says."""
+    begin = time.perf_counter()
+    check_backbone(scene)
+    bearings, shares, mass, stop = _parts(scene)
+    elements, spring, gaps = _elements(tuple(bearings), tuple(shares), mass)
+    stiffest = float(elements[0].sum() + spring + gaps[1].max())
+    gravity = bearings[0].gravity
+    step = min(STEP, STABLE / np.sqrt(gravity * stiffest))
+    ground = _ground(scene.motion, scene.end, float(step))
+    peak, force, steps = _driver().run(elements, spring, gaps, ground, float(step), gravity, stop)
+    stopped = steps < len(ground)
+    summary: dict[str, Any] = {
+        "status": "stopped" if stopped else "ok",
+        "message": "",
+        "duration": min(steps * float(step), scene.end),
+        "peak_displacement": {"radial": peak},
+        "peak_force": {"radial": force * mass},
+        "peak_force_ratio": force / gravity,
+        "wall_time": time.perf_counter() - begin,
+    }
+    if isinstance(scene, Scene):
+        sliding = _backbone(scene.bearing).sliding(peak)
+        gap = [surface.capacity - value for surface, value in zip(scene.bearing.surfaces, sliding, strict=True)]
+        met = [number for number, value in enumerate(gap, start=1) if value <= 1e-9]
+        summary |= {"peak_sliding": sliding, "minimum_gap": gap, "rims_met": met}
+    return BackboneRun(scene, summary["status"], "", summary)
+
+
+def check_backbone(scene: AnyScene) -> None:
+    """Raise InputError where a scene is none of a mass on bearings that starts at rest."""
+    if isinstance(scene, Scene):
+        if not isinstance(scene.top, MassTop):
+            raise InputError(
+                f"top.kind = {scene.top.kind!r}: the model 'backbone' carries a mass; give top.kind = 'mass', or "
+                "accuracy.models = ['massless']"
+            )
+        for name in ("initial_state", "load", "top_rotation"):
+            if getattr(scene, name) is not None:
+                raise InputError(
+                    f"{name}: the model 'backbone' has none; leave it out, or give accuracy.models = ['massless']"
+                )
+    if np.any(scene.motion.coefficients[:, 3:]):
+        raise InputError(
+            "motion: the base rotates, which the model 'backbone' does not see; give accuracy.models = ['massless']"
+        )
+
+
+def _parts(scene: AnyScene) -> tuple[list[Bearing], list[float], float, float]:
+    """Bearings, their shares of the load, the mass that they carry, and the displacement that ends the run."""
+    if isinstance(scene, Scene):
+        assert isinstance(scene.top, MassTop)
+        stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
+        return [scene.bearing], [1.0], scene.top.mass, stop
+    return list(scene.every_bearing), _shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
+
+
+def _shares(scene: BuildingScene) -> list[float]:
+    return load_shares(scene)
+
+
+@lru_cache(maxsize=64)
+def _backbone(bearing: Bearing) -> Backbone:
+    return Backbone.of(bearing)
+
+
+def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: float) -> tuple[Array, float, Array]:
+    """Elements (stiffness, strength), spring, and gaps (displacement, stiffness) of bearings side by side."""
+    weights: dict[Bearing, float] = {}
+    for bearing, share in zip(bearings, shares, strict=True):
+        weights[bearing] = weights.get(bearing, 0.0) + share
+    parts = [(share, *parallel(_backbone(bearing))) for bearing, share in weights.items()]
+    elements = np.concatenate([[[share * w for w in row] for row in own] for share, own, _, _ in parts], axis=1)
+    gaps = np.concatenate([own * [[1.0], [share]] for share, _, _, own in parts], axis=1)
+    rim = sum(bearing.surfaces[0].rim_stiffness for bearing in bearings) / (mass * bearings[0].gravity)
+    last = min(_backbone(bearing).capacity for bearing in weights)
+    most = STABLE**2 / (bearings[0].gravity * (STEP / 5) ** 2)
+    gaps = np.concatenate([gaps, [[last], [min(rim, most)]]], axis=1)
+    limit = _driver().MOST
+    if elements.shape[1] > limit:
+        raise InputError(f"bearings: {elements.shape[1]} regimes of different bearings; the backbone takes {limit}")
+    return elements, float(sum(share * spring for share, _, spring, _ in parts)), gaps
+
+
+def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
+    """Elements (stiffness [1/m], strength), spring [1/m], and gaps (displacement [m], stiffness [1/m]) of a backbone.
+
+    Each element yields where the slope falls. Stiffness and strength are over the load.
+    """
+    u, force = backbone.points
+    slopes = np.diff(force) / np.diff(u)
+    main = int(np.argmin(slopes))
+    rising = np.array([force[0] / backbone.yielding, *slopes[: main + 1]])
+    yields = backbone.yielding + u[: main + 1]
+    stiffness = rising[:-1] - rising[1:]
+    falling = stiffness > 0
+    gaps = np.array([u[main + 1 : -1], np.diff(slopes[main:])])
+    return np.array([stiffness, stiffness * yields])[:, falling], float(slopes[main]), gaps
+
+
+def _ground(motion: Motion, end: float, step: float) -> Array:
+    """Accelerations of the ground at the beginning of every step [m/s^2], shape (steps, 3)."""
+    times = np.arange(0.0, end, step)
+    if not motion.sampled:
+        return np.ascontiguousarray(motion.evaluate(times, 2)[:, :3])
+    at_knots = 2 * motion.coefficients[:, :3, 2]  # linear between samples
+    return np.stack([np.interp(times, motion.knots[:-1], channel) for channel in at_knots.T], axis=1)
+
+
+@cache
+def _driver() -> ModuleType:
+    return load_driver("msfp_gen.studies.estimation")[0]

@@ -1,0 +1,566 @@
+"""`estimate`: a mean, variance, probability, quantile or fragility of a study from cheap and exact runs together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.common.fields import Choice, Quantity, check_fields
+from msfp_gen.common.quantities import to_si
+from msfp_gen.errors import InputError
+from msfp_gen.studies.estimation.allocation import EXACT, best_chain, factor_for, optimal_runs
+from msfp_gen.studies.estimation.crossing import crossings
+from msfp_gen.studies.estimation.estimators import (
+    Flags,
+    Indices,
+    Moment,
+    Runs,
+    bent,
+    exceedance,
+    exceeding,
+    feature,
+    predictions,
+    quantile_of,
+    quantile_of_t,
+    telescoped,
+    uncertainty,
+    variance_of,
+)
+from msfp_gen.studies.estimation.source import Source, StudySource
+from msfp_gen.studies.pool import pool_from
+from msfp_gen.studies.study.definition import Study
+from msfp_gen.studies.study.loader import load_study
+
+STATISTICS = {
+    "mean": "the mean",
+    "variance": "the variance",
+    "probability": "the probability that the quantity is at least `threshold`",
+    "quantile": "the value below which the share `threshold` of all lies",
+    "fragility": "the median scale or intensity at which the quantity reaches `threshold`, and its dispersion",
+}
+LEVELS = {"backbone": 1, "equivalent": 2, "rigid": 3, "massless": 3, "loose": 3}  # cheaper models, cheapest first
+ENOUGH = 0.25  # work of a chain over that of plain Monte Carlo below which dearer models are not tried
+NO_BENEFIT = 0.8  # and above which the study is run plainly
+ROUNDS = 8
+GROWTH = 3.0  # of the exact runs from one round to the next, at most
+MARGIN = 0.9  # of the half width that the runs are planned for, over the target
+MOST = 200_000  # draws
+CHOSEN = 1.5  # exact runs at least, over those of the pilot
+CHEAP = 8  # cheap runs for each exact one in the pilot
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is estimated, and how well: `[accuracy]` of a study file.
+
+    quantity: a column of the study. statistic: a key of STATISTICS. threshold: of a probability or a fragility [unit of
+    the quantity], or the share of a quantile. target: half the width of the interval of 95 % over the value, for a
+    probability the half width itself. budget: of all runs together, over all workers [s]. pilot: exact runs at the
+    start. models: cheaper models; None: chosen. seed: of the draws. logarithmic: whether the values are logarithms,
+    whose half width is relative already. Raises InputError.
+    """
+
+    quantity: str | None = None
+    statistic: Annotated[str, Choice(STATISTICS)] = "mean"
+    threshold: Annotated[float | None, Quantity("")] = None
+    target: Annotated[float | None, Quantity("", above=0.0)] = None
+    budget: Annotated[float | None, Quantity("s", above=0.0)] = None
+    pilot: Annotated[int, Quantity("", least=16, whole=True)] = 32
+    models: tuple[str, ...] | None = None
+    seed: Annotated[int, Quantity("", least=0, whole=True)] = 0
+    logarithmic: bool = field(default=False, repr=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self, "accuracy")
+        needs = self.statistic in ("probability", "quantile", "fragility")
+        if needs != (self.threshold is not None):
+            rule = "give it" if needs else "leave it out"
+            raise InputError(f"accuracy.threshold = {self.threshold}: {rule} with statistic = {self.statistic!r}")
+        if self.statistic == "quantile" and not 0 < (self.threshold or 0.0) < 1:
+            raise InputError(f"accuracy.threshold = {self.threshold:g}: give the share of a quantile, between 0 and 1")
+        if self.target is None and self.budget is None:
+            raise InputError("accuracy: give target, such as '2 %', or budget, such as '10 min'")
+        for name in self.models or ():
+            if name not in LEVELS:
+                raise InputError(f"accuracy.models has {name!r}: give some of {', '.join(map(repr, LEVELS))}")
+
+    @property
+    def of_share(self) -> bool:
+        """Whether the statistic follows from probabilities."""
+        return self.statistic in ("probability", "quantile")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Result of `estimate`.
+
+    Attributes:
+        quantity, statistic, threshold, unit: what was estimated; of a fragility the unit of its intensity.
+        value: the estimate.
+        interval: (low, high), of 95 %.
+        runs: model -> number of its runs.
+        seconds: of all runs, on one core [s].
+        plain_seconds: what plain Monte Carlo needs for this interval, from the variance and the cost of exact runs [s].
+        correlation: model -> that with the exact one, at the same draws.
+        costs: model -> seconds of a run [s].
+        dispersion, dispersion_interval: of a fragility, standard deviation of the logarithm; else None.
+        trace: pairs of seconds and half width, after each round.
+        notes: what a reader must know, one line each.
+    """
+
+    quantity: str
+    statistic: str
+    threshold: float | None
+    unit: str
+    value: float
+    interval: tuple[float, float]
+    runs: dict[str, int]
+    seconds: float
+    plain_seconds: float
+    correlation: dict[str, float]
+    costs: dict[str, float]
+    dispersion: float | None = None
+    dispersion_interval: tuple[float, float] | None = None
+    trace: tuple[tuple[float, float], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def half(self) -> float:
+        """Half the width of the interval."""
+        return (self.interval[1] - self.interval[0]) / 2
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, ready for JSON."""
+        return asdict(self)
+
+
+def question_of(study: Study, **given: Any) -> Question:
+    """The question of `[accuracy]` in a study file, with what is given in place of it. Raises InputError."""
+    table = {key: value for key, value in study.table.get("accuracy", {}).items() if key != "listed"}
+    known = [name for name in Question.__dataclass_fields__ if name != "logarithmic"]
+    if unknown := [key for key in table if key not in known]:
+        raise InputError(f"accuracy.{unknown[0]}: no such key; the keys are {', '.join(known)}")
+    goals = ("target", "budget")
+    if any(given.get(name) is not None for name in goals):
+        table = {key: value for key, value in table.items() if key not in goals}
+    table |= {key: value for key, value in given.items() if value is not None}
+    for name, unit in (("target", ""), ("budget", "s"), ("threshold", "")):
+        if isinstance(table.get(name), str):
+            try:
+                table[name] = _number(table[name], unit)
+            except ValueError as error:
+                raise InputError(f"accuracy.{name} = {table[name]!r}: {error}") from None
+    if isinstance(table.get("models"), list):
+        table["models"] = tuple(table["models"])
+    question = Question(**table)
+    if question.quantity is None:
+        raise InputError("accuracy.quantity is missing: give a column of the study, such as 'peak_displacement'")
+    return question
+
+
+def _number(text: str, unit: str) -> float:
+    share = text.strip().removesuffix("%")
+    return float(share) / 100 if share != text.strip() else float(to_si(text, unit))
+
+
+def estimate(
+    source: Study | str | Path | Mapping[str, Any],
+    folder: str | Path,
+    quantity: str | None = None,
+    statistic: str | None = None,
+    threshold: float | None = None,
+    target: float | str | None = None,
+    budget: float | str | None = None,
+    *,
+    models: Sequence[str] | None = None,
+    pilot: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    threads: bool = False,
+    executor: Executor | None = None,
+    dask: str | None = None,
+    mpi: bool = False,
+    progress: Any = None,
+) -> Estimate:
+    """Estimate a statistic of a quantity over the draws of a study, with few exact runs.
+
+    A draw is a combination of the values of the axes, each as likely as any other, with a value of each random axis.
+    Exact runs are kept in `folder` as those of any study, runs of cheaper models in folders within it; the same call
+    continues. What is not given is that of `[accuracy]` in the study file.
+
+    Parameters
+    ----------
+    source
+        A study file, a table of the same keys, or a `Study`.
+    folder
+        Of the study.
+    quantity, statistic, threshold, target, budget, models, pilot, seed
+        As in `Question`; target and budget also as texts, such as "2 %" and "10 min".
+    workers, threads, executor, dask, mpi
+        As of `study`.
+    progress
+        Called with the name of a model and the number of its runs, before these.
+
+    Raises
+    ------
+    InputError
+        Invalid input, or a target that the budget does not permit.
+    RunError
+        Workers died; the same call continues.
+
+    """
+    study = source if isinstance(source, Study) else load_study(source)
+    question = question_of(
+        study, quantity=quantity, statistic=statistic, threshold=threshold, target=target, budget=budget,
+        models=None if models is None else tuple(models), pilot=pilot, seed=seed,
+    )  # fmt: skip
+    levels = (EXACT, *_levels(study, question))
+    assert question.quantity is not None
+    scales, names = _scales(study, question)
+    units = {column.name: column.unit for column in study.keep.columns()}
+    with pool_from(workers, threads, executor, dask, mpi) as pool:
+        runs = StudySource(study, Path(folder), question.quantity, levels, question.seed, pool, progress)
+        if scales is None:
+            unit = units[question.quantity]
+            unit = {"probability": "", "variance": f"({unit})^2" if unit else ""}.get(question.statistic, unit)
+            return replace(estimated(runs, question), unit=unit)
+        found = fragility_of(runs, question, scales, lambda draws: np.log(runs.draws.intensity(draws)))
+    return replace(found, unit=names)
+
+
+def _levels(study: Study, question: Question) -> tuple[str, ...]:
+    """The cheaper models to try, cheapest first."""
+    if question.models is not None:
+        return question.models
+    building = bool(study.keep.counts.bearings)
+    return ("backbone", "rigid" if building else "massless")
+
+
+def _scales(study: Study, question: Question) -> tuple[Array | None, str]:
+    """The scales of a study whose fragility is asked for, and the unit of its intensity; None for other statistics."""
+    if question.statistic != "fragility":
+        return None, ""
+    axis = next((axis for axis in study.axes if axis.name == "scale"), None)
+    if axis is None or axis.values is None or len(axis.values) < 3:
+        raise InputError("accuracy.statistic = 'fragility': give records.scales, three or more, rising")
+    scales = np.array(axis.values, dtype=float)
+    if not (np.diff(scales) > 0).all():
+        raise InputError(f"records.scales = {scales.tolist()}: a fragility needs them rising")
+    return scales, "m/s^2" if study.recipe.intensities else ""
+
+
+class _State:
+    """Runs of the models of a chain so far, and the chances with which exact ones are chosen."""
+
+    def __init__(self, source: Source, question: Question) -> None:
+        self.source, self.question = source, question
+        self.pilot = min(question.pilot, source.population or question.pilot)
+        self.chain: tuple[str, ...] = (EXACT,)
+        self.count = self.pilot
+        self.scale: dict[str, float] = {}
+        self.early: dict[str, int] = {}
+        self.weights: Any = None
+        self.uniform = np.random.default_rng([question.seed, 2**31]).random(MOST)
+
+    def outcome(self, level: str, draws: Indices) -> Array:
+        """The values of a model as the statistic takes them."""
+        values, early = self.source.values(level, draws)
+        self.early[level] = int(early.sum())
+        if self.question.of_share:
+            bound = (self.question.threshold or 0.0) if self.question.statistic == "probability" else np.inf
+            return np.where(early & (values < bound), np.inf, values)
+        if level == EXACT and np.isinf(values).any():
+            raise InputError(
+                f"quantity = {self.question.quantity!r}: {int(np.isinf(values).sum())} exact runs have none; see their "
+                "message, or ask for a probability or a quantile, in which they count as above all others"
+            )
+        return values
+
+    def levels(self) -> list[Runs]:
+        """The runs of every model of the chain, computed where they are missing."""
+        draws = np.arange(self.count)
+        last = Runs(draws, self.outcome(self.chain[-1], draws), np.ones(self.count))
+        if len(self.chain) == 1:
+            return [last]
+        if self.weights is None:
+            exact = self.outcome(EXACT, draws[: self.pilot])
+            self.weights = self._weights(exact, feature(last.values)[: self.pilot])
+        weights = self.weights(feature(last.values))
+        chosen, least = [], np.zeros(self.count)
+        for level in self.chain[:-1]:
+            least = np.maximum(least, np.minimum(self.scale.get(level, 0.0) * weights, 1.0))
+            chances = np.where(draws < self.pilot, 1.0, least)
+            here = draws[self.uniform[: self.count] < chances]
+            chosen.append(Runs(here, self.outcome(level, here), chances[here]))
+        return [*chosen, last]
+
+    def _weights(self, exact: Array, x: Array) -> Any:
+        bound = self.bound(exact) if self.question.of_share else None
+        return lambda at: uncertainty(x, exact, bound, at)
+
+    def bound(self, exact: Array) -> float:
+        """The threshold of a probability, or the quantile of the pilot."""
+        assert self.question.threshold is not None
+        if self.question.statistic == "probability":
+            return self.question.threshold
+        return float(np.quantile(feature(exact), self.question.threshold))
+
+    def grow(self, wanted: Array) -> None:
+        """Plan for these numbers of runs of every model, exact first."""
+        limit = min(MOST, self.source.population or MOST)
+        if len(self.chain) == 1:
+            self.count = min(max(int(np.ceil(wanted[0])), self.count), limit)
+            return
+        self.count = min(max(int(np.ceil(wanted[-1] / 64)) * 64, self.count), limit)
+        values = feature(self.outcome(self.chain[-1], np.arange(self.count)))
+        weights = self.weights(values)[self.pilot :]
+        for level, number in zip(self.chain[:-1], wanted[:-1], strict=True):
+            more = factor_for(weights, float(number) - self.pilot)
+            self.scale[level] = max(self.scale.get(level, 0.0), more)
+
+
+def estimated(source: Source, question: Question) -> Estimate:
+    """The estimate of a statistic from a source of runs. Raises InputError."""
+    return _estimated(source, question)[0]
+
+
+def _estimated(source: Source, question: Question) -> tuple[Estimate, list[Runs], int]:
+    """The estimate, the runs that it is of, and the number of draws in the pilot."""
+    state, notes = _State(source, question), []
+    correlation = _pilot(state)
+    if len(state.chain) == 1:
+        notes.append("no cheaper model saves time here (correlation too low, or too dear): exact runs only")
+    trace: list[tuple[float, float]] = []
+    for _ in range(ROUNDS):
+        levels = state.levels()
+        value, interval, moment = _answer(question, levels, state.pilot, source.population)
+        spent, runs = source.spent()
+        trace.append((spent, (interval[1] - interval[0]) / 2))
+        if not _more(state, question, value, interval, moment, len(levels[0].draws)):
+            break
+    costs = {level: source.cost(level) for level in runs}
+    half = (interval[1] - interval[0]) / 2
+    if question.target is not None and half > 1.02 * _absolute(question, value):
+        notes.append(f"the target was not reached: the half width is {half:.3g}")
+    if question.budget is not None and spent > 1.1 * question.budget:
+        notes.append(f"the runs took {spent:.3g} s in place of {question.budget:g} s: a pilot needs that; give fewer")
+    notes += _early_notes(state, runs)
+    plain = _plain_variance(question, levels, value, interval, moment)
+    seconds = costs[EXACT] * plain * quantile_of_t(np.inf) ** 2 / half**2 if half > 0 else spent
+    estimate = Estimate(
+        question.quantity or "", question.statistic, question.threshold, "", value, interval, runs, spent, seconds,
+        correlation, costs, trace=tuple(trace), notes=tuple(notes),
+    )  # fmt: skip
+    return estimate, levels, state.pilot
+
+
+def _pilot(state: _State) -> dict[str, float]:
+    """Run the pilot of each model and choose the chain; correlations by model.
+
+    The cheapest model comes first: a search for a crossing begins where it crosses.
+    """
+    draws, source = np.arange(state.pilot), state.source
+    cheaper = sorted(source.levels[1:], key=lambda name: LEVELS.get(name, 9))
+    for level in cheaper[:1]:
+        state.outcome(level, draws)
+    exact = state.outcome(EXACT, draws)
+    correlation, costs = {EXACT: 1.0}, {EXACT: source.cost(EXACT)}
+    best = best_chain(correlation, costs)
+    for level in cheaper:
+        if best.work < ENOUGH and state.question.models is None:
+            break
+        many = np.arange(min(CHEAP * state.pilot, source.population or MOST)) if LEVELS.get(level) == 1 else draws
+        x = feature(state.outcome(level, many))[: state.pilot]
+        costs[level] = source.cost(level)
+        correlation[level] = _correlation(state, exact, x)
+        best = best_chain(correlation, costs)
+    state.chain = best.models if best.work < NO_BENEFIT else (EXACT,)
+    if len(state.chain) > 1:
+        state.count = min(CHEAP * state.pilot, source.population or MOST)
+        state.scale = dict.fromkeys(state.chain[:-1], 0.0)
+    return {name: value for name, value in correlation.items() if name != EXACT}
+
+
+def _correlation(state: _State, exact: Array, x: Array) -> float:
+    """That of the target of the statistic with its prediction; of the values where the pilot has yes or no only."""
+    target, draws = exact, np.arange(len(exact))
+    if state.question.of_share:
+        target = feature(exact)
+        indicator = (exact >= state.bound(exact)).astype(float)
+        if 2 <= indicator.sum() <= len(indicator) - 2:
+            predicted = predictions(exceedance(state.bound(exact)), draws, x, draws, exact)
+            return _linear(indicator, predicted)
+    return _linear(target, predictions(bent, draws, x, draws, target))
+
+
+def _linear(one: Array, other: Array) -> float:
+    """The correlation of two arrays, 0 where one does not vary or they are opposed."""
+    if not (np.std(one) > 0 and np.std(other) > 0):
+        return 0.0
+    return max(float(np.corrcoef(one, other)[0, 1]), 0.0)
+
+
+def _answer(
+    question: Question, levels: list[Runs], pilot: int, population: int | None
+) -> tuple[float, tuple[float, float], Moment]:
+    """Value, interval, and the moment from which the runs are planned."""
+    if question.statistic == "quantile":
+        assert question.threshold is not None
+        return quantile_of(levels, question.threshold, pilot, population)
+    if question.statistic == "probability":
+        assert question.threshold is not None
+        moment = exceeding(levels, question.threshold, pilot, population)
+        low, high = np.clip([moment.value - moment.half, moment.value + moment.half], 0.0, 1.0)
+        return float(np.clip(moment.value, 0, 1)), (float(low), float(high)), moment
+    if question.statistic == "variance":
+        moment = variance_of(levels, pilot, population)
+        share = float(np.exp(moment.half / moment.value)) if moment.value > 0 else np.inf
+        return moment.value, (moment.value / share, moment.value * share), moment
+    moment = telescoped(levels[0].values, levels, pilot, population)
+    return moment.value, (moment.value - moment.half, moment.value + moment.half), moment
+
+
+def _absolute(question: Question, value: float) -> float:
+    """The half width that is asked for, in the unit of the value."""
+    assert question.target is not None
+    absolute = question.statistic == "probability" or question.logarithmic
+    return question.target if absolute else question.target * abs(value)
+
+
+def _more(
+    state: _State, question: Question, value: float, interval: tuple[float, float], moment: Moment, exact: int
+) -> bool:
+    """Plan the next round; whether there is one. Raises InputError where the budget does not permit the target."""
+    costs = np.array([state.source.cost(level) for level in state.chain])
+    spent, _ = state.source.spent()
+    half = (interval[1] - interval[0]) / 2
+    least = np.array([1e-12 * max(value**2, 1e-300)])
+    variances = np.maximum(moment.variances, least)
+    if question.target is not None:
+        wanted = _absolute(question, value)
+        checked = len(state.chain) == 1 or state.scale[EXACT] > 0 or exact >= state.count
+        if half <= wanted and checked:
+            return False
+        planned = moment.variance * (MARGIN * wanted / max(half, 1e-300)) ** 2
+        runs = optimal_runs(variances, costs, variance=planned)
+        needed = float(runs @ costs)
+        if question.budget is not None and needed > question.budget:
+            raise InputError(
+                f"target = {question.target:g} needs about {needed:.3g} s, budget = {question.budget:g} s: give a "
+                f"target of {question.target * np.sqrt(needed / question.budget):.2g}, or the time; runs are kept"
+            )
+    else:
+        assert question.budget is not None
+        if spent > 0.95 * question.budget:
+            return False
+        runs = optimal_runs(variances, costs, seconds=question.budget)
+    if len(state.chain) > 1:  # the pilot may lack draws of a kind that the cheap model knows: some more are chosen
+        runs[0] = max(runs[0], CHOSEN * state.pilot)
+    before = (state.count, dict(state.scale))
+    runs *= min(1.0, GROWTH * exact / runs[0])
+    state.grow(runs)
+    return before != (state.count, state.scale)
+
+
+def _plain_variance(
+    question: Question, levels: list[Runs], value: float, interval: tuple[float, float], moment: Moment
+) -> float:
+    """The variance of one plain draw, in the unit of the estimate."""
+    if question.statistic == "probability":
+        return max(value * (1 - value), 1e-12)
+    if question.statistic == "quantile":
+        assert question.threshold is not None
+        slope = (interval[1] - interval[0]) / 2 / max(moment.half, 1e-300)
+        return question.threshold * (1 - question.threshold) * slope**2
+    values, weights = levels[0].values, 1 / levels[0].chances
+    mean = float(np.average(values, weights=weights))
+    squares = (values - mean) ** 2
+    if question.statistic == "mean":
+        return float(np.average(squares, weights=weights))
+    return float(np.average((squares - np.average(squares, weights=weights)) ** 2, weights=weights))
+
+
+def _early_notes(state: _State, runs: Mapping[str, int]) -> list[str]:
+    """Lines about runs that ended early."""
+    notes = []
+    for level, count in state.early.items():
+        if count and state.question.of_share:
+            notes.append(f"{count} runs of {level} ended early; they count as above every value")
+        elif count:
+            word = "a lower bound" if level == EXACT else "what they reached"
+            notes.append(f"{count} of {runs.get(level, count)} runs of {level} ended early; their value is {word}")
+    return notes
+
+
+def fragility_of(source: Source, question: Question, scales: Array, intensity: Any) -> Estimate:
+    """The fragility of a threshold: median and dispersion of the intensity at which a draw reaches it.
+
+    intensity: logarithm of the intensity of draws at scale 1. The runs of a draw close in on its crossing; those of the
+    exact model begin where the cheapest one crosses.
+    """
+    searches = _Searches(source, question, scales, intensity)
+    found, levels, pilot = _estimated(searches, replace(question, statistic="mean", threshold=None, logarithmic=True))
+    spread = variance_of(levels, pilot, source.population)
+    notes = list(found.notes)
+    if searches.beyond:
+        notes.append(f"{searches.beyond} draws cross outside records.scales; they count half a step beyond: give more")
+    _, runs = source.spent()
+    costs = {level: source.cost(level) for level in runs}
+    plain = found.plain_seconds * costs[EXACT] * len(scales) / searches.cost(EXACT)  # which runs every scale
+    dispersions = [float(np.sqrt(max(spread.value + sign * spread.half, 0.0))) for sign in (-1, 0, 1)]
+    return replace(
+        found, statistic="fragility", threshold=question.threshold, value=float(np.exp(found.value)),
+        interval=(float(np.exp(found.interval[0])), float(np.exp(found.interval[1]))), dispersion=dispersions[1],
+        dispersion_interval=(dispersions[0], dispersions[2]), notes=tuple(notes), runs=runs, costs=costs,
+        plain_seconds=plain,
+    )  # fmt: skip
+
+
+class _Searches:
+    """A source of crossings: a run of it is the search of a draw."""
+
+    def __init__(self, source: Source, question: Question, scales: Array, intensity: Any) -> None:
+        self.source, self.scales, self.intensity = source, scales, intensity
+        assert question.threshold is not None
+        self.threshold = question.threshold
+        self.levels, self.population = source.levels, source.population
+        self.beyond = 0
+        self._values: dict[str, dict[int, float]] = {level: {} for level in source.levels}
+        self._runs = dict.fromkeys(source.levels, 0)
+
+    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
+        """Logarithms of the intensities at which draws cross; none ends early."""
+        known = self._values[level]
+        new = np.array([draw for draw in draws.tolist() if draw not in known], dtype=np.intp)
+        if new.size:
+            found = crossings(self.source, level, new, self.scales, self.threshold, self._guess(level, new))
+            self._runs[level] += found.runs
+            self.beyond += found.beyond if level == EXACT else 0
+            known.update(zip(new.tolist(), found.logarithms.tolist(), strict=True))
+        logs = np.array([known[draw] for draw in draws.tolist()])
+        return logs + self.intensity(draws), np.zeros(len(draws), dtype=bool)
+
+    def _guess(self, level: str, draws: Indices) -> Array:
+        """Where the search of a draw begins: where the cheapest model crosses, shifted by what the pilot showed."""
+        middle = np.full(len(draws), float(np.log(self.scales[len(self.scales) // 2])))
+        cheap = next((name for name in self.levels[1:] if self._values[name] and name != level), None)
+        if level != EXACT or cheap is None:
+            return middle
+        known = self._values[cheap]
+        shifts = [value - known[draw] for draw, value in self._values[level].items() if draw in known]
+        shift = float(np.median(shifts)) if shifts else 0.0
+        return np.array([known.get(draw, at) + shift for draw, at in zip(draws.tolist(), middle, strict=True)])
+
+    def cost(self, level: str) -> float:
+        """Seconds of the search of a draw."""
+        return self.source.cost(level) * self._runs[level] / max(len(self._values[level]), 1)
+
+    def spent(self) -> tuple[float, dict[str, int]]:
+        """As of `Source`."""
+        return self.source.spent()

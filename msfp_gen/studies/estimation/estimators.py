@@ -1,0 +1,350 @@
+"""Estimates of a mean, a variance, a probability or a quantile from runs of several models on the same random draws.
+
+The estimate is a telescoping sum: the mean of the cheapest model's prediction over very many draws, and for every
+dearer model the mean difference from that prediction over fewer of them (approximate control variates: Gorodetsky,
+Geraci, Eldred and Jakeman, *Journal of Computational Physics* 408 (2020), 109257). A prediction is a line through the
+pairs of runs, for a probability the normal law about it. That of a draw is fitted to other draws only, so that no run
+is used twice and the estimate has no bias. Exact runs are chosen among the draws with known chances, larger where the
+prediction is unsure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+
+Indices = np.ndarray[Any, np.dtype[np.intp]]
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+Fit = Callable[[Array, Array], Callable[[Array], Array]]
+FOLDS = 5  # of the draws: a prediction is fitted to those of the other folds
+LEVEL = 0.95
+LEAST = 0.25  # chance of a draw for a mean, over the mean chance
+PRIOR = 1e-3  # weight of the prior of the slopes of a line, in runs
+RIDGE = 0.05  # weight of the prior of the slope of a logistic curve, in runs
+NORMAL = 1.702  # slope of the logistic curve that is nearest to the normal law
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs of one model.
+
+    draws: their numbers, rising, shape (k,). values: of the quantity; infinite where a run failed. chances: with which
+    each draw was chosen; 1 for those of the pilot and where all draws are run.
+    """
+
+    draws: Indices
+    values: Array
+    chances: Array
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An estimated mean.
+
+    Attributes:
+        value: the estimate.
+        variance: of it.
+        freedom: degrees of freedom of the variance.
+        variances: that each level has to estimate, for `optimal_runs`, exact first.
+    """
+
+    value: float
+    variance: float
+    freedom: float
+    variances: Array
+
+    @property
+    def half(self) -> float:
+        """Half the width of the interval of 95 %."""
+        return quantile_of_t(self.freedom) * float(np.sqrt(self.variance))
+
+
+def quantile_of_t(freedom: float) -> float:
+    """How many standard errors half the width of an interval of 95 % has."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), (1 + LEVEL) / 2))
+
+
+def line(x: Array, y: Array) -> Callable[[Array], Array]:
+    """The regression line of y on x, level beyond the range of x."""
+    return _within(x, _regression(x, y, [np.asarray]))
+
+
+def bent(x: Array, y: Array) -> Callable[[Array], Array]:
+    """The regression of y on x and, where all are above 0, its logarithm; level beyond the range of x."""
+    return _within(x, _extended(x, y))
+
+
+def _extended(x: Array, y: Array) -> Callable[[Array], Array]:
+    """The same, extended beyond the range of x."""
+    low = float(x.min())
+    if low <= 0:
+        return _regression(x, y, [np.asarray])
+    return _regression(x, y, [np.asarray, lambda at: np.log(np.maximum(at, low / 100))])
+
+
+def _within(x: Array, function: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    low, high = float(x.min()), float(x.max())
+    return lambda at: function(np.clip(at, low, high))
+
+
+def _regression(x: Array, y: Array, functions: Sequence[Callable[[Array], Array]]) -> Callable[[Array], Array]:
+    """Least squares of y on functions of x, with a prior of their scaled slopes that is worth next to nothing."""
+    columns = np.stack([function(x) for function in functions], axis=-1)
+    centre, spread = columns.mean(axis=0), columns.std(axis=0)
+    scaled = (columns - centre) / np.where(spread > 0, spread, 1.0)
+    level = float(y.mean())
+    normal = scaled.T @ scaled + np.diag(np.where(spread > 0, PRIOR, 1.0))
+    slopes = np.linalg.solve(normal, scaled.T @ (y - level)) / np.where(spread > 0, spread, 1.0)
+
+    def predict(at: Array) -> Array:
+        return np.asarray(level + (np.stack([function(at) for function in functions], axis=-1) - centre) @ slopes)
+
+    return predict
+
+
+def parabola(x: Array, y: Array) -> Callable[[Array], Array]:
+    """The regression parabola of y on x."""
+    centre, spread = float(x.mean()), float(x.std()) or 1.0
+    coefficients = np.polynomial.polynomial.polyfit((x - centre) / spread, y, 2) if len(x) > 3 else [y.mean()]
+    return _within(x, lambda at: np.asarray(np.polynomial.polynomial.polyval((at - centre) / spread, coefficients)))
+
+
+def logistic(x: Array, y: Array) -> Callable[[Array], Array]:
+    """The logistic curve of shares y in [0, 1] over x, whose slope has a weak prior."""
+    centre, spread, scaled = _scaling(x)
+    level = np.log((y.sum() + 0.5) / (len(y) - y.sum() + 0.5))
+    rows = np.stack([np.ones(len(x)), (scaled(x) - centre) / spread], axis=-1)
+    solution = _newton(rows, y, np.zeros(len(x)), np.array([level, 0.0]), np.array([1e-3, RIDGE]))
+    return lambda at: _expit(solution[0] + solution[1] * (scaled(at) - centre) / spread)
+
+
+def exceedance(threshold: float) -> Fit:
+    """A fit of values y over x, of which comes the probability that y is at least a threshold.
+
+    It is the normal law about the regression line of the logarithms, which uses how far every run is from the
+    threshold; its level and slope are then fitted to the runs that exceed it, with a prior worth some runs.
+    """
+
+    def fit(x: Array, y: Array) -> Callable[[Array], Array]:
+        finite = np.isfinite(y)
+        if finite.sum() < 4:
+            return logistic(x, (y >= threshold).astype(float))
+        logs = threshold > 0 and float(y[finite].min()) > 0
+        heights, bound = (np.log(y[finite]), np.log(threshold)) if logs else (y[finite], threshold)
+        centre, spread, scaled = _scaling(x)
+        regression = line((scaled(x[finite]) - centre) / spread, heights)
+        left = heights - regression((scaled(x[finite]) - centre) / spread)
+        deviation = max(float(left.std()), 1e-3 * (float(heights.std()) or 1.0), 1e-12)
+
+        def offset(at: Array) -> Array:
+            return NORMAL * (regression((scaled(at) - centre) / spread) - bound) / deviation
+
+        own = offset(x)
+        rows = np.stack([np.ones(len(x)), own], axis=-1)
+        solution = _newton(rows, (y >= threshold).astype(float), own, np.zeros(2), np.array([1.0, 4.0]))
+        return lambda at: _expit(solution[0] + (1 + solution[1]) * offset(at))
+
+    return fit
+
+
+def _scaling(x: Array) -> tuple[float, float, Callable[[Array], Array]]:
+    """Centre and spread of x, and what they are of: its logarithm where all are above 0."""
+    low = float(x.min())
+
+    def scaled(at: Array) -> Array:
+        return np.asarray(np.log(np.maximum(at, low / 100)) if low > 0 else at)
+
+    z = scaled(x)
+    return float(z.mean()), float(z.std()) or 1.0, scaled
+
+
+def _expit(eta: Array) -> Array:
+    from scipy.special import expit
+
+    return np.asarray(expit(eta))
+
+
+def _newton(rows: Array, y: Array, offset: Array, start: Array, prior: Array) -> Array:
+    """Coefficients of a logistic regression of shares y with an offset, and a normal prior of these weights about 0."""
+    solution = start
+    for _ in range(30):
+        share = _expit(offset + rows @ solution)
+        gradient = rows.T @ (y - share) - prior * solution
+        information = (rows * (share * (1 - share))[:, None]).T @ rows + np.diag(prior)
+        step = np.linalg.solve(information, gradient)
+        most = float(np.abs(step).max())
+        solution = solution + step * min(1.0, 2.0 / (most + 1e-300))
+        if most < 1e-8:
+            break
+    return solution
+
+
+def feature(values: Array) -> Array:
+    """Values of a model as a prediction is fitted to them: a run that failed counts as the largest of the others."""
+    finite = values[np.isfinite(values)]
+    most = float(finite.max()) if len(finite) else 0.0
+    return np.where(np.isfinite(values), values, most)
+
+
+def predictions(fit: Fit, draws: Indices, x: Array, target_draws: Indices, target: Array) -> Array:
+    """For every draw the prediction of a target from x, fitted to the targets of other folds; shape of `draws`.
+
+    target_draws are among `draws`.
+    """
+    known = x[np.searchsorted(draws, target_draws)]
+    out = np.empty(len(draws))
+    for fold in range(FOLDS):
+        others, here = target_draws % FOLDS != fold, draws % FOLDS == fold
+        out[here] = fit(known[others], target[others])(x[here])
+    return out
+
+
+def telescoped(
+    target: Array, levels: Sequence[Runs], pilot: int, population: int | None = None, fit: Fit = bent,
+    threshold: float | None = None,
+) -> Moment:  # fmt: skip
+    """The mean of a target that is known at the exact runs.
+
+    levels: exact first; the draws of each are among those of the next, and the last has all. pilot: number of draws
+    that all levels have. population: number of all draws that there are; None: no end of them. fit: of predictions.
+    threshold: the target is the values, and their mean the probability that they are at least this.
+    """
+    count = len(levels[-1].draws)
+    parts, least, current = [], [], target if threshold is None else (target >= threshold).astype(float)
+    fitted = target
+    for upper, lower in pairwise(levels):
+        first = fit if threshold is None else exceedance(threshold) if upper is levels[0] else logistic
+        predicted = predictions(first, lower.draws, feature(lower.values), upper.draws, fitted)
+        difference = current - predicted[np.searchsorted(lower.draws, upper.draws)]
+        parts.append(_contributions(upper, difference, pilot, count))
+        least.append(0.0 if threshold is None else _of_shares(upper, lower, predicted, pilot, count))
+        current = fitted = predicted
+    parts.append(current)
+    groups = [slice(0, pilot), slice(pilot, count)] if 1 < pilot < count - 1 else [slice(0, count)]
+    sizes = np.array([_size(level, pilot) for level in levels])
+    least.append(0.0)
+    if threshold is not None:  # no run that errs among n does not mean that none does: at most three in n
+        least[0] = max(least[0], 1 / sizes[0] ** 2)
+    ends = [len(level.draws) for level in levels]
+    left = np.array([1.0 if population is None else max(1 - end / population, 0.0) for end in ends])
+    variances = left * np.maximum([_variance(part, groups) for part in parts], least)
+    variance = max(_variance(sum(parts, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
+    freedom = np.maximum(np.array(ends) - 2.0, 1.0)
+    total = float(variance**2 / max(np.sum(variances**2 / freedom), 1e-300)) if variance > 0 else np.inf
+    return Moment(float(np.mean(sum(parts, np.zeros(count)))), float(variance), total, variances * sizes)
+
+
+def _of_shares(upper: Runs, lower: Runs, shares: Array, pilot: int, count: int) -> float:
+    """The variance that the differences of yes or no from predicted shares have, if the shares are right.
+
+    Where few runs exceed a threshold it is known better than their own variance, which is often too small.
+    """
+    place = np.searchsorted(lower.draws, upper.draws)
+    own = shares[place] * (1 - shares[place])
+    first = upper.draws < pilot
+    if not len(own[~first]):
+        return float(own.mean()) / len(own)
+    share = float(first.sum()) / _size(upper, pilot)
+    main = float(np.sum(own[~first] / upper.chances[~first] ** 2)) * ((1 - share) / (count - pilot)) ** 2
+    return main + float(own[first].mean()) * share**2 / max(int(first.sum()), 1)
+
+
+def _size(level: Runs, pilot: int) -> float:
+    """How many runs with equal chances would be worth those of a level."""
+    main = level.chances[level.draws >= pilot]
+    return float((level.draws < pilot).sum()) + (
+        float(np.sum(1 / main) ** 2 / np.sum(main**-2.0)) if len(main) else 0.0
+    )
+
+
+def _contributions(level: Runs, difference: Array, pilot: int, count: int) -> Array:
+    """What every draw adds to `count` times the mean of a difference that is known at some of them; shape (count,).
+
+    The means over the pilot and over the other draws are weighted by the numbers of runs that they are worth.
+    """
+    out = np.zeros(count)
+    first = level.draws < pilot
+    main = level.chances[~first]
+    if not len(main):
+        out[level.draws] = difference * count / max(int(first.sum()), 1)
+        return out
+    worth = _size(level, pilot)
+    share = float(first.sum()) / worth
+    out[level.draws[first]] = difference[first] * share * count / max(pilot, 1)
+    out[level.draws[~first]] = difference[~first] / main * (1 - share) * count / (count - pilot)
+    return out
+
+
+def _variance(contributions: Array, groups: Sequence[slice]) -> float:
+    """Variance of the mean of contributions, of draws that are alike within each group."""
+    count = len(contributions)
+    parts = [contributions[group] for group in groups]
+    return float(sum(len(part) * part.var(ddof=1) for part in parts if len(part) > 1)) / count**2
+
+
+def exceeding(levels: Sequence[Runs], threshold: float, pilot: int, population: int | None = None) -> Moment:
+    """The probability that the exact value is at least a threshold."""
+    return telescoped(levels[0].values, levels, pilot, population, threshold=threshold)
+
+
+def variance_of(levels: Sequence[Runs], pilot: int, population: int | None = None) -> Moment:
+    """The variance of the exact value."""
+    mean = telescoped(levels[0].values, levels, pilot, population)
+    squares = telescoped((levels[0].values - mean.value) ** 2, levels, pilot, population, parabola)
+    return Moment(squares.value + mean.variance, squares.variance, squares.freedom, squares.variances)
+
+
+def quantile_of(
+    levels: Sequence[Runs], share: float, pilot: int, population: int | None = None
+) -> tuple[float, tuple[float, float], Moment]:
+    """The value below which a share of all lies, its interval, and the probability to be above it.
+
+    The interval contains the values whose estimated probability differs from the share by less than half the width of
+    its own interval (Woodruff, 1952).
+    """
+    from scipy.optimize import brentq
+
+    values = np.sort(levels[0].values[np.isfinite(levels[0].values)])
+    ends = float(values[0]), float(values[-1])
+
+    def above(at: float) -> Moment:
+        return exceeding(levels, at, pilot, population)
+
+    def place(probability: float) -> float:
+        if above(ends[0]).value <= probability:
+            return ends[0]
+        if above(ends[1]).value >= probability:
+            return ends[1]
+        found = brentq(lambda at: above(at).value - probability, *ends, xtol=1e-4 * (ends[1] - ends[0]))
+        return float(found)
+
+    found = place(1 - share)
+    moment = above(found)
+    low, high = (place(float(np.clip(1 - share + sign * moment.half, 0.0, 1.0))) for sign in (1, -1))
+    return found, (low, high), moment
+
+
+def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> Array:
+    """In proportion to which chance a draw should be run exactly: shape of `at` (Neyman, 1934).
+
+    threshold: of a probability: the deviation of a yes or no with the predicted share, at least a fifth of the
+    largest. None: for a mean the predicted distance from the prediction, at least a quarter of its mean, and beyond the
+    range of the pilot what an extended prediction would add. So a model that errs is found out.
+    """
+    if threshold is not None:
+        share = exceedance(threshold)(x, values)(at)
+        return np.clip(np.sqrt(share * (1 - share)), 0.1, 0.5)
+    left = np.abs(values - bent(x, values)(x))
+    mean = float(left.mean())
+    if not mean > 0:
+        return np.ones(len(at))
+    beyond = np.abs(_extended(x, values)(at) - bent(x, values)(at)) / mean
+    return np.maximum(bent(x, left)(at) / mean, LEAST) + beyond

@@ -1,0 +1,258 @@
+"""Draws of a study, and the runs of its models on them: each model is a study of its own, kept in a folder.
+
+A draw is a combination of the values of the axes with values, each as likely as any other, and a value of each random
+axis. Draw k is the same for every model, in every call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from msfp_gen.common.arrays import Array
+from msfp_gen.errors import InputError, RunError
+from msfp_gen.specification import formula
+from msfp_gen.studies.assessment.rows import numbers, read_study
+from msfp_gen.studies.estimation.allocation import EXACT
+from msfp_gen.studies.estimation.backbone_run import OF_SURFACES, QUANTITIES, check_backbone
+from msfp_gen.studies.estimation.estimators import Flags, Indices
+from msfp_gen.studies.pool import Pool
+from msfp_gen.studies.study.axes import SceneFactory
+from msfp_gen.studies.study.chunks import STUDY_FILE, parts_in, readable_parts, study_table
+from msfp_gen.studies.study.definition import Study
+from msfp_gen.studies.study.quantities import Keep
+from msfp_gen.studies.study.run import run_on
+from msfp_gen.studies.study.sampling import Sampling, values_at
+
+BLOCK = 1024  # draws that are made together
+CHUNKS = {EXACT: 4, "backbone": 64}  # runs of a part; of other models
+CHUNK = 8
+MEASURED = 4  # parts of which the cost of a run is taken
+ENDED = "ok"
+
+
+class Source(Protocol):
+    """What an estimate needs: runs of several models on the same draws.
+
+    levels: names, exact first. population: how many draws there are; None: no end of them.
+    """
+
+    levels: tuple[str, ...]
+    population: int | None
+
+    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
+        """The quantity at draws, computed where it is not known, and which runs ended early: it is what they reached.
+
+        Infinite where a run has none. scales: index of the value of the axis `scale` of each run, in place of that of
+        the draw.
+        """
+
+    def cost(self, level: str) -> float:
+        """Seconds of a run, as measured."""
+
+    def spent(self) -> tuple[float, dict[str, int]]:
+        """Seconds of all runs, and their number by model."""
+
+
+class Draws:
+    """The random draws of a study; equal for equal seeds."""
+
+    def __init__(self, study: Study, seed: int) -> None:
+        self.study, self.seed = study, seed
+        self.cells = int(np.prod(study.grid))
+        self.population = None if study.distributions else self.cells
+        self._blocks: dict[int, tuple[Indices, Array]] = {}
+        self._order = np.random.default_rng([seed, 0]).permutation(self.cells) if self.population else None
+
+    def of(self, numbers: Indices) -> tuple[Indices, Array]:
+        """Of draws by number, from 0: the combination of the grid, from 0, and the values of the random axes."""
+        if self._order is not None:
+            return self._order[numbers], np.zeros((len(numbers), 0))
+        cells, values = zip(
+            *(self._block(int(block)) for block in range(int(numbers.max(initial=0)) // BLOCK + 1)), strict=True
+        )
+        return np.concatenate(cells)[numbers], np.concatenate(values)[numbers]
+
+    def _block(self, block: int) -> tuple[Indices, Array]:
+        if block not in self._blocks:
+            rng = np.random.default_rng([self.seed, block + 1])
+            cells = rng.integers(self.cells, size=BLOCK)
+            shares = rng.random((BLOCK, len(self.study.distributions)))
+            self._blocks[block] = cells, values_at(shares, self.study.distributions)
+        return self._blocks[block]
+
+    def intensity(self, numbers: Indices) -> Array:
+        """The intensity of draws at scale 1 [m/s^2]; ones where the study has none."""
+        measures = self.study.recipe.intensities
+        if not measures:
+            return np.ones(len(numbers))
+        gridded = [axis for axis in self.study.axes if axis.values is not None]
+        place = [axis.name for axis in gridded].index("record")
+        codes = np.unravel_index(self.of(numbers)[0], self.study.grid)[place]
+        return np.array([measures[(gridded[place].values or ())[code]] for code in codes])
+
+
+class StudySource:
+    """The models of a study; exact runs are in its folder, those of others in folders within it."""
+
+    def __init__(
+        self, study: Study, folder: Path, quantity: str, levels: Sequence[str], seed: int, pool: Pool,
+        progress: Callable[[str, int], None] | None = None,
+    ) -> None:  # fmt: skip
+        self.levels = tuple(levels)
+        self.draws = Draws(study, seed)
+        self.population = self.draws.population
+        check_quantity(study, quantity, levels)
+        self._models = {
+            level: _Model(level_study(study, level, quantity), self._folder(folder, level), quantity, self.draws, pool)
+            for level in levels
+        }
+        self._progress = progress
+
+    @staticmethod
+    def _folder(folder: Path, level: str) -> Path:
+        return folder if level == EXACT else folder / level
+
+    def values(self, level: str, draws: Indices, scales: Indices | None = None) -> tuple[Array, Flags]:
+        """As of `Source`."""
+        if self._progress is not None:
+            self._progress(level, len(draws))
+        return self._models[level].values(draws, scales)
+
+    def cost(self, level: str) -> float:
+        """As of `Source`."""
+        return self._models[level].cost()
+
+    def spent(self) -> tuple[float, dict[str, int]]:
+        """As of `Source`."""
+        runs = {level: len(model.listed) for level, model in self._models.items() if model.listed}
+        return sum(count * self.cost(level) for level, count in runs.items()), runs
+
+
+class _Model:
+    """The runs of one model: (draw, index of its scale or -1) of every row, as they were asked for."""
+
+    def __init__(self, study: Study, folder: Path, quantity: str, draws: Draws, pool: Pool) -> None:
+        self.study, self.folder, self.quantity, self.draws, self.pool = study, folder, quantity, draws, pool
+        self.listed: list[tuple[int, int]] = []
+        if (folder / STUDY_FILE).is_file():
+            kept = study_table(folder).get("accuracy", {}).get("listed", [])
+            self.listed = [(int(draw), int(scale)) for draw, scale in kept]
+        self._reached, self._early = np.zeros(0), np.zeros(0, dtype=bool)
+
+    def values(self, draws: Indices, scales: Indices | None) -> tuple[Array, Flags]:
+        pairs = list(zip(draws.tolist(), [-1] * len(draws) if scales is None else scales.tolist(), strict=True))
+        present = set(self.listed)
+        if (missing := [pair for pair in dict.fromkeys(pairs) if pair not in present]) or not len(self._reached):
+            self.listed += missing
+            self._run()
+        place = {pair: row for row, pair in enumerate(self.listed)}
+        rows = [place[pair] for pair in pairs]
+        return self._reached[rows], self._early[rows]
+
+    def _run(self) -> None:
+        study = self._complete()
+        run_on(self.pool, study, self.folder)
+        rows = read_study(self.folder, [self.quantity])
+        values = numbers(rows, self.quantity)
+        ended = np.asarray(rows["status"] == ENDED)
+        if len(values) < len(self.listed):
+            raise RunError(
+                f"{self.folder}: {len(self.listed) - len(values)} runs are missing; run the same command again"
+            )
+        self._reached = np.where(np.isnan(values), np.inf, values)
+        self._early = ~ended | np.isnan(values)
+
+    def _complete(self) -> Study:
+        """The study of all rows that were asked for."""
+        numbers_, scales = (np.array(column, dtype=np.intp) for column in zip(*self.listed, strict=True))
+        cells, values = self.draws.of(numbers_)
+        if (scales >= 0).any():
+            cells = _scaled(self.study, cells, scales)
+        sampling = Sampling(
+            "listed",
+            values=tuple(map(tuple, values.tolist())) if values.shape[1] else None,
+            cells=tuple((cells + 1).tolist()),
+        )
+        listing = {"method": "listed", "cells": list(sampling.cells or ())}
+        listing |= {"values": values.tolist()} if values.shape[1] else {}
+        accuracy = {**self.study.table.get("accuracy", {}), "listed": [list(pair) for pair in self.listed]}
+        return replace(
+            self.study, sampling=sampling, table={**self.study.table, "sampling": listing, "accuracy": accuracy}
+        )
+
+    def cost(self) -> float:
+        """Median over the first parts of their seconds of a core for each run, so that it stays the same.
+
+        Not the mean: in its first part a process builds or loads the model.
+        """
+        import pyarrow.parquet as pq
+
+        seconds = []
+        for name, _ in sorted(parts_in(self.folder).items(), key=lambda part: part[1])[:MEASURED]:
+            with readable_parts(self.folder / name):
+                schema = pq.read_metadata(self.folder / name)
+            seconds.append(float((schema.metadata or {})[b"seconds"]) / schema.num_rows)
+        return float(np.median(seconds))
+
+
+def _scaled(study: Study, cells: Indices, scales: Indices) -> Indices:
+    """The combinations with another value of the axis `scale`."""
+    names = [axis.name for axis in study.axes if axis.values is not None]
+    codes = list(np.unravel_index(cells, study.grid))
+    place = names.index("scale")
+    codes[place] = np.where(scales >= 0, scales, codes[place])
+    return np.asarray(np.ravel_multi_index(codes, study.grid))
+
+
+def level_study(study: Study, level: str, quantity: str) -> Study:
+    """The study of one model: of the exact one as it is, of others with the quantity alone."""
+    chunk = CHUNKS.get(level, CHUNK)
+    if level == EXACT:
+        return replace(study, given_chunk=study.given_chunk or chunk)
+    scene = {**study.recipe.scene, "fidelity": level}
+    formulas = tuple((name, text) for name, text in study.keep.formulas if name == quantity)
+    keep = replace(study.keep, names=() if formulas else (quantity,), formulas=formulas)
+    table = {key: value for key, value in study.table.items() if key not in ("keep", "quantities")}
+    table |= {"scene": scene, "keep": list(keep.names), "quantities": dict(formulas)}
+    return replace(study, recipe=replace(study.recipe, scene=scene), keep=keep, table=table, given_chunk=chunk)
+
+
+def check_quantity(study: Study, quantity: str, levels: Sequence[str]) -> None:
+    """Raise InputError: the study does not keep the quantity, or a model does not have it, or is not for the scene."""
+    known = [column.name for column in study.keep.columns() if not column.text]
+    if quantity not in known:
+        raise InputError(f"quantity = {quantity!r}: the study keeps {', '.join(known)}; give one, or add it to keep")
+    factory = SceneFactory(study.recipe)
+    for level in levels:
+        if level == "backbone":
+            check_backbone(factory.base)
+            missing = [name for name in _names_in(study.keep, quantity) if not _of_backbone(name, study)]
+            if missing:
+                raise InputError(
+                    f"quantity = {quantity!r}: {missing[0]} is none of the model 'backbone'; give another quantity, or "
+                    "accuracy.models = ['massless']"
+                )
+        elif level != EXACT:
+            SceneFactory(replace(study.recipe, scene={**study.recipe.scene, "fidelity": level}))
+
+
+def _of_backbone(name: str, study: Study) -> bool:
+    """Whether runs of the cheapest model have a quantity."""
+    if name in QUANTITIES or name in study.keep.axes:
+        return True
+    return not study.keep.counts.bearings and name.rpartition("_")[0] in OF_SURFACES
+
+
+def _names_in(keep: Keep, quantity: str) -> list[str]:
+    """The quantities of which one is made."""
+    text = dict(keep.formulas).get(quantity)
+    if text is None:
+        return [quantity]
+    if "(" in text and any(f"{word}(" in text for word in ("peak", "least", "most", "last")):
+        return [text]
+    return sorted(formula.names_in(formula.parse(text, [*keep.known, *keep.axes])))
