@@ -178,11 +178,12 @@ class Case:
             return float(np.mean(np.where(values >= threshold, True, np.isinf(outcomes))))
         if self.question.statistic == "quantile":
             return float(np.quantile(outcomes, threshold, method="inverted_cdf"))
-        return float(values.mean())
+        return float(values.var() if self.question.statistic == "variance" else values.mean())
 
 
 CASES = (
     Case("mean of peak displacement", "design", 0, Question("u", target=0.03)),
+    Case("variance of peak displacement", "design", 0, Question("u", "variance", target=0.1)),
     Case("mean of base shear", "design", 1, Question("V", target=0.02)),
     Case("mean of base shear", "within", 1, Question("V", target=0.02)),
     Case("mean of peak displacement", "beyond", 0, Question("u", target=0.03)),
@@ -219,7 +220,11 @@ def line_of(case: Case, rows: dict[str, np.ndarray], scene: float) -> str:
     gain = np.median([one.plain_seconds / one.seconds for one in found])
     exact = int(np.median([one.runs["exact"] for one in found]))
     rho = np.median([one.correlation["backbone"] for one in found])
-    plain = "" if fragile else f"{100 * plain_coverage(case, rows['exact'], truth, found):.1f} %"
+    plain = (
+        ""
+        if case.question.statistic in ("variance", "fragility")
+        else f"{100 * plain_coverage(case, rows['exact'], truth, found):.1f} %"
+    )
     word = {"probability": f"{case.question.target:g}"}.get(
         case.question.statistic, f"{100 * case.question.target:g} %"
     )
