@@ -8,6 +8,7 @@
 #include "msfp_math.h"
 
 enum { FACTORS = 3 }; /* step sizes whose factors are kept */
+enum { ENDED = -1 };
 enum { ENERGIES = 3, DAMPED = 0, RECEIVED, GROUND }; /* integrals over the run */
 
 /* The linear equations at one step size: A = M/beta + C + beta K. */
@@ -38,8 +39,9 @@ typedef struct {
     pthread_mutex_t lock;
     pthread_cond_t begun, done;
     task *what;
-    long generation;
-    int pending, ended;
+    int *taken; /* [count] bearings of each that have been begun; from here on shared without the lock */
+    long generation; /* of the task, from 1; ENDED */
+    int pending, sleeping, waiting; /* threads at work, without work; whether the one that asks sleeps */
 } pool;
 
 struct msfp_building {

@@ -1,14 +1,43 @@
-/* pool.c: the bearings of one stage in threads. Each thread has its own bearings, so results do not depend on how many
- * threads there are. */
+/* pool.c: the bearings of one stage in threads. Each bearing is computed by one thread, so results do not depend on how
+ * many there are, nor on which thread it is.
+ *
+ * A stage takes some tens of microseconds, in which a thread that sleeps is not even woken. Threads therefore look for
+ * work for some time before they sleep, and one that has done its own bearings takes those that others have left.
+ */
 #include <stdlib.h>
 #include "building.h"
 
+enum { LOOKS = 10000 }; /* for work before a thread sleeps: some tenths of a millisecond */
+
+#define LOAD(variable) __atomic_load_n(&(variable), __ATOMIC_SEQ_CST)
+#define STORE(variable, value) __atomic_store_n(&(variable), value, __ATOMIC_SEQ_CST)
+#define ADD(variable, value) __atomic_add_fetch(&(variable), value, __ATOMIC_SEQ_CST)
+
+/* Tell the processor that this thread only waits. */
+static inline void relax(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    __asm__ __volatile__("yield");
+#endif
+}
+
+/* First bearing of a thread. */
+static int first_of(const msfp_building *b, int thread)
+{
+    return (int)((long)b->scene.bearings * thread / b->pool.count);
+}
+
+/* The bearings of a thread, then those of the others that are left. */
 static void work(msfp_building *b, int thread)
 {
-    const int count = b->scene.bearings, threads = b->pool.count;
-    const int end = (int)((long)count * (thread + 1) / threads);
-    for (int i = (int)((long)count * thread / threads); i < end; ++i)
-        b->pool.what(b, i);
+    pool *p = &b->pool;
+    for (int k = 0; k < p->count; ++k) {
+        const int of = (thread + k) % p->count, end = first_of(b, of + 1);
+        for (int i; (i = ADD(p->taken[of], 1) - 1) < end;)
+            p->what(b, i);
+    }
 }
 
 typedef struct {
@@ -16,26 +45,36 @@ typedef struct {
     int thread;
 } worker;
 
+/* Wait for work other than that of generation `seen`; returns its generation, or -1 at the end. */
+static long next_generation(pool *p, long seen)
+{
+    for (int i = 0; i < LOOKS && LOAD(p->generation) == seen; ++i)
+        relax();
+    if (LOAD(p->generation) == seen) {
+        pthread_mutex_lock(&p->lock);
+        ADD(p->sleeping, 1);
+        while (LOAD(p->generation) == seen)
+            pthread_cond_wait(&p->begun, &p->lock);
+        ADD(p->sleeping, -1);
+        pthread_mutex_unlock(&p->lock);
+    }
+    return LOAD(p->generation);
+}
+
 static void *serve(void *given)
 {
     const worker at = *(worker *)given;
     pool *p = &at.b->pool;
     long seen = 0;
     free(given);
-    pthread_mutex_lock(&p->lock);
-    for (;;) {
-        while (p->generation == seen && !p->ended)
-            pthread_cond_wait(&p->begun, &p->lock);
-        if (p->ended)
-            break;
-        seen = p->generation;
-        pthread_mutex_unlock(&p->lock);
+    while ((seen = next_generation(p, seen)) != ENDED) {
         work(at.b, at.thread);
-        pthread_mutex_lock(&p->lock);
-        if (--p->pending == 0)
+        if (ADD(p->pending, -1) == 0 && LOAD(p->waiting)) {
+            pthread_mutex_lock(&p->lock);
             pthread_cond_signal(&p->done);
+            pthread_mutex_unlock(&p->lock);
+        }
     }
-    pthread_mutex_unlock(&p->lock);
     return NULL;
 }
 
@@ -43,12 +82,14 @@ int pool_begin(msfp_building *b)
 {
     pool *p = &b->pool;
     const int wanted = b->scene.threads < b->scene.bearings ? b->scene.threads : b->scene.bearings;
+    const size_t most = (size_t)(wanted > 1 ? wanted : 1);
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->begun, NULL);
     pthread_cond_init(&p->done, NULL);
     p->count = 1;
-    p->threads = calloc((size_t)(wanted > 1 ? wanted : 1), sizeof *p->threads);
-    if (!p->threads)
+    p->threads = calloc(most, sizeof *p->threads);
+    p->taken = calloc(most, sizeof *p->taken);
+    if (!p->threads || !p->taken)
         return MSFP_E_MEMORY;
     while (p->count < wanted) { /* fewer where the system gives no more */
         worker *at = malloc(sizeof *at);
@@ -64,18 +105,27 @@ int pool_begin(msfp_building *b)
     return MSFP_OK;
 }
 
+/* Begin a generation: threads that sleep are woken. */
+static void begin_generation(pool *p, long generation)
+{
+    STORE(p->generation, generation);
+    if (LOAD(p->sleeping)) {
+        pthread_mutex_lock(&p->lock);
+        pthread_cond_broadcast(&p->begun);
+        pthread_mutex_unlock(&p->lock);
+    }
+}
+
 void pool_end(msfp_building *b)
 {
     pool *p = &b->pool;
     if (!p->count)
         return;
-    pthread_mutex_lock(&p->lock);
-    p->ended = 1;
-    pthread_cond_broadcast(&p->begun);
-    pthread_mutex_unlock(&p->lock);
+    begin_generation(p, ENDED);
     for (int i = 0; i + 1 < p->count; ++i)
         pthread_join(p->threads[i], NULL);
     free(p->threads);
+    free(p->taken);
     pthread_cond_destroy(&p->begun);
     pthread_cond_destroy(&p->done);
     pthread_mutex_destroy(&p->lock);
@@ -85,18 +135,21 @@ void for_each_bearing(msfp_building *b, task *what)
 {
     pool *p = &b->pool;
     p->what = what;
+    for (int i = 0; i < p->count; ++i)
+        STORE(p->taken[i], first_of(b, i));
     if (p->count > 1) {
-        pthread_mutex_lock(&p->lock);
-        p->pending = p->count - 1;
-        ++p->generation;
-        pthread_cond_broadcast(&p->begun);
-        pthread_mutex_unlock(&p->lock);
+        STORE(p->pending, p->count - 1);
+        begin_generation(p, p->generation + 1);
     }
     work(b, 0);
-    if (p->count > 1) {
+    for (int i = 0; i < LOOKS && LOAD(p->pending); ++i)
+        relax();
+    if (LOAD(p->pending)) {
         pthread_mutex_lock(&p->lock);
-        while (p->pending)
+        STORE(p->waiting, 1);
+        while (LOAD(p->pending))
             pthread_cond_wait(&p->done, &p->lock);
+        STORE(p->waiting, 0);
         pthread_mutex_unlock(&p->lock);
     }
 }
