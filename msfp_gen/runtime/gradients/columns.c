@@ -55,6 +55,7 @@ MSFP_INLINE void kinematics(const msfp_parameters *p, const msfp_parameter_colum
     msfp_bodies_directions(p, dp, w, d, s, ds);
 }
 
+#if MSFP_UPLIFT
 void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d)
 {
@@ -64,6 +65,7 @@ void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns 
     ds.point = dat;
     kinematics(p, dp, w, &s, &ds, d);
 }
+#endif
 
 #if MSFP_TOP_ROTATION
 void msfp_support_columns(const msfp_point *at, const msfp_point_columns *dat, double *dupright)

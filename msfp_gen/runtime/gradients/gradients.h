@@ -68,9 +68,11 @@ typedef struct {
     double of[MSFP_CONTACT_RESULTS][MSFP_CONTACT_INPUTS][MSFP_LANES]; /* the last index is the surface */
 } msfp_slopes;
 
+#if MSFP_UPLIFT
 /* Columns of the motion of all bodies, of which `w` has the values: blocks `x` and `body`. */
 void msfp_motion_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                          const msfp_point_columns *dat, const msfp_work *w, msfp_work_columns *d);
+#endif
 /* Columns of the rim of surface j [MSFP_RIM_SIZE][MSFP_COLUMNS], whether it pushes or not. */
 void msfp_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w, int j,
                       const msfp_work_columns *d, double *columns);
