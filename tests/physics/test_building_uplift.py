@@ -83,7 +83,10 @@ def test_moments_of_the_axial_forces_are_those_of_the_frame():
 
 
 def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
-    """The compliance of the contacts is taken out of the interfaces: N does not depend on when they open."""
+    """The compliance of the contacts is taken out of the interfaces: N does not depend on when they open.
+
+    At a tolerance of 1e-3 the height to which light sliders rattle is not resolved: 17 to 82 um, 18 um below 5e-4.
+    """
     monkeypatch.setattr(selection, "LEAST_SHARE", -np.inf)
     for seat, force, path in ((None, 3e-3, 3e-5), (1e9, 1e-2, 2e-4)):
         bearing = BEARING.replace(seat_stiffness=seat)
@@ -95,7 +98,8 @@ def test_uplift_that_opens_on_the_way_is_that_from_the_start(monkeypatch):
         left = opened.kinetic + opened.strain + opened.damped - opened.received
         assert np.abs(left).max() < 5e-4 * opened.kinetic.max()
         assert opened.axial_force.min() < 1e-6 * LOAD
-        lifts = [run.extremes.lift.max(axis=1) for run in (opened, whole)]
+        finer = (simulate(rocking(effects, 5e-4, bearing)) for effects in (None, LIFTING))
+        lifts = [run.extremes.lift.max(axis=1) for run in finer]
         assert np.all(lifts[1][1:3] > 1e-5) and lifts[0] == pytest.approx(lifts[1], abs=path)
 
 

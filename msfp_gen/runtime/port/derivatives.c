@@ -381,7 +381,7 @@ int msfp_port_stage_derivative(msfp_port *port, double *derivative)
     return msfp_all_finite(derivative, EACH * EACH) ? MSFP_OK : MSFP_E_FINITE;
 }
 #else /* no bearing of this model is a two-port (msfp_check_port) */
-int msfp_port_derivative(msfp_port *port, const double *direction, double *derivative, double *rows)
+int msfp_port_derivative(msfp_port *port, const double direction[MSFP_ORDERS], double *derivative, double *rows)
 {
     return (void)port, (void)direction, (void)derivative, (void)rows, MSFP_E_ARGUMENT;
 }
