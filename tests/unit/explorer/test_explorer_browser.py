@@ -1,11 +1,10 @@
-"""The explorer in headless Chromium, from a file and offline: numbers equal to Python's, quick, nothing loaded."""
+"""The explorer in headless Chromium, from a file and offline: numbers equal to Python's, nothing loaded."""
 
 from __future__ import annotations
 
 import base64
 import importlib.util
 import json
-import shutil
 from dataclasses import replace
 from typing import Any
 
@@ -16,9 +15,8 @@ from msfp_gen import build_model, changed_scene, simulate
 from msfp_gen.analysis.characterise.loops import REVERSAL, closed_cycles, effective_properties, turning_points
 from msfp_gen.explorer import EXPLORED, write_explorer
 from msfp_gen.explorer.page import Problem, explored_scene, fixed_scene, problem_of, run_arguments
+from tests.support.explorer_page import CHROMIUM, DRIVER, SLIDE, act, choose_preset, explorer_in_browser
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-DRIVER = shutil.which("chromedriver")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="no Chromium with its driver"),
@@ -26,30 +24,12 @@ pytestmark = [
         importlib.util.find_spec("ziglang") is None, reason="the extra 'compiler' (ziglang) is not installed"
     ),
 ]
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--window-size=1400,1000",
-)  # fmt: skip
-SHOWN = """
-const done = arguments[arguments.length - 1];
-const before = state.shown;
-{action}
-const wait = () => (state.shown > before && !state.busy ? done(true) : setTimeout(wait, 2));
-wait();
-"""
 READ = """
 const { problem, numbers, found } = state.last;
 return { name: problem.name, status: found.status, force: numbers.peakForce, displacement: numbers.peakDisplacement,
   sliding: numbers.sliding, cycle: numbers.cycle, path: numbers.path, loop: numbers.force,
   time: numbers.u.map((_, row) => numbers.at.read("time", row)[0]), times: state.times };
 """
-SLIDE = """
-const input = document.querySelector(`[data-name="${arguments[0]}"]`);
-input.value = arguments[1];
-input.dispatchEvent(new Event("input"));
-"""
-
-
 # The numbers that the worker gives to the compiled run, and the rows that come back.
 EXCHANGED = """
 const source = find("worker").textContent;
@@ -73,36 +53,12 @@ def page(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser(page, tmp_path_factory):
-    from selenium import webdriver
-    from selenium.webdriver.chrome.options import Options
-    from selenium.webdriver.chrome.service import Service
-
-    options = Options()
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    opened = webdriver.Chrome(options=options, service=Service(DRIVER))
-    opened.get("about:blank")
-    opened.get_log("performance")
-    opened.set_script_timeout(60)
-    opened.get(page.as_uri())
-    act(opened, "if (before > 0) { done(true); return; }")
-    yield opened
-    opened.quit()
-
-
-def act(browser, action, *arguments):
-    """Do something in the page and wait for what it draws."""
-    browser.execute_async_script(SHOWN.replace("{action}", action), *arguments)
+    with explorer_in_browser(page, tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
 
 
 def choose(browser, name):
-    act(
-        browser,
-        "const p = find('preset'); p.value = arguments[0]; p.dispatchEvent(new Event('change'));",
-        str(EXPLORED.index(name)),
-    )
+    choose_preset(browser, name)
     return browser.execute_script(READ)
 
 
@@ -306,23 +262,6 @@ def test_direction_turns_the_motion(browser):
     act(browser, SLIDE, "direction", 30.0)
     turned = browser.execute_script(READ)
     assert turned["force"][3] == pytest.approx(plain["force"][3], rel=0.02) and turned["force"][0] != plain["force"][0]
-
-
-@pytest.mark.parametrize("name", EXPLORED)
-def test_a_redraw_takes_less_than_a_tenth_of_a_second(browser, name):
-    """From the movement of a slider to the end of the drawing: the median of nine, of the best of some rounds, since
-    other work on the machine disturbs."""
-    choose(browser, name)
-    medians = []
-    for _ in range(5):
-        times = []
-        for share in np.linspace(0.9, 1.1, 9):
-            act(browser, SLIDE, "scale of the record" if "ridgecrest" in name else "amplitude", share)
-            times.append(browser.execute_script("return state.times.redraw"))
-        medians.append(np.median(times))
-        if medians[-1] < 100:
-            break
-    assert min(medians) < 100, medians
 
 
 def test_everything_is_drawn(browser):
