@@ -30,11 +30,9 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
     Where it is not given: `LEAST`, or more, so that contacts which all have this value have `SHARE` of the compliance
     of the stiffest spring of the top. Raises InputError: the contacts in series are not stiffer than this spring.
     """
-    springs = {name: getattr(top, name, None) or 0.0 for name in SPRINGS}
-    name = max(springs, key=lambda spring: springs[spring])
-    stiffest, values = springs[name], [surface.seat_stiffness for surface in bearing.surfaces]
-    chosen = max(LEAST, len(values) * stiffest / SHARE)
-    stiffness = np.array([chosen if value is None else value for value in values])
+    name, stiffest, needed = _stiffest_spring(bearing, top)
+    values = [surface.seat_stiffness for surface in bearing.surfaces]
+    stiffness = np.array([max(LEAST, needed) if value is None else value for value in values])
     in_series = 1.0 / float((1.0 / stiffness).sum())
     if stiffest >= in_series:
         index = int(stiffness.argmin())
@@ -49,9 +47,16 @@ def seat_stiffness(bearing: Bearing, top: Top | None) -> Array:
 def stiffness_slopes(bearing: Bearing, top: Top, spring: str) -> Array:
     """Derivatives of `seat_stiffness` with respect to a spring of the top, ndarray, shape (n-1,) [-]."""
     values = [surface.seat_stiffness for surface in bearing.surfaces]
-    stiffest = max(getattr(top, name, None) or 0.0 for name in SPRINGS)
-    follows = getattr(top, spring) == stiffest and len(values) * stiffest / SHARE > LEAST
+    _, stiffest, needed = _stiffest_spring(bearing, top)
+    follows = getattr(top, spring) == stiffest and needed > LEAST
     return np.array([len(values) / SHARE if follows and value is None else 0.0 for value in values])
+
+
+def _stiffest_spring(bearing: Bearing, top: Top | None) -> tuple[str, float, float]:
+    """Name and stiffness of the stiffest spring of the top, and what every contact needs to have `SHARE` [N/m]."""
+    springs = {name: getattr(top, name, None) or 0.0 for name in SPRINGS}
+    name = max(springs, key=lambda spring: springs[spring])
+    return name, springs[name], len(bearing.surfaces) * springs[name] / SHARE
 
 
 def check_seats(bearing: Bearing, top: Top, effects: Effects | Auto | None) -> None:

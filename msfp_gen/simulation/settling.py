@@ -80,18 +80,24 @@ class StartSlopes:
     h: Array
 
 
-def moves_settling(parameter: Parameter) -> bool:
-    """Whether the state after settling may depend on a parameter: not on how the base moves afterwards."""
-    return parameter.part != "motion" and not parameter.field.startswith("seat_")
+def moves_settling(parameter: Parameter, settling: Scene) -> bool:
+    """Whether the state after settling may depend on a parameter.
+
+    Not on how the base moves afterwards, nor on contacts that the slow tilting does not model.
+    """
+    if parameter.field.startswith("seat_"):
+        return settling.effect_selection.effects.uplift
+    return parameter.part != "motion"
 
 
 def start_slopes(history: History, gradients: Gradients | None, parameters: Sequence[Parameter]) -> StartSlopes:
-    """The derivatives of the state in which settling ended, of those parameters on which it may depend."""
+    """The derivatives of the state in which settling ended, of those parameters for which it has them."""
     surfaces = history.tilt_angles.shape[1]
     slopes = StartSlopes(np.zeros((len(parameters), surfaces, 3)), np.zeros((len(parameters), surfaces, 2)))
     if gradients is None:
         return slopes
-    moving = [moves_settling(parameter) for parameter in parameters]
+    known = {parameter.path for parameter in gradients.parameters}
+    moving = [parameter.path in known for parameter in parameters]
     slopes.q[moving] = gradients.arrays["tilt_angles"][:, -1]
     h, dh = history.friction_state[-1], gradients.arrays["friction_state"][:, -1]
     size = np.linalg.norm(h, axis=1, keepdims=True)

@@ -228,9 +228,10 @@ def settle(scene: Scene, parameters: Sequence[Parameter] = ()) -> tuple[Scene, S
     """
     if not needs_settling(scene):
         return scene, None
-    moving = [parameter.path for parameter in parameters if moves_settling(parameter)]
+    settling = settling_scene(scene)
+    moving = [parameter.path for parameter in parameters if moves_settling(parameter, settling)]
     try:
-        end = simulate(settling_scene(scene), gradients=moving, gradient_errors=False)
+        end = simulate(settling, gradients=moving, gradient_errors=False)
     except RunError as error:
         raise RunError(f"before the start, while the plates are tilted: {error}", status=error.status) from error
     state = state_at_rest(end.history.tilt_angles[-1], end.history.friction_state[-1])

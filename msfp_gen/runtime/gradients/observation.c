@@ -81,20 +81,21 @@ double msfp_event_columns(const msfp_parameters *p, const msfp_parameter_columns
         compression_columns(p, dp, &w, &d, j, columns);
         return msfp_compression(p, &w, j);
     }
-#if MSFP_RIMS
+#endif
+#if MSFP_UPLIFT && MSFP_RIMS
     double rim[MSFP_RIM_SIZE * C];
     msfp_rim_force(p, &w, j, NULL);
     msfp_rim_columns(p, dp, &w, j, &d, rim);
     memcpy(columns, rim + MSFP_RIM_G * C, sizeof(msfp_columns));
     return w.rim_gap[j];
-#endif
-#endif
+#else
     msfp_columns gaps[NB][MSFP_GAP_SIZE];
     double sliding[NB][MSFP_GAP_SIZE];
     (void)kind;
     msfp_gaps_columns(p, dp, at->q, dat->q, sliding, gaps);
     memcpy(columns, gaps[j][MSFP_GAP_G], sizeof(msfp_columns));
     return sliding[j][MSFP_GAP_G];
+#endif
 }
 
 void msfp_closed_rim_columns(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_work *w,

@@ -166,7 +166,8 @@ static double latest_end(msfp_run *run)
     return end;
 }
 
-/* One step of length h of the method; it is not accepted yet. */
+/* One step of length h of the method; it is not accepted yet. A prescribed step, from which derivatives are estimated by
+ * differences, is that of another run: it is not refused for its energy balance. */
 static int try_step(msfp_run *run, double h, int prescribed, double *error)
 {
     run->status_surface = 0;

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from msfp_gen.buildings.file import AnyScene
-    from msfp_gen.buildings.scene import BuildingScene
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
 
@@ -125,11 +124,7 @@ def _parts(scene: AnyScene) -> tuple[list[Bearing], list[float], float, float]:
         assert isinstance(scene.top, MassTop)
         stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
         return [scene.bearing], [1.0], scene.top.mass, stop
-    return list(scene.every_bearing), _shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
-
-
-def _shares(scene: BuildingScene) -> list[float]:
-    return load_shares(scene)
+    return list(scene.every_bearing), load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
 
 
 @lru_cache(maxsize=64)
