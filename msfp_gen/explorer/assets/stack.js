@@ -1,8 +1,6 @@
 // The deformed stack from the side: positions from the tilts of a row, outlines with the radii at hand.
 "use strict";
 
-const BOX = { width: 620, height: 300, left: 58, right: 12, top: 12, bottom: 42 };
-
 function rotatedBasis([psi, theta], [t1, t2, t3]) {
   const mix = (a, x, b, y) => x.map((v, k) => a * v + b * y[k]);
   const second = mix(Math.cos(psi), t2, Math.sin(psi), t3);
@@ -42,7 +40,7 @@ function outlineWith(pieces, radius, nominal) {
 
 function drawStack(parent, problem, numbers, radius, angle, row) {
   parent.replaceChildren();
-  const { svg } = drawing(parent, "Bearing from the side, to scale", BOX.width, BOX.height);
+  const { svg } = drawing(parent, "Bearing from the side, to scale", CHART.width, CHART.height);
   const nominal = problem.surfaces.map((values) => values[problem.values.indexOf("radius")]);
   const cut = problem.planar ? [1, 0] : [Math.cos(angle), Math.sin(angle)];
   const flat = (vector) => [vector[0] * cut[0] + vector[1] * cut[1], vector[2]];
@@ -51,10 +49,10 @@ function drawStack(parent, problem, numbers, radius, angle, row) {
   const reach = Math.max(...outlines.flat(2).flatMap(({ points }) => points.map(([r]) => r)));
   const travel = Math.max(...numbers.u.map((v) => Math.abs(flat(v)[0])));
   const height = problem.heights.reduce((sum, h) => sum + h, 0);
-  const inner = [BOX.width - BOX.left - BOX.right, BOX.height - BOX.top - BOX.bottom];
+  const inner = [CHART.width - CHART.left - CHART.right, CHART.height - CHART.top - CHART.bottom];
   const wide = [-(reach + travel) * 1000, (reach + travel) * 1000];
   const [x, z] = withEqualScale(wide, [-0.1 * height * 1000, 1.25 * height * 1000], ...inner);
-  const { px, py } = axes(svg, BOX, x, z, "along the section [mm]", "height [mm]");
+  const { px, py } = axes(svg, CHART, x, z, "along the section [mm]", "height [mm]");
   const scale = (px(1) - px(0)) * 1000;
   outlines.forEach((pieces, body) => {
     const [along, up] = flat(bodies[body].axis);
