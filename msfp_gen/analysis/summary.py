@@ -76,6 +76,10 @@ def summary_of_run(result: ResultFiles, time: Array, counters: Mapping[str, int]
     }
 
 
+# Extremes that friction laws add -> keys of the summary.
+OF_FRICTION = {"least_friction": "least_friction", "most_friction": "most_friction", "temperature": "peak_temperature"}
+
+
 def summary_of_bearing(one: BearingData) -> dict[str, Any]:
     """The part of a summary that all bearings have, alone or below a building."""
     extremes, load, sheet = one.extremes, one.axial_load, one.bearing.friction_at_pivot
@@ -95,8 +99,7 @@ def summary_of_bearing(one: BearingData) -> dict[str, Any]:
         "uplift": uplift_of(one),
         "rims_met": rims_met(one),
     }
-    optional = {"least_friction": "least_friction", "most_friction": "most_friction", "temperature": "peak_temperature"}
-    recorded = {key: getattr(extremes, name) for name, key in optional.items()}
+    recorded = {key: getattr(extremes, name) for name, key in OF_FRICTION.items()}
     summary |= {key: values.tolist() for key, values in recorded.items() if values is not None}
     return summary | ({"transitions": transitions(one)} if is_monotonic(one) else {})
 
@@ -166,6 +169,7 @@ WITHOUT = {
     "transitions": "they are read from rows",
     "counters": "they count the work of the solver",
     "error": "errors are measured where a slider meets its rim",
+    "peak_rim_force": "it is read from rows, whose rim_force has derivatives",
     "energy": "its terms are integrals over the run, which simulate(..., energy_gradients=True) differentiates",
 }
 """Keys of the summary that have no derivative, or only where it was asked for, with the reason."""
@@ -183,8 +187,8 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
     Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
-    maximum_normal_force and, with a friction law, least_friction and most_friction, as in the summary; and of runs with
-    `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors were measured, error:
+    maximum_normal_force and, with a friction law, least_friction, most_friction and peak_temperature, as in the summary;
+    and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors were measured, error:
     that of each derivative, with the same keys. Raises InputError where the run computed no derivatives, and for a key
     whose value jumps (`WITHOUT`).
     """
@@ -216,9 +220,7 @@ def _summary(gradients: Gradients, index: int, slopes: dict[str, Array], ratio: 
         minimum_normal_force=slopes["least_normal"].tolist(),
         maximum_normal_force=slopes["most_normal"].tolist(),
     )
-    for name in ("least_friction", "most_friction"):
-        if name in slopes:
-            gradient[name] = slopes[name].tolist()
+    gradient |= {key: slopes[name].tolist() for name, key in OF_FRICTION.items() if name in slopes}
     energy = {name.removeprefix("energy_"): v for name, v in gradients.arrays.items() if name.startswith("energy_")}
     if "input" in energy:
         gradient["energy"] = {name: float(values[index, -1]) for name, values in energy.items()}

@@ -146,6 +146,23 @@ def test_differences_with_the_same_steps_through_frictional_heating(method: str)
     assert values["temperature"].max() > 40.0
 
 
+def test_extremes_of_a_friction_law_that_heats_are_those_of_the_steps() -> None:
+    """With a row at every step their derivatives are those of the rows."""
+    scene = replace(heated(patch_radius=0.15), output_step=None)
+    result = simulate(scene, gradients=["bearing.surfaces[0].conductivity"], gradient_errors=False)
+    mu, temperature = result.history.friction_coefficient, result.history.temperature
+    assert mu is not None and temperature is not None and temperature.max() > 40.0
+    summary, slopes = result.gradient_summary["bearing.surfaces[0].conductivity"], result.gradient
+    for key, name, rows in (
+        ("least_friction", "friction_coefficient", mu.argmin(axis=0)),
+        ("most_friction", "friction_coefficient", mu.argmax(axis=0)),
+        ("peak_temperature", "temperature", temperature.argmax(axis=0)),
+    ):
+        expected = slopes[name].values[0][rows, np.arange(rows.size)]
+        assert np.abs(expected).max() > 0
+        np.testing.assert_allclose(summary[key], expected, rtol=1e-9, err_msg=key)
+
+
 @pytest.mark.slow
 def test_differences_with_the_same_steps_where_a_patch_uncovers_the_centre() -> None:
     """With small changes: the second derivative of the heat flux jumps where the patch begins to leave the centre."""

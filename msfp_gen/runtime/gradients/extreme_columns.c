@@ -60,6 +60,10 @@ static void contributions(const msfp_run *run, const msfp_group *group, const ms
         memcpy(columns[EXTREME(least_friction) + j], d[MSFP_ROW_MU + j], sizeof *columns);
         memcpy(columns[EXTREME(most_friction) + j], d[MSFP_ROW_MU + j], sizeof *columns);
 #endif
+#if MSFP_HEAT
+        value[EXTREME(temperature) + j] = row->temperature[j];
+        memcpy(columns[EXTREME(temperature) + j], d[MSFP_ROW_TEMPERATURE + j], sizeof *columns);
+#endif
     }
 }
 
