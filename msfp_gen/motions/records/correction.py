@@ -150,7 +150,7 @@ def uncorrected(record: Record, *, start: float | None = None, duration: float |
 
 def _integrated(record: Record, corner: float, taper: float) -> tuple[Array, Array]:
     """Velocity [m/s] and acceleration [m/s^2] of the whole record after the filter, each ndarray, shape (k, 3)."""
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import butter, sosfilt
 
     raw = record.acceleration - record.acceleration.mean(axis=0)
     raw = raw * _taper_window(record.time, min(taper, record.duration / 4))[0][:, None]
@@ -162,7 +162,12 @@ def _integrated(record: Record, corner: float, taper: float) -> tuple[Array, Arr
     pad = int(np.ceil(samples))
     padded = np.pad(raw, ((pad, pad), (0, 0)))
     filters = butter(_ORDER, corner, "highpass", fs=1 / record.time_step, output="sos")
-    filtered = sosfiltfilt(filters, padded, axis=0, padtype=None)
+    forwards = sosfilt(filters, padded, axis=0)
+    # Backwards from where a constant leaves a section: `sosfiltfilt` solves for it with LAPACK, whose last digits depend
+    # on the processor. A high-pass filter passes no constant on: the first section settles, the others rest.
+    at_rest = np.zeros((len(filters), 2, 3))
+    at_rest[0] = np.outer([-filters[0, 0], filters[0, 2]], forwards[-1])
+    filtered = sosfilt(filters, forwards[::-1], axis=0, zi=at_rest)[0][::-1]
     return _integral(filtered, record.time_step)[pad:-pad], filtered[pad:-pad]
 
 
