@@ -187,10 +187,10 @@ def summarise_gradients(result: RunData) -> dict[str, dict[str, Any]]:
     """Derivatives of the scalars of `summarise(result)` in SI units, by the path of the parameter.
 
     Keys: peak_displacement, peak_force, peak_force_ratio, peak_sliding, minimum_gap, minimum_normal_force,
-    maximum_normal_force and, with a friction law, least_friction, most_friction and peak_temperature, as in the summary;
-    and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors were measured, error:
-    that of each derivative, with the same keys. Raises InputError where the run computed no derivatives, and for a key
-    whose value jumps (`WITHOUT`).
+    maximum_normal_force and, with a friction law, least_friction, most_friction and peak_temperature, as in the
+    summary; and of runs with `energy_gradients` energy, those of the terms of `History.energy` at the end; where errors
+    were measured, error: that of each derivative, with the same keys. Raises InputError where the run computed no
+    derivatives, and for a key whose value jumps (`WITHOUT`).
     """
     gradients = gradients_of(result)
     recorded = result.recorded_extremes

@@ -163,8 +163,8 @@ def _integrated(record: Record, corner: float, taper: float) -> tuple[Array, Arr
     padded = np.pad(raw, ((pad, pad), (0, 0)))
     filters = butter(_ORDER, corner, "highpass", fs=1 / record.time_step, output="sos")
     forwards = sosfilt(filters, padded, axis=0)
-    # Backwards from where a constant leaves a section: `sosfiltfilt` solves for it with LAPACK, whose last digits depend
-    # on the processor. A high-pass filter passes no constant on: the first section settles, the others rest.
+    # Backwards from where a constant leaves a section. `sosfiltfilt` solves for it with LAPACK, whose last digits
+    # depend on the processor. A high-pass filter passes no constant on: the first section settles, the others rest.
     at_rest = np.zeros((len(filters), 2, 3))
     at_rest[0] = np.outer([-filters[0, 0], filters[0, 2]], forwards[-1])
     filtered = sosfilt(filters, forwards[::-1], axis=0, zi=at_rest)[0][::-1]
