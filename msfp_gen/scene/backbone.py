@@ -91,42 +91,54 @@ def series_links(bearing: Bearing, rims: bool, arms: bool) -> list[Link]:
 class Backbone:
     """Force over axial load of a stack that is pushed from its centre, piecewise linear.
 
-    links: as of `series_links`. yielding: displacement within which friction is elastic [m].
+    links: as of `series_links`. yielding: displacement within which friction is elastic [m]. load: on the stack [N],
+    under which surfaces yield before they slide and rims give way; 0: neither, as published.
     """
 
     links: tuple[Link, ...]
     yielding: float
+    load: float = 0.0
 
     @classmethod
-    def of(cls, bearing: Bearing) -> Backbone:
+    def of(cls, bearing: Bearing, load: float = 0.0) -> Backbone:
         """That of a bearing, with rims and friction at the radii of its surfaces."""
         links = tuple(series_links(bearing, rims=True, arms=True))
         first = min(link.friction for link in links)
         elastic = [
             link.effective / link.radius * link.yielding for link in links if link.friction <= first * (1 + 1e-9)
         ]
-        return cls(links, sum(elastic))
+        return cls(links, sum(elastic), load)
+
+    def softness(self, link: Link) -> float:
+        """By how much a link tilts with the force over load once its slider presses on the rim [rad]."""
+        return self.load / (self.load + link.rim * link.radius)
 
     def tilts(self, force: float) -> list[float]:
         """Tilt of every link [rad] at a force over load, outermost first."""
         tilts: list[float] = []
         for link in self.links:
-            outside = 0.0 if link.outside is None else tilts[link.outside]
-            tilts.append(min(max(force - link.friction, 0.0), outside + link.limit))
+            most = link.limit + (0.0 if link.outside is None else tilts[link.outside])
+            free = max(force - link.friction, 0.0)
+            tilts.append(free if free <= most else most + (free - most) * self.softness(link))
         return tilts
 
     def displacement(self, force: float) -> float:
         """Displacement [m] at a force over load."""
-        return sum(link.share * tilt for link, tilt in zip(self.links, self.tilts(force), strict=True))
+        elastic = sum(
+            link.effective / link.radius * link.yielding * min(force / link.friction, 1.0)
+            for link in self.links
+            if self.load and link.friction > 0
+        )
+        return elastic + sum(link.share * tilt for link, tilt in zip(self.links, self.tilts(force), strict=True))
 
     @cached_property
     def points(self) -> tuple[Array, Array]:
-        """Displacements [m] and forces over load at which the slope changes, from the first onset of sliding to the
-        last rim; ndarrays, shape (k,).
+        """Displacements [m] and forces over load at which the slope changes, from the first onset of sliding (under a
+        load: from 0) to the last rim; ndarrays, shape (k,).
         """
-        forces: set[float] = set()
+        forces: set[float] = {0.0} if self.load else set()
         limits: list[float] = []
-        for link in self.links:
+        for link in self.links:  # that rims give way moves the corners by next to nothing
             limits.append(link.limit + (0.0 if link.outside is None else limits[link.outside]))
             forces |= {link.friction, link.friction + limits[-1]}
         rising = np.array(sorted(forces))
@@ -137,8 +149,9 @@ class Backbone:
         return displacements[moved], rising[moved]
 
     def force(self, displacement: Array) -> Array:
-        """Force over load at displacements [m] up to the last rim, at which it stays."""
-        return np.asarray(np.interp(displacement, *self.points))
+        """Force over load at displacements [m]; beyond the last rim it stays where rims are rigid."""
+        beyond = np.maximum(np.asarray(displacement) - self.capacity, 0.0)
+        return np.asarray(np.interp(displacement, *self.points) + beyond * self.last_slope)
 
     def sliding(self, displacement: float) -> list[float]:
         """Sliding displacement of every surface [m] at a displacement of the bearing [m], in the order of surfaces."""
@@ -147,6 +160,13 @@ class Backbone:
         for link, tilt in zip(self.links, tilts, strict=True):
             out[link.surface] = link.radius * (tilt - (0.0 if link.outside is None else tilts[link.outside]))
         return [max(value, 0.0) for value in out]
+
+    @cached_property
+    def last_slope(self) -> float:
+        """Slope where all sliders press on their rims [1/m]; 0 where rims are rigid."""
+        first = 2 * float(self.points[1][-1])
+        compliance = self.displacement(first + 1.0) - self.displacement(first)
+        return 1 / compliance if compliance > 0 else 0.0
 
     @property
     def capacity(self) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from msfp_gen.scene.top import MassTop, PrescribedTop
 from msfp_gen.specification.layout import Effects, Layout
 
 if TYPE_CHECKING:
+    from msfp_gen.buildings.scene import BuildingScene
     from msfp_gen.scene.scene import Scene
     from msfp_gen.scene.solver import Solver
     from msfp_gen.scene.top import Top
 
+_Scene = TypeVar("_Scene", bound="Scene | BuildingScene")
 LOOSE = 1e-2  # relative tolerance of the cheaper models
 JOINT = 0.05  # radius of the joint of the equivalent pendulum, and height of its slider [m]
 JOINT_FRICTION = 1e-3
@@ -49,11 +51,16 @@ def at_fidelity(scene: Scene, word: str) -> Scene:
     if word not in _REDUCTIONS:
         levels = ", ".join(map(repr, ("exact", *_REDUCTIONS)))
         raise InputError(f"fidelity = {word!r}: one bearing has no such model; give one of {levels}")
-    if word == "backbone":  # the label alone says how studies run it; nothing is checked again
-        labelled = copy(scene)
-        object.__setattr__(labelled, "fidelity", word)
-        return labelled
+    if word == "backbone":
+        return labelled(scene, word)
     return replace(_REDUCTIONS[word](scene), fidelity=word)
+
+
+def labelled(scene: _Scene, word: str) -> _Scene:
+    """The scene with another fidelity, which alone says how studies run it; nothing is checked again."""
+    other = copy(scene)
+    object.__setattr__(other, "fidelity", word)
+    return other
 
 
 def _loose(scene: Scene) -> Scene:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
+    from msfp_gen.specification.layout import Effects
 
 STEP = 0.005  # [s], at most
 STABLE = 0.5  # largest circular frequency times step
@@ -92,7 +93,7 @@ def run_backbone(scene: AnyScene) -> BackboneRun:
         "wall_time": time.perf_counter() - begin,
     }
     if isinstance(scene, Scene):
-        sliding = _backbone(scene.bearing).sliding(peak)
+        sliding = _backbone(bearings[0], mass * gravity).sliding(peak)
         gap = [surface.capacity - value for surface, value in zip(scene.bearing.surfaces, sliding, strict=True)]
         met = [number for number, value in enumerate(gap, start=1) if value <= 1e-9]
         summary |= {"peak_sliding": sliding, "minimum_gap": gap, "rims_met": met}
@@ -123,27 +124,30 @@ def _parts(scene: AnyScene) -> tuple[list[Bearing], list[float], float, float]:
     if isinstance(scene, Scene):
         assert isinstance(scene.top, MassTop)
         stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
-        return [scene.bearing], [1.0], scene.top.mass, stop
-    return list(scene.every_bearing), load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
+        return [_modelled(scene.bearing, scene.modelled)], [1.0], scene.top.mass, stop
+    bearings = list(map(_modelled, scene.every_bearing, scene.modelled))
+    return bearings, load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
+
+
+def _modelled(bearing: Bearing, effects: Effects) -> Bearing:
+    """The bearing with rims that carry nothing where the effects of its scene have none."""
+    return bearing if effects.rims else bearing.replace(rim_stiffness=0.0)
 
 
 @lru_cache(maxsize=64)
-def _backbone(bearing: Bearing) -> Backbone:
-    return Backbone.of(bearing)
+def _backbone(bearing: Bearing, load: float) -> Backbone:
+    return Backbone.of(bearing, load)
 
 
 def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: float) -> tuple[Array, float, Array]:
     """Elements (stiffness, strength), spring, and gaps (displacement, stiffness) of bearings side by side."""
-    weights: dict[Bearing, float] = {}
+    alike: dict[Bearing, list[float]] = {}
     for bearing, share in zip(bearings, shares, strict=True):
-        weights[bearing] = weights.get(bearing, 0.0) + share
-    parts = [(share, *parallel(_backbone(bearing))) for bearing, share in weights.items()]
-    elements = np.concatenate([[[share * w for w in row] for row in own] for share, own, _, _ in parts], axis=1)
-    gaps = np.concatenate([own * [[1.0], [share]] for share, _, _, own in parts], axis=1)
-    rim = sum(bearing.surfaces[0].rim_stiffness for bearing in bearings) / (mass * bearings[0].gravity)
-    last = min(_backbone(bearing).capacity for bearing in weights)
-    most = STABLE**2 / (bearings[0].gravity * (STEP / 5) ** 2)
-    gaps = np.concatenate([gaps, [[last], [min(rim, most)]]], axis=1)
+        alike.setdefault(bearing, []).append(share)
+    weight = mass * bearings[0].gravity
+    parts = [(sum(own), *parallel(_backbone(bearing, weight * float(np.mean(own))))) for bearing, own in alike.items()]
+    elements = np.concatenate([rows * share for share, rows, _, _ in parts], axis=1)
+    gaps = np.concatenate([rows * [[1.0], [share]] for share, _, _, rows in parts], axis=1)
     limit = _driver().MOST
     if elements.shape[1] > limit:
         raise InputError(f"bearings: {elements.shape[1]} regimes of different bearings; the backbone takes {limit}")
@@ -153,16 +157,16 @@ def _elements(bearings: tuple[Bearing, ...], shares: tuple[float, ...], mass: fl
 def parallel(backbone: Backbone) -> tuple[Array, float, Array]:
     """Elements (stiffness [1/m], strength), spring [1/m], and gaps (displacement [m], stiffness [1/m]) of a backbone.
 
-    Each element yields where the slope falls. Stiffness and strength are over the load.
+    Each element yields where the slope falls. Stiffness and strength are over the load. The last gap is that at which
+    all sliders press on their rims.
     """
     u, force = backbone.points
     slopes = np.diff(force) / np.diff(u)
     main = int(np.argmin(slopes))
-    rising = np.array([force[0] / backbone.yielding, *slopes[: main + 1]])
-    yields = backbone.yielding + u[: main + 1]
-    stiffness = rising[:-1] - rising[1:]
+    stiffness = -np.diff(slopes[: main + 1])
+    yields = u[1 : main + 1]
     falling = stiffness > 0
-    gaps = np.array([u[main + 1 : -1], np.diff(slopes[main:])])
+    gaps = np.array([u[main + 1 :], np.diff([*slopes[main:], backbone.last_slope])])
     return np.array([stiffness, stiffness * yields])[:, falling], float(slopes[main]), gaps
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from msfp_gen import InputError, load_scene
+from msfp_gen import InputError, Motion, load_scene
 from msfp_gen.buildings.file import reduced
 from msfp_gen.scene.backbone import Backbone
 from msfp_gen.scene.file.loader import bearing_from_table
@@ -216,12 +216,30 @@ def test_a_fragility_has_the_known_median_and_dispersion():
 
 
 def test_the_backbone_in_parallel_is_the_backbone():
-    backbone = Backbone.of(bearing_from_table({"preset": "prototype-tfp"}))
+    backbone = Backbone.of(bearing_from_table({"preset": "prototype-tfp"}), 112e3)
     elements, spring, gaps = parallel(backbone)
-    for u in np.linspace(0.01, 0.9 * backbone.capacity, 17):
+    for u in np.linspace(0.0, 1.3 * backbone.capacity, 27):
         force = spring * u + np.minimum(elements[0] * u, elements[1]).sum()
         force += (gaps[1] * np.maximum(u - gaps[0], 0)).sum()
-        assert force == pytest.approx(backbone.force(u - backbone.yielding), rel=0.02)
+        assert force == pytest.approx(backbone.force(u), rel=1e-9)
+
+
+@pytest.mark.parametrize("rims", [True, False])
+def test_the_backbone_meets_its_rims_as_the_bearing_does(rims):
+    """A pulse that presses all sliders on their rims, which multiplies the shear; without rims they go beyond."""
+    times = np.arange(0.0, 6.0, 0.01)
+    pulse = 2.0 * np.sin(2 * np.pi * times / 2.5) * (times < 2.5)
+    motion = Motion.from_acceleration(times, np.outer(pulse, [1.0, 0.3, 0.0]))
+    given = load_scene("ridgecrest-clc")
+    scene = replace(
+        given, motion=motion, motion_table=None, duration=None, bearing=given.bearing.replace(reference_pressure=None),
+        effects=replace(given.effects, rims=rims, friction="constant"), solver=replace(given.solver, rtol=1e-3),
+    )  # fmt: skip
+    exact, cheap = run_to_end(scene).summary, run_to_end(reduced(scene, "backbone")).summary
+    assert max(exact["minimum_gap"][0], cheap["minimum_gap"][0]) < 0
+    assert (exact["peak_force"]["radial"] > 150e3) == rims
+    for name in ("peak_displacement", "peak_force"):
+        assert cheap[name]["radial"] == pytest.approx(exact[name]["radial"], rel=0.1)
 
 
 def test_a_run_of_the_backbone_follows_the_exact_one():
