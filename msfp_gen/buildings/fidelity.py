@@ -9,7 +9,7 @@ import numpy as np
 
 from msfp_gen.buildings.building import Building
 from msfp_gen.errors import InputError
-from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver
+from msfp_gen.scene.fidelity import LEVEL, LOOSE, equivalent_pendulum, implicit_solver, labelled
 from msfp_gen.scene.scene import Scene
 from msfp_gen.scene.top import Top
 from msfp_gen.specification.layout import Effects
@@ -23,8 +23,8 @@ def building_at_fidelity(scene: BuildingScene, word: str) -> BuildingScene | Sce
 
     The last is the scene of one bearing that carries the whole building. Raises InputError of one line.
     """
-    if word in ("exact", "backbone"):  # the label alone says how studies run the latter
-        return replace(scene, fidelity=word)
+    if word in ("exact", "backbone"):
+        return labelled(scene, word)
     if word == "equivalent":
         return _equivalent(scene)
     if word == "loose" and scene.solver.rtol >= LOOSE:

@@ -117,13 +117,14 @@ def building_from_table(
     still = {"kind": "ramp", "acceleration": 1.0, "duration": 1.0}  # valid, where a motion replaces it
     given = validate(_SCENE, table if motion is None else {**table, "motion": still}, TABLES)
     frame, named = given.pop("building"), given.pop("bearings", {})
-    made = given.pop("motion")
-    parts: Table = {"building": _building(frame, folder), "motion": motion or _motion(made, folder)}
+    shaking = given.pop("motion")
+    parts: Table = {"building": _building(frame, folder), "motion": motion or _motion(shaking, folder)}
     parts |= {name: kind(**given.pop(name)) for name, kind in (("solver", Solver), ("limits", Limits)) if name in given}
     common = {name: frame[name] for name in COMMON if name in frame}
+    made: dict[str, Bearing] = {}
     rows = enumerate(frame["bearing"])
     parts["bearings"] = [
-        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder) for index, row in rows
+        _bearing({**common, **row}, f"building.bearing[{index}]", named, folder, made) for index, row in rows
     ]
     word = given.pop("fidelity", "exact")
     return building_at_fidelity(BuildingScene(**given, **parts), word)
@@ -180,14 +181,14 @@ def _of_matrices(given: Table, options: Table) -> Building:
 def stored_bearing(row: Table, index: int) -> BuildingBearing:
     """A bearing of the table of a result file, complete and in SI units. Raises InputError."""
     path = f"bearing[{index}]"
-    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {}, None)
+    return _bearing(validate(_BEARING, row, {"": _BEARING, "interface": _INTERFACE}), path, {}, None, {})
 
 
-def _bearing(given: Table, path: str, named: Table, folder: Path | None) -> BuildingBearing:
+def _bearing(given: Table, path: str, named: Table, folder: Path | None, made: dict[str, Bearing]) -> BuildingBearing:
     values = dict(given)
     if "interface" not in values:
         raise InputError(f"{path}.interface is missing: give this table, or [building.interface] for all bearings")
-    values["bearing"] = _values(values["bearing"], path, named)
+    values["bearing"] = _values(values["bearing"], path, named, made)
     with errors_at("effects", f"{path}.effects"):
         if "effects" in values:
             values["effects"] = effects_from_table(values["effects"])
@@ -203,15 +204,20 @@ def _bearing(given: Table, path: str, named: Table, folder: Path | None) -> Buil
         return BuildingBearing(**values)
 
 
-def _values(given: Any, path: str, named: Table) -> Bearing:
-    """A bearing by its name in `[bearings]`, by that of a preset, or as a table."""
+def _values(given: Any, path: str, named: Table, made: dict[str, Bearing]) -> Bearing:
+    """A bearing by its name in `[bearings]`, by that of a preset, or as a table. made: those with a name, so far."""
     own = isinstance(given, str) and given in named
+    if isinstance(given, str) and given in made:
+        return made[given]
     place = f"bearings.{given}" if own else f"{path}.bearing"
     try:
-        return bearing_from_table(named[given] if own else given)
+        bearing = bearing_from_table(named[given] if own else given)
     except InputError as error:
         names = f"; those of [bearings] are {', '.join(named)}" if isinstance(given, str) and not own and named else ""
         raise InputError(place + str(error).removeprefix("bearing") + names) from None
+    if isinstance(given, str):
+        made[given] = bearing
+    return bearing
 
 
 def _motion(given: Table, folder: Path | None) -> Motion:

@@ -65,10 +65,10 @@ class Quantity:
     def _number(self, value: object, text: bool) -> float | int:
         if text and isinstance(value, str):
             value = to_si(value, self.unit)
-        kind = Integral if self.whole else Real
-        if isinstance(value, bool) or not isinstance(value, kind):
+        kinds = (int, Integral) if self.whole else (float, int, Real)  # abstract classes last: they take longest
+        if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError(self.remedy)
-        number = int(value) if self.whole else _float(value)  # type: ignore[call-overload]
+        number = int(value) if self.whole else _float(value)  # type: ignore[arg-type]
         low, high = self.limits
         if low <= number <= high:
             return number
