@@ -52,6 +52,7 @@ GROWTH = 3.0  # of the exact runs from one round to the next, at most
 MARGIN = 0.9  # of the half width that the runs are planned for, over the target
 MOST = 200_000  # draws
 CHOSEN = 1.5  # exact runs at least, over those of the pilot
+LEAST_SHARE = 0.2  # time of the cheapest runs, over that of the others, at least: so a rare event is seen by them
 CHEAP = 8  # cheap runs for each exact one in the pilot
 
 
@@ -463,7 +464,13 @@ def _more(
     if len(state.chain) > 1:  # the pilot may lack draws of a kind that the cheap model knows: some more are chosen
         runs[0] = max(runs[0], CHOSEN * state.pilot)
     before = (state.count, dict(state.scale))
-    runs *= min(1.0, GROWTH * exact / runs[0])
+    most = (
+        GROWTH
+        if not moment.unseen or question.target is None
+        else float(np.clip(half / (MARGIN * wanted), CHOSEN, GROWTH))
+    )
+    runs *= min(1.0, most * exact / runs[0])
+    runs[-1] = max(runs[-1], LEAST_SHARE * float(runs[:-1] @ costs[:-1]) / costs[-1])
     state.grow(runs)
     return before != (state.count, state.scale)
 

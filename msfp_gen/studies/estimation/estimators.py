@@ -21,7 +21,7 @@ from msfp_gen.common.arrays import Array
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
-Fit = Callable[[Array, Array], Callable[[Array], Array]]
+Fit = Callable[[Array, Array, Array], Callable[[Array], Array]]  # of x, y and the weights of these runs
 FOLDS = 5  # of the draws: a prediction is fitted to those of the other folds
 LEVEL = 0.95
 LEAST = 0.25  # chance of a draw for a mean, over the mean chance
@@ -52,12 +52,15 @@ class Moment:
         variance: of it.
         freedom: degrees of freedom of the variance.
         variances: that each level has to estimate, for `optimal_runs`, exact first.
+        unseen: whether the variance is mostly that of errors of the prediction which no run showed; it falls with the
+            square of the number of exact runs.
     """
 
     value: float
     variance: float
     freedom: float
     variances: Array
+    unseen: bool = False
 
     @property
     def half(self) -> float:
@@ -72,22 +75,17 @@ def quantile_of_t(freedom: float) -> float:
     return float(stdtrit(max(freedom, 1.0), (1 + LEVEL) / 2))
 
 
-def line(x: Array, y: Array) -> Callable[[Array], Array]:
-    """The regression line of y on x, level beyond the range of x."""
-    return _within(x, _regression(x, y, [np.asarray]))
-
-
-def bent(x: Array, y: Array) -> Callable[[Array], Array]:
+def bent(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
     """The regression of y on x and, where all are above 0, its logarithm; level beyond the range of x."""
-    return _within(x, _extended(x, y))
+    return _within(x, _extended(x, y, weights))
 
 
-def _extended(x: Array, y: Array) -> Callable[[Array], Array]:
+def _extended(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
     """The same, extended beyond the range of x."""
     low = float(x.min())
     if low <= 0:
-        return _regression(x, y, [np.asarray])
-    return _regression(x, y, [np.asarray, lambda at: np.log(np.maximum(at, low / 100))])
+        return _regression(x, y, weights, [np.asarray])
+    return _regression(x, y, weights, [np.asarray, lambda at: np.log(np.maximum(at, low / 100))])
 
 
 def _within(x: Array, function: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -95,14 +93,18 @@ def _within(x: Array, function: Callable[[Array], Array]) -> Callable[[Array], A
     return lambda at: function(np.clip(at, low, high))
 
 
-def _regression(x: Array, y: Array, functions: Sequence[Callable[[Array], Array]]) -> Callable[[Array], Array]:
+def _regression(
+    x: Array, y: Array, weights: Array, functions: Sequence[Callable[[Array], Array]]
+) -> Callable[[Array], Array]:
     """Least squares of y on functions of x, with a prior of their scaled slopes that is worth next to nothing."""
     columns = np.stack([function(x) for function in functions], axis=-1)
-    centre, spread = columns.mean(axis=0), columns.std(axis=0)
+    share = weights / weights.sum()
+    centre, level = share @ columns, float(share @ y)
+    spread = np.sqrt(share @ (columns - centre) ** 2)
     scaled = (columns - centre) / np.where(spread > 0, spread, 1.0)
-    level = float(y.mean())
-    normal = scaled.T @ scaled + np.diag(np.where(spread > 0, PRIOR, 1.0))
-    slopes = np.linalg.solve(normal, scaled.T @ (y - level)) / np.where(spread > 0, spread, 1.0)
+    worth = len(y) * share
+    normal = scaled.T * worth @ scaled + np.diag(np.where(spread > 0, PRIOR, 1.0))
+    slopes = np.linalg.solve(normal, scaled.T * worth @ (y - level)) / np.where(spread > 0, spread, 1.0)
 
     def predict(at: Array) -> Array:
         return np.asarray(level + (np.stack([function(at) for function in functions], axis=-1) - centre) @ slopes)
@@ -110,14 +112,13 @@ def _regression(x: Array, y: Array, functions: Sequence[Callable[[Array], Array]
     return predict
 
 
-def parabola(x: Array, y: Array) -> Callable[[Array], Array]:
+def parabola(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
     """The regression parabola of y on x."""
-    centre, spread = float(x.mean()), float(x.std()) or 1.0
-    coefficients = np.polynomial.polynomial.polyfit((x - centre) / spread, y, 2) if len(x) > 3 else [y.mean()]
-    return _within(x, lambda at: np.asarray(np.polynomial.polynomial.polyval((at - centre) / spread, coefficients)))
+    centre = float(x.mean())
+    return _within(x, _regression(x, y, weights, [np.asarray, lambda at: (at - centre) ** 2]))
 
 
-def logistic(x: Array, y: Array) -> Callable[[Array], Array]:
+def logistic(x: Array, y: Array, _: Array) -> Callable[[Array], Array]:
     """The logistic curve of shares y in [0, 1] over x, whose slope has a weak prior."""
     centre, spread, scaled = _scaling(x)
     level = np.log((y.sum() + 0.5) / (len(y) - y.sum() + 0.5))
@@ -126,21 +127,24 @@ def logistic(x: Array, y: Array) -> Callable[[Array], Array]:
     return lambda at: _expit(solution[0] + solution[1] * (scaled(at) - centre) / spread)
 
 
-def exceedance(threshold: float) -> Fit:
+def exceedance(threshold: float, extended: bool = False) -> Fit:
     """A fit of values y over x, of which comes the probability that y is at least a threshold.
 
     It is the normal law about the regression line of the logarithms, which uses how far every run is from the
-    threshold; its level and slope are then fitted to the runs that exceed it, with a prior worth some runs.
+    threshold; its level and slope are then fitted to the runs that exceed it, with a prior worth some runs. extended:
+    beyond the range of x too, where otherwise it is level.
     """
 
-    def fit(x: Array, y: Array) -> Callable[[Array], Array]:
+    def fit(x: Array, y: Array, weights: Array) -> Callable[[Array], Array]:
         finite = np.isfinite(y)
         if finite.sum() < 4:
-            return logistic(x, (y >= threshold).astype(float))
+            return logistic(x, (y >= threshold).astype(float), weights)
         logs = threshold > 0 and float(y[finite].min()) > 0
         heights, bound = (np.log(y[finite]), np.log(threshold)) if logs else (y[finite], threshold)
         centre, spread, scaled = _scaling(x)
-        regression = line((scaled(x[finite]) - centre) / spread, heights)
+        fitted = (scaled(x[finite]) - centre) / spread
+        straight = _regression(fitted, heights, np.ones(len(heights)), [np.asarray])
+        regression = straight if extended else _within(fitted, straight)
         left = heights - regression((scaled(x[finite]) - centre) / spread)
         deviation = max(float(left.std()), 1e-3 * (float(heights.std()) or 1.0), 1e-12)
 
@@ -194,16 +198,19 @@ def feature(values: Array) -> Array:
     return np.where(np.isfinite(values), values, most)
 
 
-def predictions(fit: Fit, draws: Indices, x: Array, target_draws: Indices, target: Array) -> Array:
+def predictions(
+    fit: Fit, draws: Indices, x: Array, target_draws: Indices, target: Array, weights: Array | None = None
+) -> Array:
     """For every draw the prediction of a target from x, fitted to the targets of other folds; shape of `draws`.
 
-    target_draws are among `draws`.
+    target_draws are among `draws`. weights: of the targets in the fit; None: equal.
     """
     known = x[np.searchsorted(draws, target_draws)]
+    weights = np.ones(len(target)) if weights is None else weights
     out = np.empty(len(draws))
     for fold in range(FOLDS):
         others, here = target_draws % FOLDS != fold, draws % FOLDS == fold
-        out[here] = fit(known[others], target[others])(x[here])
+        out[here] = fit(known[others], target[others], weights[others])(x[here])
     return out
 
 
@@ -218,28 +225,31 @@ def telescoped(
     threshold: the target is the values, and their mean the probability that they are at least this.
     """
     count = len(levels[-1].draws)
-    parts, least, current = [], [], target if threshold is None else (target >= threshold).astype(float)
+    parts, least, unseen, current = [], [], 0.0, target if threshold is None else (target >= threshold).astype(float)
     fitted = target
     for upper, lower in pairwise(levels):
         first = fit if threshold is None else exceedance(threshold) if upper is levels[0] else logistic
-        predicted = predictions(first, lower.draws, feature(lower.values), upper.draws, fitted)
+        predicted = predictions(first, lower.draws, feature(lower.values), upper.draws, fitted, 1 / upper.chances)
         difference = current - predicted[np.searchsorted(lower.draws, upper.draws)]
         parts.append(_contributions(upper, difference, pilot, count))
         least.append(0.0 if threshold is None else _of_shares(upper, lower, predicted, pilot, count))
         current = fitted = predicted
     parts.append(current)
     groups = [slice(0, pilot), slice(pilot, count)] if 1 < pilot < count - 1 else [slice(0, count)]
-    sizes = np.array([_size(level, pilot) for level in levels])
     least.append(0.0)
     if threshold is not None:  # no run that errs among n does not mean that none does: at most three in n
-        least[0] = max(least[0], 1 / sizes[0] ** 2)
+        inverse = 1 / levels[0].chances[levels[0].draws >= pilot]
+        unseen = 1 / (pilot + inverse.sum() ** 2 / max(inverse @ inverse, 1.0)) ** 2
+        least[0] = max(least[0], unseen)
     ends = [len(level.draws) for level in levels]
     left = np.array([1.0 if population is None else max(1 - end / population, 0.0) for end in ends])
     variances = left * np.maximum([_variance(part, groups) for part in parts], least)
     variance = max(_variance(sum(parts, np.zeros(count)), groups) if population is None else 0.0, variances.sum())
     freedom = np.maximum(np.array(ends) - 2.0, 1.0)
     total = float(variance**2 / max(np.sum(variances**2 / freedom), 1e-300)) if variance > 0 else np.inf
-    return Moment(float(np.mean(sum(parts, np.zeros(count)))), float(variance), total, variances * sizes)
+    planned = variances * ends * variance / max(float(variances.sum()), 1e-300)
+    value = float(np.mean(sum(parts, np.zeros(count))))
+    return Moment(value, float(variance), total, planned, bool(unseen > variance / 2))
 
 
 def _of_shares(upper: Runs, lower: Runs, shares: Array, pilot: int, count: int) -> float:
@@ -252,17 +262,15 @@ def _of_shares(upper: Runs, lower: Runs, shares: Array, pilot: int, count: int) 
     first = upper.draws < pilot
     if not len(own[~first]):
         return float(own.mean()) / len(own)
-    share = float(first.sum()) / _size(upper, pilot)
+    share = float(first.sum()) / _size(upper, pilot, count)
     main = float(np.sum(own[~first] / upper.chances[~first] ** 2)) * ((1 - share) / (count - pilot)) ** 2
     return main + float(own[first].mean()) * share**2 / max(int(first.sum()), 1)
 
 
-def _size(level: Runs, pilot: int) -> float:
-    """How many runs with equal chances would be worth those of a level."""
+def _size(level: Runs, pilot: int, count: int) -> float:
+    """How many runs of a pilot are worth those of a level, with chances in proportion to what predictions leave."""
     main = level.chances[level.draws >= pilot]
-    return float((level.draws < pilot).sum()) + (
-        float(np.sum(1 / main) ** 2 / np.sum(main**-2.0)) if len(main) else 0.0
-    )
+    return float((level.draws < pilot).sum()) + ((count - pilot) * float(main.mean()) if len(main) else 0.0)
 
 
 def _contributions(level: Runs, difference: Array, pilot: int, count: int) -> Array:
@@ -276,7 +284,7 @@ def _contributions(level: Runs, difference: Array, pilot: int, count: int) -> Ar
     if not len(main):
         out[level.draws] = difference * count / max(int(first.sum()), 1)
         return out
-    worth = _size(level, pilot)
+    worth = _size(level, pilot, count)
     share = float(first.sum()) / worth
     out[level.draws[first]] = difference[first] * share * count / max(pilot, 1)
     out[level.draws[~first]] = difference[~first] / main * (1 - share) * count / (count - pilot)
@@ -336,15 +344,17 @@ def uncertainty(x: Array, values: Array, threshold: float | None, at: Array) -> 
     """In proportion to which chance a draw should be run exactly: shape of `at` (Neyman, 1934).
 
     threshold: of a probability: the deviation of a yes or no with the predicted share, at least a fifth of the
-    largest. None: for a mean the predicted distance from the prediction, at least a quarter of its mean, and beyond the
-    range of the pilot what an extended prediction would add. So a model that errs is found out.
+    largest; a rare event lies beyond the range of the pilot, so an extended prediction counts as well. None: for a
+    mean the predicted distance from the prediction, at least a quarter of its mean, and beyond the range of the pilot
+    what an extended prediction would add. So a model that errs is found out.
     """
+    equal = np.ones(len(x))
     if threshold is not None:
-        share = exceedance(threshold)(x, values)(at)
-        return np.clip(np.sqrt(share * (1 - share)), 0.1, 0.5)
-    left = np.abs(values - bent(x, values)(x))
+        level, extended = (exceedance(threshold, far)(x, values, equal)(at) for far in (False, True))
+        return np.clip(np.sqrt(np.maximum(level * (1 - level), extended * (1 - extended))), 0.1, 0.5)
+    left = np.abs(values - bent(x, values, equal)(x))
     mean = float(left.mean())
     if not mean > 0:
         return np.ones(len(at))
-    beyond = np.abs(_extended(x, values)(at) - bent(x, values)(at)) / mean
-    return np.maximum(bent(x, left)(at) / mean, LEAST) + beyond
+    beyond = np.abs(_extended(x, values, equal)(at) - bent(x, values, equal)(at)) / mean
+    return np.maximum(bent(x, left, equal)(at) / mean, LEAST) + beyond
