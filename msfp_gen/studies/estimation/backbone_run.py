@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from msfp_gen.buildings.file import AnyScene
     from msfp_gen.motions.motion import Motion
     from msfp_gen.scene.bearing import Bearing
-    from msfp_gen.specification.layout import Effects
+    from msfp_gen.specification.layout import Auto, Effects
 
 STEP = 0.005  # [s], at most
 STABLE = 0.5  # largest circular frequency times step
@@ -124,14 +124,14 @@ def _parts(scene: AnyScene) -> tuple[list[Bearing], list[float], float, float]:
     if isinstance(scene, Scene):
         assert isinstance(scene.top, MassTop)
         stop = 0.0 if scene.stop is None or scene.stop.displacement is None else scene.stop.displacement
-        return [_modelled(scene.bearing, scene.modelled)], [1.0], scene.top.mass, stop
-    bearings = list(map(_modelled, scene.every_bearing, scene.modelled))
+        return [_with_rims(scene.bearing, scene.effects)], [1.0], scene.top.mass, stop
+    bearings = [_with_rims(one.bearing, one.effects) for one in scene.bearings]
     return bearings, load_shares(scene), float(scene.axial_loads.sum()) / scene.gravity, 0.0
 
 
-def _modelled(bearing: Bearing, effects: Effects) -> Bearing:
-    """The bearing with rims that carry nothing where the effects of its scene have none."""
-    return bearing if effects.rims else bearing.replace(rim_stiffness=0.0)
+def _with_rims(bearing: Bearing, effects: Effects | Auto | None) -> Bearing:
+    """The bearing, with rims that carry nothing where the effects of its scene have none."""
+    return bearing.replace(rim_stiffness=0.0) if effects and effects.rims is False else bearing
 
 
 @lru_cache(maxsize=64)

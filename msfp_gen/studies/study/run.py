@@ -196,12 +196,12 @@ def run_chunk(order: Order, task: Task) -> tuple[bytes, int]:
 
 
 def _chunk(order: Order, task: Task) -> tuple[bytes, int]:
-    begin = time.thread_time()
     factory = _factories.get(order.identity)
     if factory is None:
         factory = SceneFactory(order.recipe)
         _factories.clear()
         _factories[order.identity] = factory
+    begin = time.thread_time()
     axes = order.recipe.axes
     rows = []
     for offset, (values, labels) in enumerate(task.rows(axes), start=1):
