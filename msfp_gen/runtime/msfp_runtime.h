@@ -300,29 +300,45 @@ typedef struct {
  * stop displacement, and with uplift the compression of every unilateral contact. */
 #define MSFP_EVENTS (MSFP_NB + 1 + MSFP_UPLIFT * MSFP_NB)
 
-/* The state at the end of a step. */
-typedef struct {
-    double t;                                                                 /* [s] */
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ];     /* as in msfp_point */
-    double f[MSFP_NB][2], df[MSFP_NB][2];                                     /* Y, Z [-] and their rates [1/s] */
-    double foot[MSFP_FOOT_SIZE]; /* motion of the foot of the supported mass */
-    double work[MSFP_WORKS], power[MSFP_WORKS];                               /* integrals [J] and integrands [W] */
-    double prescribed_power; /* of everything that moves as prescribed, a part of power[MSFP_WORK_INPUT] [W] */
-    double energy;           /* stored energy [J], see energy_balance.c */
-    msfp_mechanical mechanical;
+/* Fields that hold one number for each of what is named, or with gradients one array of derivatives ("columns"): the
+ * coordinates q as in msfp_point; from v to work what the methods integrate besides; from a to power its rates in the same
+ * order, those of q being v. f: Y, Z [-]; foot: height of the foot of the supported mass and its velocity; heat: parts of
+ * the rise in temperature [K], see heat.c; work: integrals [J], power: integrands [W]; prescribed_power, load_power: the
+ * parts of the power of the input, see msfp_input_parts. */
 #if MSFP_HEAT
-    double heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB]; /* parts of the rise in temperature [K]; see heat.c */
+#define MSFP_HEAT_FIELD(type, name) type name[MSFP_NB][MSFP_HEAT];
+#else
+#define MSFP_HEAT_FIELD(type, name)
 #endif
+#define MSFP_STATE_FIELDS(type) \
+    type t, q[MSFP_NB][MSFP_NQ]; \
+    type v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2]; \
+    MSFP_HEAT_FIELD(type, heat) \
+    type work[MSFP_WORKS]; \
+    type a[MSFP_NB][MSFP_NQ], df[MSFP_NB][2], dfoot[2]; \
+    MSFP_HEAT_FIELD(type, dheat) \
+    type power[MSFP_WORKS], prescribed_power, load_power;
+
+/* A state: at the end of a step, at a stage, or inside a step; also a change of one. */
+typedef struct {
+    MSFP_STATE_FIELDS(double)
+    double energy; /* stored energy [J], see energy_balance.c */
+    msfp_mechanical mechanical;
 } msfp_state;
 
-/* Values at an interpolation node inside the last step. */
+enum {
+    MSFP_COORDINATES = MSFP_NB * MSFP_NQ,
+    MSFP_INTEGRATED = (offsetof(msfp_state, a) - offsetof(msfp_state, v)) / sizeof(double), /* numbers from v to work */
+    MSFP_INTEGRATED_MOTION = MSFP_INTEGRATED - MSFP_WORKS                                   /* from v to heat */
+};
+/* The numbers of a state, or of its columns, from a field on. */
+#define MSFP_NUMBERS(type, state, field) ((double *)((char *)(state) + offsetof(type, field)))
+
+/* An interpolation node inside the last step. */
 typedef struct {
-    double share; /* of the step, 0 to 1 */
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2], work[MSFP_WORKS];
+    double share;    /* of the step, 0 to 1 */
+    msfp_state state;
     double top_force[3]; /* of the stage; see extremes.c [N] */
-#if MSFP_HEAT
-    double heat[MSFP_NB][MSFP_HEAT];
-#endif
 } msfp_node;
 
 #if MSFP_CLOSED_FORM
@@ -364,11 +380,6 @@ struct msfp_run {
     msfp_node node[MSFP_NODES]; /* of the last step */
     int node_count;             /* 0: dense output uses the ends of the step and their rates */
     msfp_work work;
-#if MSFP_HEAT
-    struct { /* the step in progress [K], [K/s]: the sum over earlier stages, the present stage, rates of all stages */
-        double before[MSFP_NB][MSFP_HEAT], heat[MSFP_NB][MSFP_HEAT], rates[MSFP_STAGES][MSFP_NB][MSFP_HEAT];
-    } step;
-#endif
     double h, previous_error, output_time; /* next step [s], error of the last one [-], time of the next row [s] */
     double start[3];                       /* r_01 - r_nn at the start [m] */
     double events_now[MSFP_EVENTS];        /* event functions at the present state */

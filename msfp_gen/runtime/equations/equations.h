@@ -166,39 +166,21 @@ void msfp_history_at(msfp_history *h, double t, int orders, double out[][6]);
 
 /* ---- heat.c: nothing of it is compiled into models without heat ---- */
 #if MSFP_HEAT
-/* Rates [MSFP_NB][MSFP_HEAT] of the parts of the temperature rise [K/s]: dheat/dt = -lambda heat + weight flux. */
-void msfp_heat_rates(const double *heat, const double flux[MSFP_NB], double *rates);
-/* Temperature of a state, for an evaluation. */
-void msfp_heat_point(const msfp_state *s, msfp_point *at);
-/* Heat flux of the evaluation in run->work, into the present state. */
-void msfp_heat_initial_state(msfp_run *run);
-/* A step: begin; prepare and close each stage i (weights: of the earlier stages, beta: diagonal entry [s]); finish. */
-void msfp_heat_begin(msfp_run *run);
-void msfp_heat_prepare(msfp_run *run, const double *weights, int i, double h, double beta, msfp_point *at);
-void msfp_heat_stage(msfp_run *run, int i, double beta);
-/* Copy the present stage to an interpolation node. */
-void msfp_heat_node(const msfp_run *run, msfp_node *node);
-void msfp_heat_finish(msfp_run *run);
-/* Largest error of a temperature over its tolerance [-]; weights: of the method less the embedded ones. */
-double msfp_heat_error(const msfp_run *run, const double *weights, int stages, double h, double beta);
+/* Temperatures of a stage with diagonal entry beta [s], for its evaluation, from what the earlier stages give; at beta = 0
+ * those of a state. */
+void msfp_heat_point(const msfp_state *from, double beta, msfp_point *at);
+/* Parts of the temperatures after the evaluation in `w`, and their rates, into `s`. */
+void msfp_heat_state(const msfp_work *w, const msfp_state *from, double beta, msfp_state *s);
+/* Largest error of a temperature over its tolerance [-]; error: its estimate, s: the end of the step. */
+double msfp_heat_error(const msfp_run *run, const msfp_state *error, const msfp_state *s, double beta);
 #else
 /* In place of their prefixed names, see msfp_symbols.h. */
 #undef msfp_heat_point
-#undef msfp_heat_initial_state
-#undef msfp_heat_begin
-#undef msfp_heat_prepare
-#undef msfp_heat_stage
-#undef msfp_heat_node
-#undef msfp_heat_finish
+#undef msfp_heat_state
 #undef msfp_heat_error
-#define msfp_heat_point(s, at) ((void)0)
-#define msfp_heat_initial_state(run) ((void)0)
-#define msfp_heat_begin(run) ((void)0)
-#define msfp_heat_prepare(run, weights, i, h, beta, at) ((void)0)
-#define msfp_heat_stage(run, i, beta) ((void)0)
-#define msfp_heat_node(run, node) ((void)0)
-#define msfp_heat_finish(run) ((void)0)
-#define msfp_heat_error(run, weights, stages, h, beta) 0.0
+#define msfp_heat_point(from, beta, at) ((void)0)
+#define msfp_heat_state(w, from, beta, s) ((void)0)
+#define msfp_heat_error(run, error, s, beta) 0.0
 #endif
 
 #endif

@@ -163,12 +163,11 @@ void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage)
     memcpy(&run->gradients->trail.work[i], &run->work, offsetof(msfp_work, dx)); /* without derivatives */
 }
 
-void msfp_gradients_powers(msfp_run *run, const msfp_stages *s, int ringing)
+void msfp_gradients_states(msfp_run *run, const msfp_stages *s, int ringing)
 {
     if (!run->gradients)
         return;
-    memcpy(run->gradients->trail.power, s->power, sizeof s->power);
-    memcpy(run->gradients->trail.prescribed, s->prescribed, sizeof s->prescribed);
+    memcpy(run->gradients->trail.state, s->stage, sizeof s->stage);
     run->gradients->trail.ringing = ringing;
 }
 

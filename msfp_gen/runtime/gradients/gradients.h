@@ -120,26 +120,15 @@ void msfp_gaps_columns(const msfp_parameters *p, const msfp_parameter_columns *d
 
 typedef msfp_columns msfp_row_columns[MSFP_ROW_SIZE];
 
-/* Columns of the powers of one evaluation [W], the block `works`; prescribed, load: parts of the input. */
+/* Columns of a state; of works and powers where they are computed, else zero. */
 typedef struct {
-    msfp_columns of[MSFP_WORKS], prescribed, load;
-} msfp_power_columns;
-
-/* Columns of a state, and of its time; of works and powers where they are computed, else zero. */
-typedef struct {
-    msfp_columns t, q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], a[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], df[MSFP_NB][2];
-    msfp_columns foot[MSFP_FOOT_SIZE], work[MSFP_WORKS];
-    msfp_power_columns power;
-#if MSFP_HEAT
-    msfp_columns heat[MSFP_NB][MSFP_HEAT], flux[MSFP_NB];
-#endif
+    MSFP_STATE_FIELDS(msfp_columns)
 } msfp_state_columns;
 
 #if MSFP_CLOSED_FORM
 /* Of what the work of a quasi-static step follows from (msfp_step_history): powers before it, and at its end. */
 typedef struct {
-    msfp_power_columns power;
-    msfp_columns load[6], top[3], tilt, normal[MSFP_NB];
+    msfp_columns power[MSFP_WORKS], load[6], top[3], tilt, normal[MSFP_NB];
 } msfp_history_columns;
 #endif
 
@@ -157,7 +146,6 @@ typedef struct {
     msfp_row_columns start_row, end_row; /* of the rows at the ends of the step, where they are known */
     int start_known, end_known;
     msfp_columns extremes[sizeof(msfp_extremes) / sizeof(double)];
-    msfp_power_columns power[MSFP_STAGES]; /* of the stages, where works are computed */
 #if MSFP_CLOSED_FORM
     msfp_history_columns history;
 #endif
@@ -166,10 +154,10 @@ typedef struct {
 /* The stages of a step as the method solved them, and their factored tangents. */
 typedef struct {
     msfp_stage stage[MSFP_STAGES];
+    msfp_state state[MSFP_STAGES]; /* 0: the start of the step */
     msfp_work work[MSFP_STAGES];
     msfp_slopes slopes[MSFP_STAGES];
     int all_slopes; /* whether those of the last stage are complete */
-    double power[MSFP_STAGES][MSFP_WORKS], prescribed[MSFP_STAGES];
     int ringing; /* whether the step integrates its works as where rates ring (refine_integrals of implicit.c) */
     double factors[MSFP_STAGES][MSFP_DOF * MSFP_DOF];
     int pivots[MSFP_STAGES][MSFP_DOF];
@@ -216,13 +204,13 @@ void msfp_event_time_columns(msfp_run *run, msfp_group *group, int kind, int j, 
 
 /* ---- initial_columns.c, step_columns.c: states ---- */
 
+/* The numbers of the columns of a state from a field on. */
+#define MSFP_COLUMN_NUMBERS(state, field) MSFP_NUMBERS(msfp_state_columns, state, field)
+
 /* sum += weight * columns, of `count` numbers */
-MSFP_INLINE void msfp_add_columns(msfp_columns *restrict sum, const msfp_columns *restrict columns, double weight,
-                                  int count)
+MSFP_INLINE void msfp_add_columns(msfp_columns *sum, const msfp_columns *columns, double weight, int count)
 {
-    for (int i = 0; i < count; ++i)
-        for (int c = 0; c < MSFP_COLUMNS; ++c)
-            sum[i][c] += weight * columns[i][c];
+    msfp_add(sum[0], columns[0], weight, count * MSFP_COLUMNS);
 }
 /* sum += values * factor: columns of a product whose other factor has the columns `factor`. */
 MSFP_INLINE void msfp_add_scaled(msfp_columns *restrict sum, const double *restrict values, const msfp_columns factor,
@@ -301,37 +289,30 @@ void msfp_step_columns(msfp_run *run, msfp_group *group);
 /* Complete the columns of the evaluation that ended the step. */
 void msfp_complete_columns(msfp_run *run, msfp_group *group);
 
-/* ---- heat_columns.c: temperatures of the surfaces (heat.c) ---- */
+/* ---- heat_columns.c: temperatures of the surfaces, as the functions of heat.c without "columns" ---- */
 #if MSFP_HEAT
-/* Rates of the parts of the rise in all stages, and the parts at one of them: values, and columns. */
-typedef struct {
-    double rates[MSFP_STAGES][MSFP_NB][MSFP_HEAT], before[MSFP_NB][MSFP_HEAT];
-    msfp_columns drates[MSFP_STAGES][MSFP_NB][MSFP_HEAT], dbefore[MSFP_NB][MSFP_HEAT], heat[MSFP_NB][MSFP_HEAT],
-        flux[MSFP_NB];
-} msfp_heat_columns;
-
-/* A step: begin; rise and warming of stage i, into `dat`; its heat and rates, from the columns of the flux. */
-void msfp_heat_columns_begin(const msfp_run *run, const msfp_group *group, msfp_heat_columns *s);
-void msfp_heat_columns_prepare(const msfp_run *run, const msfp_group *group, const double *weights, int i,
-                               double h, msfp_heat_columns *s, msfp_point_columns *dat);
-void msfp_heat_columns_stage(const msfp_run *run, const msfp_group *group, int i, msfp_heat_columns *s);
-/* Rise of a state, into `dat`. */
-void msfp_heat_columns_point(const msfp_state_columns *ds, msfp_point_columns *dat);
+/* Into `dat`, after its columns of beta. from: values and columns of what the earlier stages give. */
+void msfp_heat_point_columns(const msfp_state *from, const msfp_state_columns *dfrom, double beta,
+                             msfp_point_columns *dat);
+/* flux: columns of the heat flux of the surfaces; s: the values of the state. */
+void msfp_heat_state_columns(const msfp_state *s, const msfp_state_columns *dfrom, const msfp_columns flux[MSFP_NB],
+                             double beta, const double *dbeta, msfp_state_columns *ds);
 #else
-#define msfp_heat_columns_point(ds, dat) ((void)0)
+#define msfp_heat_point_columns(from, dfrom, beta, dat) ((void)0)
 #endif
 
 /* ---- observation.c, work_columns.c: works of the energy balance, where they are asked for ---- */
 
-/* Columns of the powers at the evaluation in `w`, with all results of its contacts. */
+/* Columns of the powers at the evaluation in `w`, with all results of its contacts, into `ds`. */
 void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp, const msfp_point *at,
                             const msfp_point_columns *dat, const msfp_work *w, const msfp_work_columns *d,
-                            msfp_power_columns *power);
+                            msfp_state_columns *ds);
 /* Columns of the powers of the present state, at the point and evaluation of msfp_initial_columns. */
 void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, const msfp_seed *seed,
                         const double g[MSFP_NB][2]);
-/* Columns of the works up to stage i, which is solved, into group->next; after the last stage of the step. */
-void msfp_stage_works(msfp_run *run, msfp_group *group, int i);
+/* Columns of powers and works of stage i, which is solved, into stages[i]; from: what the earlier ones give. */
+void msfp_stage_works(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from,
+                      msfp_state_columns *stages);
 /* Columns of the works of a quasi-static step, whose evaluation is complete. */
 void msfp_quasistatic_works(msfp_run *run, msfp_group *group);
 

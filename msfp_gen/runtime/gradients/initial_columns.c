@@ -93,7 +93,7 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     memcpy(dat->q, now->q, sizeof dat->q);
     memcpy(dat->v, now->v, sizeof dat->v);
     memcpy(dat->f, now->f, sizeof dat->f);
-    msfp_heat_columns_point(now, dat);
+    msfp_heat_point_columns(&run->now, now, 0.0, dat);
     msfp_inputs_columns(run, group, run->now.t, now->t, dat);
     if (first) {
         msfp_condensed_columns(p, dp, &at, dat, &seed, w, slopes, MSFP_OF_RESIDUAL, &group->work);
@@ -113,10 +113,14 @@ int msfp_initial_columns(msfp_run *run, msfp_group *group, int first)
     }
     msfp_friction_columns(&group->work, now->df, NULL);
 #if MSFP_HEAT
+    static const msfp_columns fixed;
+    msfp_columns flux[NB];
     for (int j = 0; j < NB; ++j)
-        memcpy(now->flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof now->flux[j]);
+        memcpy(flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof flux[j]);
+    msfp_heat_state_columns(&run->now, now, (const msfp_columns *)flux, 0.0, fixed, now);
 #endif
-    memcpy(now->foot, group->work.foot, sizeof now->foot);
+    memcpy(now->foot, group->work.foot + MSFP_FOOT_Y * C, sizeof now->foot);
+    memcpy(now->dfoot, group->work.foot + MSFP_FOOT_Y1 * C, sizeof now->dfoot);
     if (run->gradients->energies)
         msfp_initial_works(run, group, &at, &seed, (const double(*)[2])g);
     return MSFP_OK;

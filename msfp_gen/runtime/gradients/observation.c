@@ -137,14 +137,14 @@ static void set_observed(const msfp_point *at, const msfp_point_columns *dat, ms
 
 MSFP_COLUMNWISE void msfp_columns_of_powers(const msfp_parameters *p, const msfp_parameter_columns *dp,
                                             const msfp_point *at, const msfp_point_columns *dat, const msfp_work *w,
-                                            const msfp_work_columns *d, msfp_power_columns *power)
+                                            const msfp_work_columns *d, msfp_state_columns *to)
 {
     msfp_blocks s;
     msfp_block_directions ds;
     set_observed(at, dat, &s, &ds);
     msfp_mechanical_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
     msfp_powers_directions(p, dp, w, (msfp_work_columns *)d, &s, &ds);
-    memcpy(power, ds.works, sizeof *power);
+    memcpy(to->power, ds.works, sizeof to->power + sizeof to->prescribed_power + sizeof to->load_power);
 }
 
 /* Quantities of surface j. */

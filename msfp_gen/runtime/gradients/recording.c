@@ -53,7 +53,7 @@ static void event_columns(msfp_run *run, msfp_group *group, int kind, int j, msf
         msfp_add_scaled(at.q[0], next->v[0], dt, 1.0, NB * NQ);
         msfp_add_scaled(at.v[0], next->a[0], dt, 1.0, NB * NQ);
         msfp_add_scaled(at.f[0], next->df[0], dt, 1.0, NB * 2);
-        msfp_add_scaled(at.foot, next->foot + 1, dt, 1.0, 2);
+        msfp_add_scaled(at.foot, next->dfoot, dt, 1.0, 2);
         if (!MSFP_MASSLESS)
             msfp_add_scaled(at.a[0], run->acceleration_slope[0], dt, 1.0, NB * NQ);
     }

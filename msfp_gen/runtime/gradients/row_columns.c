@@ -9,19 +9,19 @@
 #if MSFP_GRADIENTS
 /* Columns of the row of an observed state. */
 static void observed_columns(msfp_run *run, msfp_group *group, const msfp_observation *o, const msfp_slopes *slopes,
-                             double t, const msfp_state_columns *ds, msfp_row_columns d)
+                             const msfp_state *s, const msfp_state_columns *ds, msfp_row_columns d)
 {
     const msfp_parameters *p = &run->parameters;
     msfp_work_columns *dw = &run->gradients->recording.work;
     msfp_point_columns dat;
     memset(&dat, 0, sizeof dat);
-    msfp_inputs_columns(run, group, t, ds->t, &dat);
+    msfp_inputs_columns(run, group, s->t, ds->t, &dat);
     memcpy(dat.q, ds->q, sizeof dat.q);
     memcpy(dat.v, ds->v, sizeof dat.v);
     memcpy(dat.a, ds->a, sizeof dat.a);
     memcpy(dat.f, ds->f, sizeof dat.f);
     memcpy(dat.foot, ds->foot, sizeof dat.foot);
-    msfp_heat_columns_point(ds, &dat);
+    msfp_heat_point_columns(s, ds, 0.0, &dat);
     msfp_condensed_columns(p, &group->parameters, &o->at, &dat, &o->seed, &o->work, slopes, MSFP_OF_ROW, dw);
     msfp_record_columns(p, &group->parameters, &o->at, &dat, &o->work, dw, d);
     memcpy(d[MSFP_ROW_WORK], ds->work, sizeof ds->work);
@@ -36,19 +36,28 @@ void msfp_observe_columns(msfp_run *run, msfp_group *group, const msfp_state *s,
     msfp_to_point(run, s, &o->at);
     msfp_evaluate_state(p, &o->at, &o->seed, &o->work, o->g);
     msfp_contact_slopes(p, &o->seed, &o->work, (const double(*)[2])o->g, 1, slopes);
-    observed_columns(run, group, o, slopes, s->t, ds, d);
+    observed_columns(run, group, o, slopes, s, ds, d);
 }
 
 /* Columns of row `index` of those at the start of the step and at its nodes, at the state with the columns ds. */
-static void node_columns(msfp_run *run, msfp_group *group, int index, double t, const msfp_state_columns *ds,
-                         msfp_row_columns d)
+static void node_columns(msfp_run *run, msfp_group *group, int index, const msfp_state *s,
+                         const msfp_state_columns *ds, msfp_row_columns d)
 {
     msfp_recording *r = &run->gradients->recording;
     const msfp_observation *o = &r->node[index];
     if (!r->sloped[index])
         msfp_contact_slopes(&run->parameters, &o->seed, &o->work, (const double(*)[2])o->g, 1, &r->slopes[index]);
     r->sloped[index] = 1;
-    observed_columns(run, group, o, &r->slopes[index], t, ds, d);
+    observed_columns(run, group, o, &r->slopes[index], s, ds, d);
+}
+
+/* Columns of the accelerations at a share of the step. */
+static void accelerations_inside(const msfp_group *group, double share, msfp_state_columns *to)
+{
+    const double *a = group->now.a[0][0], *b = group->next.a[0][0];
+    double *out = to->a[0][0];
+    for (int i = 0; i < NB * NQ * C; ++i)
+        out[i] = (1.0 - share) * a[i] + share * b[i];
 }
 
 void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
@@ -61,21 +70,15 @@ void msfp_observe_node_columns(msfp_run *run, msfp_group *group)
     if (!r->known)
         msfp_row_inside(run, 1.0, &row); /* which gives the rows to msfp_gradients_node */
     if (!group->start_known)
-        node_columns(run, group, 0, run->now.t, &group->now, group->start_row);
+        node_columns(run, group, 0, &run->now, &group->now, group->start_row);
     memcpy(r->d[0], group->start_row, sizeof group->start_row);
     for (int i = 1; i < last; ++i) {
         const double share = run->node[i - 1].share;
         msfp_state_columns *node = &group->node[i - 1];
-        for (int c = 0; c < C; ++c) {
+        for (int c = 0; c < C; ++c)
             node->t[c] = group->now.t[c] + share * group->h[c];
-            node->foot[MSFP_FOOT_Y2][c] =
-                (1.0 - share) * group->now.foot[MSFP_FOOT_Y2][c] + share * group->next.foot[MSFP_FOOT_Y2][c];
-        }
-        for (int k = 0; k < NB; ++k)
-            for (int d = 0; d < NQ; ++d)
-                for (int c = 0; c < C; ++c)
-                    node->a[k][d][c] = (1.0 - share) * group->now.a[k][d][c] + share * group->next.a[k][d][c];
-        node_columns(run, group, i, run->now.t + share * (run->next.t - run->now.t), node, r->d[i]);
+        accelerations_inside(group, share, node);
+        node_columns(run, group, i, &run->node[i - 1].state, node, r->d[i]);
     }
     msfp_row_reached_columns(run, group);
     memcpy(r->d[last], group->end_row, sizeof group->end_row);
@@ -157,17 +160,6 @@ static void restore_bounds(msfp_run *run, msfp_group *group, const msfp_row *row
     }
 }
 
-/* Sum of weights times `count` numbers of each of at least three rows. */
-MSFP_INLINE void weigh(const double *weights, int rows, const double *const *numbers, int count, double *restrict sum)
-{
-    const double *a = numbers[0], *b = numbers[1], *c = numbers[2];
-    for (int i = 0; i < count; ++i)
-        sum[i] = weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i];
-    for (int r = 3; r < rows; ++r)
-        for (int i = 0; i < count; ++i)
-            sum[i] += weights[r] * numbers[r][i];
-}
-
 MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, double share, int moving,
                                               msfp_row_columns d)
 {
@@ -182,14 +174,14 @@ MSFP_COLUMNWISE void msfp_row_between_columns(msfp_run *run, msfp_group *group, 
         values[r] = (const double *)&rows->value[r];
         columns[r] = rows->d[r][0];
     }
-    weigh(w.of, w.count, values, MSFP_ROW_SIZE, (double *)&blended);
-    weigh(w.of, w.count, columns, MSFP_ROW_SIZE * C, d[0]);
+    msfp_weigh(w.of, w.count, values, MSFP_ROW_SIZE, (double *)&blended);
+    msfp_weigh(w.of, w.count, columns, MSFP_ROW_SIZE * C, d[0]);
     for (int c = 0; c < C; ++c)
         moved[c] = -(group->now.t[c] + share * group->h[c]) / h;
     if (moving && msfp_any_column(moved)) {
         double slopes[MSFP_NODES + 2], slope[MSFP_ROW_SIZE];
         weight_slopes(run, share, slopes);
-        weigh(slopes, w.count, values, MSFP_ROW_SIZE, slope);
+        msfp_weigh(slopes, w.count, values, MSFP_ROW_SIZE, slope);
         msfp_add_scaled(d, slope, moved, 1.0, MSFP_ROW_SIZE);
     }
     limit_friction(rows, w.count, &blended, d);
@@ -209,16 +201,6 @@ void msfp_row_reached_columns(msfp_run *run, msfp_group *group)
     group->end_known = 1;
 }
 
-/* The cubic through values and rates at the ends of the step, of a quasi-static step: columns at a share of it. */
-static void hermite(const msfp_columns *y0, const msfp_columns *d0, const msfp_columns *y1, const msfp_columns *d1,
-                    double h, double s, int count, msfp_columns *out)
-{
-    const double r = 1.0 - s, w0 = r * r * (1.0 + 2.0 * s), w1 = s * s * (3.0 - 2.0 * s), d = s * r * h;
-    for (int i = 0; i < count; ++i)
-        for (int c = 0; c < C; ++c)
-            out[i][c] = w0 * y0[i][c] + w1 * y1[i][c] + d * (r * d0[i][c] - s * d1[i][c]);
-}
-
 void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, msfp_row *row, msfp_row_columns d)
 {
     const msfp_state_columns *a = &group->now, *b = &group->next;
@@ -227,13 +209,11 @@ void msfp_row_of_cubic_columns(msfp_run *run, msfp_group *group, double share, m
     msfp_state s;
     msfp_interpolate(run, share, &s);
     *ds = *a;
-    hermite(a->q[0], a->v[0], b->q[0], b->v[0], h, share, NB * NQ, ds->q[0]);
-    hermite(a->v[0], a->a[0], b->v[0], b->a[0], h, share, NB * NQ, ds->v[0]);
-    hermite(a->f[0], a->df[0], b->f[0], b->df[0], h, share, NB * 2, ds->f[0]);
-    for (int k = 0; k < NB; ++k)
-        for (int i = 0; i < NQ; ++i)
-            for (int c = 0; c < C; ++c)
-                ds->a[k][i][c] = (1.0 - share) * a->a[k][i][c] + share * b->a[k][i][c];
+    msfp_hermite(MSFP_COLUMN_NUMBERS(a, q), MSFP_COLUMN_NUMBERS(a, v), MSFP_COLUMN_NUMBERS(b, q), MSFP_COLUMN_NUMBERS(b, v), h, share, MSFP_COORDINATES * C,
+                 MSFP_COLUMN_NUMBERS(ds, q));
+    msfp_hermite(MSFP_COLUMN_NUMBERS(a, v), MSFP_COLUMN_NUMBERS(a, a), MSFP_COLUMN_NUMBERS(b, v), MSFP_COLUMN_NUMBERS(b, a), h, share, MSFP_INTEGRATED_MOTION * C,
+                 MSFP_COLUMN_NUMBERS(ds, v));
+    accelerations_inside(group, share, ds);
     msfp_observe_state(run, &s, row);
     msfp_observe_columns(run, group, &s, ds, d);
 }

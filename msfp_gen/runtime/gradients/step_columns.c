@@ -50,63 +50,35 @@ MSFP_COLUMNWISE void msfp_friction_columns(const msfp_work_columns *d, msfp_colu
         }
 }
 
-/* Rates of all stages, in columns and as values. */
-typedef struct {
-    msfp_columns v[STAGES][NB][NQ], a[STAGES][NB][NQ], df[STAGES][NB][2], foot[STAGES][2];
-    double rates[STAGES][NB][2]; /* of Y, Z */
-#if MSFP_HEAT
-    msfp_heat_columns heat;
-#endif
-} stage_columns;
-
-/* Rates of the bodies [MSFP_NB][MSFP_NQ] at stage j. */
-static const double *rates_v(const msfp_run *run, int j)
+/* What the stages before stage i give, as `msfp_stage_begin` forms it, and the columns of the point that follow. */
+MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const msfp_state_columns *stages,
+                         const msfp_tableau *method, int i, double h, msfp_state_columns *from, msfp_point_columns *dat)
 {
-    return j ? &run->gradients->trail.stage[j].at.v[0][0] : &run->now.v[0][0];
-}
-
-static const double *rates_a(const msfp_run *run, int j)
-{
-    return j ? &run->gradients->trail.stage[j].at.a[0][0] : &run->now.a[0][0];
-}
-
-static const double *rates_foot(const msfp_run *run, int j)
-{
-    return (j ? run->gradients->trail.work[j].foot : run->now.foot) + MSFP_FOOT_Y1;
-}
-
-/* Columns of Q, V, fp and the foot of stage i, as `prepare` of implicit.c forms them. */
-MSFP_INLINE void prepare(const msfp_run *run, const msfp_group *group, const stage_columns *s,
-                         const msfp_tableau *method, int i, double h, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ],
-                         msfp_point_columns *dat)
-{
-    const msfp_state_columns *now = &group->now;
-    const msfp_stage *stage = &run->gradients->trail.stage[i];
-    memcpy(Q, now->q, sizeof now->q);
-    memcpy(V, now->v, sizeof now->v);
-    memcpy(dat->f, now->f, sizeof dat->f);
-    memcpy(dat->foot, now->foot, sizeof dat->foot);
+    const msfp_trail *trail = &run->gradients->trail;
+    const double beta = trail->stage[i].beta;
+    const int count = run->gradients->energies ? MSFP_INTEGRATED : MSFP_INTEGRATED_MOTION;
+    memcpy(from, &group->now, offsetof(msfp_state_columns, a));
     for (int j = 0; j < i; ++j) {
         const double weight = method->a[i][j];
-        msfp_add_columns(&Q[0][0], &s->v[j][0][0], h * weight, NB * NQ);
-        msfp_add_columns(&V[0][0], &s->a[j][0][0], h * weight, NB * NQ);
-        msfp_add_columns(&dat->f[0][0], &s->df[j][0][0], h * weight, 2 * NB);
-        msfp_add_columns(dat->foot, s->foot[j], h * weight, 2);
+        const msfp_state *state = &trail->state[j];
+        msfp_add(MSFP_COLUMN_NUMBERS(from, q), MSFP_COLUMN_NUMBERS(&stages[j], v), h * weight, MSFP_COORDINATES * C);
+        msfp_add(MSFP_COLUMN_NUMBERS(from, v), MSFP_COLUMN_NUMBERS(&stages[j], a), h * weight, count * C);
         if (msfp_any_column(group->h)) {
-            msfp_add_scaled(&Q[0][0], rates_v(run, j), group->h, weight, NB * NQ);
-            msfp_add_scaled(&V[0][0], rates_a(run, j), group->h, weight, NB * NQ);
-            msfp_add_scaled(&dat->f[0][0], &s->rates[j][0][0], group->h, weight, 2 * NB);
-            msfp_add_scaled(dat->foot, rates_foot(run, j), group->h, weight, 2);
+            msfp_add_scaled(from->q[0], MSFP_NUMBERS(msfp_state, state, v), group->h, weight, MSFP_COORDINATES);
+            msfp_add_scaled(from->v[0], MSFP_NUMBERS(msfp_state, state, a), group->h, weight, count);
         }
     }
+    memcpy(dat->f, from->f, sizeof dat->f);
+    memcpy(dat->foot, from->foot, sizeof dat->foot);
     for (int c = 0; c < C; ++c) {
         dat->beta[c] = dat->foot_beta[c] = method->gamma * group->h[c];
-        dat->foot[0][c] += stage->beta * dat->foot[1][c] + dat->beta[c] * stage->at.foot[1];
+        dat->foot[0][c] += beta * dat->foot[1][c] + dat->beta[c] * trail->stage[i].at.foot[1];
     }
+    msfp_heat_point_columns(&trail->stage[i].from, from, beta, dat);
 }
 
 /* Columns of q and a from those of v, by the stage formula q = Q + beta v, a = (v - V)/beta, at stage i. */
-MSFP_INLINE void stage_point(const msfp_run *run, int i, msfp_columns (*restrict Q)[NQ], msfp_columns (*restrict V)[NQ],
+MSFP_INLINE void stage_point(const msfp_run *run, int i, const msfp_state_columns *restrict from,
                              msfp_point_columns *restrict dat)
 {
     const msfp_stage *stage = &run->gradients->trail.stage[i];
@@ -114,17 +86,17 @@ MSFP_INLINE void stage_point(const msfp_run *run, int i, msfp_columns (*restrict
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < NQ; ++d)
             for (int c = 0; c < C; ++c) {
-                dat->q[k][d][c] = Q[k][d][c] + beta * dat->v[k][d][c];
-                dat->a[k][d][c] = rate * (dat->v[k][d][c] - V[k][d][c]);
+                dat->q[k][d][c] = from->q[k][d][c] + beta * dat->v[k][d][c];
+                dat->a[k][d][c] = rate * (dat->v[k][d][c] - from->v[k][d][c]);
             }
     if (!msfp_any_column(dat->beta))
         return;
-    msfp_add_scaled(dat->q[0], rates_v(run, i), dat->beta, 1.0, NB * NQ);
-    msfp_add_scaled(dat->a[0], rates_a(run, i), dat->beta, -rate, NB * NQ);
+    msfp_add_scaled(dat->q[0], stage->at.v[0], dat->beta, 1.0, NB * NQ);
+    msfp_add_scaled(dat->a[0], stage->at.a[0], dat->beta, -rate, NB * NQ);
 }
 
 /* Solve stage i for the columns of its rates: group->point. group->work has the columns at constant rates. */
-MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_columns Q[NB][NQ], msfp_columns V[NB][NQ])
+MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from)
 {
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
@@ -134,14 +106,14 @@ MSFP_INLINE void solve_stage(msfp_run *run, msfp_group *group, int i, msfp_colum
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             memset(dat->v[k][unknown[d]], 0, sizeof(msfp_columns));
-    stage_point(run, i, Q, V, dat);
+    stage_point(run, i, from, dat);
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, dat, &stage->seed, &trail->work[i],
                            &trail->slopes[i], MSFP_OF_RESIDUAL, &group->work);
     msfp_solve_columns(trail->factors[i], trail->pivots[i], x);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < ND; ++d)
             msfp_add_columns(&dat->v[k][unknown[d]], &x[k * ND + d], -1.0, 1);
-    stage_point(run, i, Q, V, dat);
+    stage_point(run, i, from, dat);
     group->complete = 0;
 }
 
@@ -169,101 +141,72 @@ MSFP_INLINE void add_rates(const double *row, const msfp_columns *x, double *col
         columns[c] -= sum[c];
 }
 
-/* Columns of what the next stages need of a solved one, by the derivatives with respect to its rates that its tangent
- * contains: of the rates of Y, Z, of Y, Z and of the foot. */
-MSFP_INLINE void stage_results(msfp_run *run, msfp_group *group, int i, const double rates[NB][2],
-                               msfp_columns df[NB][2], msfp_columns f[NB][2])
+/* Columns of a solved stage and of its rates, by the derivatives with respect to its unknowns that its tangent contains. */
+MSFP_INLINE void stage_state(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from,
+                             msfp_state_columns *to)
 {
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
     const msfp_work *w = &trail->work[i];
     const msfp_point_columns *dat = &group->point;
     const msfp_columns *x = (const msfp_columns *)group->work.residual;
-    msfp_friction_columns(&group->work, df, NULL);
-    for (int j = 0; j < NB; ++j)
-        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d)
-            add_rates(w->drates[j][d], x, df[j][d]);
-    memcpy(f, dat->f, sizeof dat->f);
-    msfp_add_columns(f[0], df[0], stage->beta, 2 * NB);
-    if (msfp_any_column(dat->beta))
-        msfp_add_scaled(f[0], rates[0], dat->beta, 1.0, 2 * NB);
-    const int sprung = msfp_top_is_sprung(&run->parameters);
-    const int of_plate[3] = { MSFP_BODY_CZ, MSFP_BODY_VZ, MSFP_BODY_AZ };
-    for (int i = 0; i < (sprung ? MSFP_BODY_SIZE : 3); ++i) {
-        const int field = sprung ? i : of_plate[i];
-        add_rates(w->dbody[NB] + field * DOF, x, group->work.body[NB] + field * C);
-    }
-    msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
-}
-
-/* The state at stage i, which is solved; its works are those of group->next. */
-MSFP_INLINE void state_of_stage(const msfp_group *group, const stage_columns *s, int i, msfp_columns f[NB][2],
-                                msfp_state_columns *to)
-{
-    const msfp_point_columns *dat = &group->point;
     memcpy(to->q, dat->q, sizeof to->q);
     memcpy(to->v, dat->v, sizeof to->v);
     memcpy(to->a, dat->a, sizeof to->a);
-    memcpy(to->f, f, sizeof to->f);
-    memcpy(to->df, s->df[i], sizeof to->df);
+    if (MSFP_SHEAR_SIZE < 2)
+        memset(to->df, 0, sizeof to->df);
+    msfp_friction_columns(&group->work, to->df, NULL);
+    for (int j = 0; j < NB; ++j)
+        for (int d = 0; d < MSFP_SHEAR_SIZE; ++d)
+            add_rates(w->drates[j][d], x, to->df[j][d]);
+    memcpy(to->f, dat->f, sizeof to->f);
+    msfp_add_columns(to->f[0], to->df[0], stage->beta, 2 * NB);
+    if (msfp_any_column(dat->beta))
+        msfp_add_scaled(to->f[0], trail->state[i].df[0], dat->beta, 1.0, 2 * NB);
+    const int sprung = msfp_top_is_sprung(&run->parameters);
+    const int of_plate[3] = { MSFP_BODY_CZ, MSFP_BODY_VZ, MSFP_BODY_AZ };
+    for (int k = 0; k < (sprung ? MSFP_BODY_SIZE : 3); ++k) {
+        const int field = sprung ? k : of_plate[k];
+        add_rates(w->dbody[NB] + field * DOF, x, group->work.body[NB] + field * C);
+    }
+    msfp_foot_columns(&run->parameters, &group->parameters, &stage->at, dat, w, &group->work);
+    memcpy(to->foot, group->work.foot + MSFP_FOOT_Y * C, sizeof to->foot);
+    memcpy(to->dfoot, group->work.foot + MSFP_FOOT_Y1 * C, sizeof to->dfoot);
 #if MSFP_HEAT
-    memcpy(to->heat, s->heat.heat, sizeof to->heat);
-    memcpy(to->flux, s->heat.flux, sizeof to->flux);
+    msfp_columns flux[NB];
+    for (int j = 0; j < NB; ++j) {
+        memcpy(flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof flux[j]);
+        add_rates(w->drates[j][MSFP_SHEAR_SIZE], x, flux[j]);
+    }
+    msfp_heat_state_columns(&trail->state[i], from, (const msfp_columns *)flux, stage->beta, dat->beta, to);
 #endif
-    memcpy(to->foot, group->work.foot, sizeof to->foot);
-    if (to != &group->next)
-        memcpy(to->work, group->next.work, sizeof to->work);
+    memcpy(to->work, from->work, sizeof to->work);
+    memset(to->power, 0, sizeof to->power);
 }
 
 static MSFP_COLUMNWISE void implicit_step(msfp_run *run, msfp_group *group)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
-    const msfp_trail *trail = &run->gradients->trail;
-    const double h = trail->stage[1].beta / method->gamma;
-    const msfp_state_columns *now = &group->now;
-    msfp_state_columns *next = &group->next;
+    const double h = run->gradients->trail.stage[1].beta / method->gamma;
     msfp_point_columns *dat = &group->point;
-    msfp_columns Q[NB][NQ], V[NB][NQ], f[NB][2], dt;
-    stage_columns s;
+    msfp_state_columns stages[STAGES], from;
+    msfp_columns dt;
     int node = 0;
-    if (MSFP_SHEAR_SIZE < 2)
-        memset(s.df, 0, sizeof s.df);
-#if MSFP_HEAT
-    msfp_heat_columns_begin(run, group, &s.heat);
-#endif
-    memcpy(s.v[0], now->v, sizeof s.v[0]);
-    memcpy(s.a[0], now->a, sizeof s.a[0]);
-    memcpy(s.df[0], now->df, sizeof s.df[0]);
-    memcpy(s.foot[0], now->foot + MSFP_FOOT_Y1, sizeof s.foot[0]);
-    memcpy(s.rates[0], run->now.df, sizeof s.rates[0]);
+    stages[0] = group->now;
     memset(dat, 0, sizeof *dat);
     for (int i = 1; i < method->stages; ++i) {
-        msfp_friction_rates(&trail->work[i], s.rates[i]);
-        prepare(run, group, &s, method, i, h, Q, V, dat);
+        prepare(run, group, stages, method, i, h, &from, dat);
         for (int c = 0; c < C; ++c)
-            dt[c] = now->t[c] + method->c[i] * group->h[c];
+            dt[c] = group->now.t[c] + method->c[i] * group->h[c];
         msfp_inputs_columns(run, group, run->now.t + method->c[i] * h, dt, dat);
-#if MSFP_HEAT
-        msfp_heat_columns_prepare(run, group, method->a[i], i, h, &s.heat, dat);
-#endif
-        solve_stage(run, group, i, Q, V);
-        stage_results(run, group, i, (const double(*)[2])s.rates[i], s.df[i], f);
-#if MSFP_HEAT
-        for (int j = 0; j < NB; ++j) {
-            memcpy(s.heat.flux[j], group->work.contact[j] + MSFP_CONTACT_FLUX * C, sizeof s.heat.flux[j]);
-            add_rates(trail->work[i].drates[j][MSFP_SHEAR_SIZE], group->work.residual[0], s.heat.flux[j]);
-        }
-        msfp_heat_columns_stage(run, group, i, &s.heat);
-#endif
-        memcpy(s.v[i], dat->v, sizeof s.v[i]);
-        memcpy(s.a[i], dat->a, sizeof s.a[i]);
-        memcpy(s.foot[i], group->work.foot + MSFP_FOOT_Y1 * C, sizeof s.foot[i]);
+        solve_stage(run, group, i, &from);
+        stage_state(run, group, i, &from, &stages[i]);
         if (run->gradients->energies)
-            msfp_stage_works(run, group, i);
+            msfp_stage_works(run, group, i, &from, stages);
         if (node < run->node_count && i == method->nodes[node])
-            state_of_stage(group, &s, i, f, &group->node[node++]);
+            group->node[node++] = stages[i];
     }
-    state_of_stage(group, &s, method->stages - 1, f, next);
+    group->next = stages[method->stages - 1];
 }
 
 #if MSFP_CLOSED_FORM
@@ -275,21 +218,21 @@ static MSFP_COLUMNWISE void quasistatic_step(msfp_run *run, msfp_group *group)
     const msfp_state_columns *now = &group->now;
     msfp_state_columns *next = &group->next;
     msfp_point_columns *dat = &group->point;
-    msfp_columns Q[NB][NQ], V[NB][NQ] = { 0 };
+    msfp_state_columns from = *now;
     const double h = run->next.t - run->now.t, last = run->step_history.h, r = last > 0.0 ? h / last : 0.0;
     memset(dat, 0, sizeof *dat);
-    memcpy(Q, now->q, sizeof Q);
+    memset(from.v, 0, sizeof from.v);
     for (int k = 0; k < NB; ++k)
         for (int c = 0; c < C; ++c) {
             const double q = now->q[k][ANGLE][c];
-            Q[k][ANGLE][c] = q + r * r / (1.0 + 2.0 * r) * (q - group->before[k][c]);
+            from.q[k][ANGLE][c] = q + r * r / (1.0 + 2.0 * r) * (q - group->before[k][c]);
             dat->slip[k][MSFP_SLIP_Y * C + c] = now->f[k][0][c];
-            dat->slip[k][MSFP_SLIP_TURN * C + c] = Q[k][ANGLE][c] - q;
+            dat->slip[k][MSFP_SLIP_TURN * C + c] = from.q[k][ANGLE][c] - q;
             group->before[k][c] = q;
         }
     memcpy(dat->foot, now->foot, sizeof dat->foot);
     msfp_inputs_columns(run, group, run->next.t, now->t, dat);
-    solve_stage(run, group, 1, Q, V);
+    solve_stage(run, group, 1, &from);
     msfp_complete_columns(run, group);
     *next = *now;
     memcpy(next->q, dat->q, sizeof next->q);

@@ -21,43 +21,39 @@ MSFP_INLINE void add_product(const msfp_group *group, double h, double weight, d
 
 /* As refine_integrals of implicit.c. */
 static void refine(const msfp_run *run, const msfp_group *group, const msfp_tableau *method, double h,
-                   msfp_columns work[WORKS])
+                   const msfp_state_columns *stages, msfp_columns work[WORKS])
 {
     const msfp_trail *trail = &run->gradients->trail;
     for (int j = 0; j < method->stages && method->order <= 3.0; ++j) {
+        const msfp_state *state = &trail->state[j];
         if (trail->ringing)
-            add_product(group, h, -method->e[j], trail->prescribed[j], group->power[j].prescribed,
+            add_product(group, h, -method->e[j], state->prescribed_power, stages[j].prescribed_power,
                         work[MSFP_WORK_INPUT]);
         for (int e = 0; e < WORKS && !trail->ringing; ++e)
             if (e != MSFP_WORK_FRICTION_STORED)
-                add_product(group, h, -method->e[j], trail->power[j][e], group->power[j].of[e], work[e]);
+                add_product(group, h, -method->e[j], state->power[e], stages[j].power[e], work[e]);
     }
 }
 
-MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i)
+MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i, const msfp_state_columns *from,
+                                      msfp_state_columns *stages)
 {
     const msfp_tableau *method = msfp_tableau_of(run->options.method);
     const msfp_trail *trail = &run->gradients->trail;
     const msfp_stage *stage = &trail->stage[i];
     const double h = stage->beta / method->gamma;
-    msfp_columns *work = group->next.work;
-    if (i == 1)
-        group->power[0] = group->now.power;
+    msfp_state_columns *to = &stages[i];
     msfp_condensed_columns(&run->parameters, &group->parameters, &stage->at, &group->point, &stage->seed,
                            &trail->work[i], &trail->slopes[i], MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
     msfp_columns_of_powers(&run->parameters, &group->parameters, &stage->at, &group->point, &trail->work[i],
-                           &group->work, &group->power[i]);
-    memcpy(work, group->now.work, sizeof group->now.work);
-    for (int j = 0; j <= i; ++j) {
-        const double weight = j == i ? method->gamma : method->a[i][j];
-        const double *power = trail->power[j];
-        for (int e = 0; e < WORKS; ++e)
-            add_product(group, h, weight, power[e], group->power[j].of[e], work[e]);
+                           &group->work, to);
+    for (int e = 0; e < WORKS; ++e) {
+        memcpy(to->work[e], from->work[e], sizeof to->work[e]);
+        add_product(group, h, method->gamma, trail->state[i].power[e], to->power[e], to->work[e]);
     }
     if (i < method->stages - 1)
         return;
-    refine(run, group, method, h, work);
-    group->next.power = group->power[i];
+    refine(run, group, method, h, stages, to->work);
     group->complete = 1;
 }
 
@@ -67,10 +63,10 @@ MSFP_COLUMNWISE void msfp_stage_works(msfp_run *run, msfp_group *group, int i)
 enum { ANGLE = 1 };
 
 /* What the work of the next step uses of the end of this one, at the point and evaluation of the group. */
-static void ends(const msfp_group *group, const msfp_power_columns *before, msfp_history_columns *to)
+static void ends(const msfp_group *group, const msfp_state_columns *before, msfp_history_columns *to)
 {
     const msfp_point_columns *dat = &group->point;
-    to->power = *before;
+    memcpy(to->power, before->power, sizeof to->power);
     memcpy(to->load, dat->load, sizeof to->load);
     memcpy(to->tilt, dat->base[0][3 + ANGLE], sizeof to->tilt);
     msfp_get_polar(group->work.body[NB] + MSFP_BODY_CX * C, to->top);
@@ -128,17 +124,17 @@ void msfp_quasistatic_works(msfp_run *run, msfp_group *group)
 {
     const msfp_trail *trail = &run->gradients->trail;
     const double h = run->next.t - run->now.t, last = run->step_history.h, curved = h * h * h / 6.0;
-    const msfp_power_columns *now = &group->now.power, *before = &group->history.power;
-    msfp_power_columns *next = &group->next.power;
-    msfp_columns *work = group->next.work;
+    const msfp_state_columns *now = &group->now;
+    msfp_state_columns *next = &group->next;
+    msfp_columns *work = next->work;
     msfp_history_columns reached;
     msfp_columns_of_powers(&run->parameters, &group->parameters, &trail->stage[1].at, &group->point, &trail->work[1],
                            &group->work, next);
-    msfp_add_columns(&next->of[MSFP_WORK_INPUT], (const msfp_columns *)&next->load, -1.0, 1);
+    msfp_add_columns(&next->power[MSFP_WORK_INPUT], (const msfp_columns *)&next->load_power, -1.0, 1);
     for (int e = 0; e < WORKS; ++e)
         for (int c = 0; c < C && e != MSFP_WORK_FRICTION_DISSIPATED && e != MSFP_WORK_FRICTION_STORED; ++c) {
-            const double a = now->of[e][c], b = next->of[e][c];
-            const double bend = last > 0.0 ? ((b - a) / h - (a - before->of[e][c]) / last) / (h + last) : 0.0;
+            const double a = now->power[e][c], b = next->power[e][c], before = group->history.power[e][c];
+            const double bend = last > 0.0 ? ((b - a) / h - (a - before) / last) / (h + last) : 0.0;
             work[e][c] += 0.5 * h * (a + b) - bend * curved;
         }
     ends(group, now, &reached);
@@ -153,16 +149,16 @@ void msfp_initial_works(msfp_run *run, msfp_group *group, const msfp_point *at, 
 {
     msfp_trail *trail = &run->gradients->trail;
     const msfp_work *w = &trail->work[0];
-    msfp_power_columns *power = &group->now.power;
+    msfp_state_columns *now = &group->now;
     msfp_contact_slopes(&run->parameters, seed, w, g, 1, &trail->slopes[0]);
     msfp_condensed_columns(&run->parameters, &group->parameters, at, &group->point, seed, w, &trail->slopes[0],
                            MSFP_OF_RESIDUAL | MSFP_OF_ROW, &group->work);
-    msfp_columns_of_powers(&run->parameters, &group->parameters, at, &group->point, w, &group->work, power);
+    msfp_columns_of_powers(&run->parameters, &group->parameters, at, &group->point, w, &group->work, now);
 #if MSFP_CLOSED_FORM
     if (!msfp_is_quasistatic(run))
         return;
-    msfp_add_columns(&power->of[MSFP_WORK_INPUT], (const msfp_columns *)&power->load, -1.0, 1);
-    ends(group, power, &group->history);
+    msfp_add_columns(&now->power[MSFP_WORK_INPUT], (const msfp_columns *)&now->load_power, -1.0, 1);
+    ends(group, now, &group->history);
 #endif
 }
 #endif

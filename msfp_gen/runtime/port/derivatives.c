@@ -23,27 +23,22 @@ static const int unknown[ND] = MSFP_FREE;
 
 /* ---- a trial ---- */
 
-/* Of a state: q, v, Y and Z, height and velocity of the foot, parts of the rise in temperature; or of their rates. */
+/* Of a state, without works and powers. */
 typedef struct {
-    columns q[NB][NQ], v[NB][NQ], f[NB][2], foot[2];
-#if MSFP_HEAT
-    columns heat[NB][MSFP_HEAT];
-#endif
+    MSFP_STATE_FIELDS(columns)
 } state_columns;
 
 typedef struct {
     channels to[MSFP_ENDS]; /* at the end of the trial */
-    state_columns now, rates[MSFP_STAGES];
+    state_columns stage[MSFP_STAGES]; /* 0: the start of the step */
     msfp_by_ends d;
 } moved;
 
-/* to += factor * from */
+/* The state to += factor times the rates of another one. */
 static void add(state_columns *to, const state_columns *from, double factor)
 {
-    double *sum = &to->q[0][0][0];
-    const double *more = &from->q[0][0][0];
-    for (size_t i = 0; i < sizeof *to / sizeof *sum; ++i)
-        sum[i] += factor * more[i];
+    msfp_add(MSFP_NUMBERS(state_columns, to, q), MSFP_NUMBERS(state_columns, from, v), factor, MSFP_COORDINATES * W);
+    msfp_add(MSFP_NUMBERS(state_columns, to, v), MSFP_NUMBERS(state_columns, from, a), factor, MSFP_INTEGRATED_MOTION * W);
 }
 
 /* Derivatives of the channels of an end along a direction, at its motion [order][6]; rates: not of second derivatives. */
@@ -107,7 +102,7 @@ static void differentiate(const msfp_parameters *p, const msfp_work *w, int bala
 }
 
 /* Derivatives of coordinates and accelerations of a stage from those of the rates and of what is known before it. */
-static void point(const state_columns *known, double beta, state_columns *rates, msfp_by_ends *d)
+static void point(const state_columns *known, double beta, state_columns *stage, msfp_by_ends *d)
 {
     for (int k = 0; k < NB; ++k)
         for (int i = 0; i < ND; ++i) {
@@ -116,9 +111,9 @@ static void point(const state_columns *known, double beta, state_columns *rates,
             for (int order = 0; order < MSFP_ORDERS; ++order)
                 x[order] = (columns *)(d->x[k + 1] + msfp_unknown_field(order, i) * W);
             for (int c = 0; c < W; ++c) {
-                (*x[0])[c] = known->q[k][at][c] + beta * rates->q[k][at][c];
-                (*x[1])[c] = rates->q[k][at][c];
-                (*x[2])[c] = rates->v[k][at][c] = (rates->q[k][at][c] - known->v[k][at][c]) / beta;
+                (*x[0])[c] = stage->q[k][at][c] = known->q[k][at][c] + beta * stage->v[k][at][c];
+                (*x[1])[c] = stage->v[k][at][c];
+                (*x[2])[c] = stage->a[k][at][c] = (stage->v[k][at][c] - known->v[k][at][c]) / beta;
             }
         }
 }
@@ -144,24 +139,29 @@ static void known_of_stage(const state_columns *known, double beta, msfp_by_ends
     memcpy(d->foot_stage + MSFP_FOOT_STAGE_Y1 * W, known->foot[1], sizeof(columns));
 }
 
-/* Rates of Y and Z, of the foot and of the temperature, from the derivatives of the solved stage. */
-static void rates_of_stage(const state_columns *known, double beta, const msfp_by_ends *d, state_columns *rates)
+/* Y and Z, foot and temperatures of the solved stage, with their rates. */
+static void rest_of_stage(const state_columns *known, double beta, const msfp_by_ends *d, state_columns *stage)
 {
-    (void)known, (void)beta;
+    memcpy(stage->f, known->f, sizeof stage->f);
+    memcpy(stage->foot, known->foot, sizeof stage->foot);
     for (int j = 0; j < NB; ++j) {
-        memcpy(rates->f[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
+        memcpy(stage->df[j], d->contact[j] + MSFP_CONTACT_DY * W, MSFP_SHEAR_SIZE * sizeof(columns));
 #if MSFP_HEAT
         const double *flux = d->contact[j] + MSFP_CONTACT_FLUX * W;
-        for (int i = 0; i < MSFP_HEAT * W; ++i)
-            rates->heat[j][i / W][i % W] = (weight[i / W] * flux[i % W] - decay[i / W] * known->heat[j][i / W][i % W])
-                                           / (1.0 + beta * decay[i / W]);
+        for (int i = 0; i < MSFP_HEAT * W; ++i) {
+            stage->dheat[j][i / W][i % W] = (weight[i / W] * flux[i % W] - decay[i / W] * known->heat[j][i / W][i % W])
+                                            / (1.0 + beta * decay[i / W]);
+            stage->heat[j][i / W][i % W] = known->heat[j][i / W][i % W] + beta * stage->dheat[j][i / W][i % W];
+        }
 #endif
     }
-    memcpy(rates->foot, d->foot + MSFP_FOOT_Y1 * W, sizeof rates->foot);
+    memcpy(stage->dfoot, d->foot + MSFP_FOOT_Y1 * W, sizeof stage->dfoot);
+    msfp_add(stage->f[0][0], stage->df[0][0], beta, 2 * NB * W);
+    msfp_add(stage->foot[0], stage->dfoot[0], beta, 2 * W);
 }
 
 /* Derivatives of the rates of the stage: -(dr/dv)^-1 dr, with r the balances over N as Newton's method divides them. */
-static void solve(const msfp_run *run, const double *residual, const msfp_by_ends *d, state_columns *rates)
+static void solve(const msfp_run *run, const double *residual, const msfp_by_ends *d, state_columns *stage)
 {
     for (int c = 0; c < W; ++c) {
         double x[DOF];
@@ -178,7 +178,7 @@ static void solve(const msfp_run *run, const double *residual, const msfp_by_end
         msfp_lu_solve(run->factors, DOF, run->pivots, x);
         for (int k = 0; k < NB; ++k)
             for (int i = 0; i < ND; ++i)
-                rates->q[k][unknown[i]][c] = -x[k * ND + i];
+                stage->v[k][unknown[i]][c] = -x[k * ND + i];
     }
     (void)residual;
 }
@@ -190,10 +190,10 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
 {
     enum { COUNT = sizeof(m->to[0][0]) / sizeof(double) };
     const double beta = stages->now.beta;
-    state_columns known = m->now, *rates = &m->rates[i];
+    state_columns known = m->stage[0], *stage = &m->stage[i];
     channels here[MSFP_ENDS];
     for (int j = 0; j < i; ++j)
-        add(&known, &m->rates[j], stages->h * stages->method->a[i][j]);
+        add(&known, &m->stage[j], stages->h * stages->method->a[i][j]);
     for (int e = 0; e < MSFP_ENDS; ++e)
         for (int order = 0; order < MSFP_ORDERS; ++order)
             for (int c = 0; c < COUNT; ++c) {
@@ -203,18 +203,15 @@ static void differentiate_stage(const msfp_port *port, const msfp_run *run, cons
     move_base(&run->parameters, &run->work, here[0], s, &m->d);
     move_top(port, &run->work, here[1], s, &m->d);
     known_of_stage(&known, beta, &m->d);
-    memset(rates, 0, sizeof *rates);
-    point(&known, beta, rates, &m->d);
+    memset(stage, 0, sizeof *stage);
+    point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, 1, s, &m->d);
-    solve(run, residual, &m->d, rates);
-    point(&known, beta, rates, &m->d);
+    solve(run, residual, &m->d, stage);
+    point(&known, beta, stage, &m->d);
     differentiate(&run->parameters, &run->work, balances, s, &m->d);
-    rates_of_stage(&known, beta, &m->d, rates);
-    if (i < stages->method->stages - 1)
-        return;
-    m->now = known; /* the last stage is at the end of the step */
-    add(&m->now, rates, beta);
-    m->rates[0] = *rates;
+    rest_of_stage(&known, beta, &m->d, stage);
+    if (i == stages->method->stages - 1) /* at the end of the step */
+        m->stage[0] = *stage;
 }
 
 /* The blocks of the evaluation of a stage that msfp_work has not. */
@@ -277,11 +274,12 @@ static int repeat(msfp_port *port, msfp_run *run, moved *m)
 static void give_row(const moved *m, double *rows)
 {
     const msfp_by_ends *d = &m->d;
+    const state_columns *end = &m->stage[0];
     memset(rows, 0, MSFP_ROW_SIZE * sizeof(columns));
-    memcpy(rows + MSFP_ROW_Q * W, m->now.q, sizeof m->now.q);
-    memcpy(rows + MSFP_ROW_V * W, m->now.v, sizeof m->now.v);
-    memcpy(rows + MSFP_ROW_A * W, m->rates[0].v, sizeof m->rates[0].v);
-    memcpy(rows + MSFP_ROW_F * W, m->now.f, sizeof m->now.f);
+    memcpy(rows + MSFP_ROW_Q * W, end->q, sizeof end->q);
+    memcpy(rows + MSFP_ROW_V * W, end->v, sizeof end->v);
+    memcpy(rows + MSFP_ROW_A * W, end->a, sizeof end->a);
+    memcpy(rows + MSFP_ROW_F * W, end->f, sizeof end->f);
     for (int j = 0; j < NB; ++j) {
         memcpy(rows + (MSFP_ROW_NORMAL + j) * W, d->contact[j] + MSFP_CONTACT_N * W, sizeof(columns));
         memcpy(rows + (MSFP_ROW_SLIDING + j) * W, d->gap[j] + MSFP_GAP_S * W, sizeof(columns));

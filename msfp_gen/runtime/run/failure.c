@@ -31,11 +31,11 @@ static int unloaded(msfp_run *run, const msfp_work *w)
 /* The present state extrapolated by `moment` [s]. */
 static void extrapolate(msfp_run *run, double moment, msfp_point *at)
 {
-    const double *foot = run->now.foot;
+    const double *rates = run->now.dfoot;
     msfp_to_point(run, &run->now, at);
     for (int order = 0; order < 2; ++order) { /* relative to the base, which is not extrapolated */
-        const double rate = foot[order + 1] - at->base[order + 1][2];
-        at->foot[order] += moment * (rate + (order ? 0.0 : 0.5 * moment * (foot[2] - at->base[2][2])));
+        const double rate = rates[order] - at->base[order + 1][2];
+        at->foot[order] += moment * (rate + (order ? 0.0 : 0.5 * moment * (rates[1] - at->base[2][2])));
     }
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < MSFP_NQ; ++d) {

@@ -54,12 +54,10 @@ int msfp_write_row(msfp_run *run, const msfp_state *s)
  * interpolated as such; computed from interpolated angles they would carry the error of a stiff spring. */
 static void blend(const msfp_row *rows, const msfp_weights *w, msfp_row *out)
 {
-    double *values = (double *)out;
-    for (size_t i = 0; i < MSFP_ROW_SIZE; ++i) {
-        values[i] = 0.0;
-        for (int r = 0; r < w->count; ++r)
-            values[i] += w->of[r] * ((const double *)&rows[r])[i];
-    }
+    const double *numbers[MSFP_NODES + 2] = { NULL };
+    for (int r = 0; r < w->count; ++r)
+        numbers[r] = (const double *)&rows[r];
+    msfp_weigh(w->of, w->count, numbers, MSFP_ROW_SIZE, (double *)out);
 }
 
 /* |(Y, Z)| no larger than in the rows that a row is interpolated from: at a reversal a polynomial may exceed them. */

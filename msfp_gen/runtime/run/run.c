@@ -33,19 +33,14 @@ static int solve_initial_state(msfp_run *run)
     const int status = msfp_condensed(&run->parameters, &at, &seed, &run->work, g, residual, NULL);
     if (status)
         return status;
-    memcpy(run->now.a, at.a, sizeof at.a);
-    memcpy(run->now.foot, run->work.foot, sizeof run->now.foot);
-    msfp_friction_rates(&run->work, run->now.df);
-    msfp_heat_initial_state(run);
-    run->now.mechanical = msfp_mechanical_energy(&run->parameters, &at, &run->work);
-    const msfp_input_parts parts =
-        msfp_powers(&run->parameters, &at, &run->work, &run->now.mechanical, run->now.power);
-    run->now.prescribed_power = parts.prescribed;
+    msfp_state_of(run, &at, at.f, &run->now);
+    msfp_heat_state(&run->work, &run->now, 0.0, &run->now);
+    msfp_powers_of(run, &at, &run->now);
     msfp_energy_balance_begin(run, &at);
     memset(run->acceleration_slope, 0, sizeof run->acceleration_slope);
     run->have_unknowns = 0;
     run->restart = 1;
-    msfp_quasistatic_begin(run, &at, parts.load);
+    msfp_quasistatic_begin(run, &at, run->now.load_power);
     return msfp_check_state(run, &run->work, &run->now);
 }
 

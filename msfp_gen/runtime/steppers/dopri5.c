@@ -21,13 +21,9 @@ static const double e[STAGES] = {
     71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40
 };
 
-typedef struct {
-    double v[NB][NQ], a[NB][NQ], f[NB][2], foot[2];
-} slope;
-
 /* State derivatives at a point: Newton's method on the momentum balances, starting from the solution of the last
  * stage. */
-static int slope_at(msfp_run *run, msfp_point *at, slope *s)
+static int rates_at(msfp_run *run, msfp_point *at, msfp_state *s)
 {
     msfp_solution solution;
     int status = MSFP_E_NEWTON;
@@ -48,32 +44,21 @@ static int slope_at(msfp_run *run, msfp_point *at, slope *s)
             return MSFP_E_IRREGULAR;
         }
     }
-    memcpy(s->v, at->v, sizeof s->v);
-    memcpy(s->a, at->a, sizeof s->a);
-    memcpy(s->foot, run->work.foot + MSFP_FOOT_Y1, sizeof s->foot);
-    msfp_friction_rates(&run->work, s->f);
+    msfp_state_of(run, at, at->f, s);
+    memset(s->power, 0, sizeof s->power); /* works are integrated by other weights */
     return MSFP_OK;
 }
 
-/* The point of a stage from the weighted rates of the earlier stages. */
-static void combine(const msfp_state *now, const slope *k, const double *weights, int count, double h, msfp_point *at)
+/* The point of stage i, from the weighted rates of the earlier stages. */
+static void stage_point(msfp_run *run, const msfp_state *stages, int i, double h, msfp_state *from, msfp_point *at)
 {
-    memcpy(at->q, now->q, sizeof at->q);
-    memcpy(at->v, now->v, sizeof at->v);
-    memcpy(at->f, now->f, sizeof at->f);
-    memcpy(at->foot, now->foot, sizeof at->foot);
-    for (int i = 0; i < count; ++i)
-        for (int d = 0; d < 2; ++d)
-            at->foot[d] += h * weights[i] * k[i].foot[d];
-    for (int i = 0; i < count; ++i)
-        for (int b = 0; b < NB; ++b) {
-            for (int d = 0; d < NQ; ++d) {
-                at->q[b][d] += h * weights[i] * k[i].v[b][d];
-                at->v[b][d] += h * weights[i] * k[i].a[b][d];
-            }
-            for (int d = 0; d < 2; ++d)
-                at->f[b][d] += h * weights[i] * k[i].f[b][d];
-        }
+    *from = run->now;
+    msfp_add_rates(from, stages, a[i], i, h);
+    memcpy(at->q, from->q, sizeof at->q);
+    memcpy(at->v, from->v, sizeof at->v);
+    memcpy(at->f, from->f, sizeof at->f);
+    memcpy(at->foot, from->foot, sizeof at->foot);
+    msfp_heat_point(from, 0.0, at);
 }
 
 /* Integrals of the energy balance by Simpson's rule: the power of a rim damper is a peak that lasts only a few
@@ -106,20 +91,19 @@ static int integrals(msfp_run *run, double h)
 /* Whether the fastest rate of decay, estimated from the last two stages at the end of the step, exceeds the limit of
  * stability of the method (Hairer and Wanner, Solving ODEs II, IV.2). Undamped ringing is not detected here; the error
  * estimate detects it. */
-static int at_stability_limit(const slope *sixth, const slope *last, const msfp_point *before, const msfp_point *at,
-                              double h)
+static int at_stability_limit(const msfp_state *sixth, const msfp_state *last, double h)
 {
     double rates = 0.0, states = 0.0;
     for (int b = 0; b < NB; ++b)
         for (int d = 0; d < NQ; ++d) {
-            const double slopes = last->a[b][d] - sixth->a[b][d], change = at->v[b][d] - before->v[b][d];
+            const double slopes = last->a[b][d] - sixth->a[b][d], change = last->v[b][d] - sixth->v[b][d];
             rates += slopes * slopes;
             states += change * change;
         }
     return h * h * rates > 3.25 * 3.25 * states && states > 0.0;
 }
 
-static int finish(msfp_run *run, const msfp_point *at, const slope *last, double h)
+static int finish(msfp_run *run, const msfp_point *at, const msfp_state *last, double h)
 {
     msfp_state *next = &run->next;
     double g[NB][2], residual[MSFP_DOF];
@@ -129,66 +113,42 @@ static int finish(msfp_run *run, const msfp_point *at, const slope *last, double
     const int status = msfp_condensed(&run->parameters, at, &seed, &run->work, g, residual, NULL);
     if (status)
         return status;
+    *next = *last;
+    memcpy(next->foot, run->work.foot + MSFP_FOOT_Y, sizeof next->foot);
+    memcpy(next->dfoot, run->work.foot + MSFP_FOOT_Y1, sizeof next->dfoot);
+    msfp_powers_of(run, at, next);
     next->t = run->now.t + h;
-    msfp_heat_finish(run);
     run->reached = *at;
-    memcpy(next->q, at->q, sizeof next->q);
-    memcpy(next->v, at->v, sizeof next->v);
-    memcpy(next->a, last->a, sizeof next->a);
-    memcpy(next->f, at->f, sizeof next->f);
-    memcpy(next->df, last->f, sizeof next->df);
-    memcpy(next->foot, run->work.foot, sizeof next->foot);
-    next->mechanical = msfp_mechanical_energy(&run->parameters, at, &run->work);
-    msfp_powers(&run->parameters, at, &run->work, &next->mechanical, next->power);
     return integrals(run, h);
 }
 
 int msfp_step_dopri5(msfp_run *run, double h, double *error)
 {
-    slope k[STAGES];
-    msfp_point at, sixth;
-    msfp_increment estimate;
+    msfp_state k[STAGES], from, estimate = { 0 };
+    msfp_point at;
     run->node_count = 0;
     memset(&at, 0, sizeof at);
-    memset(&estimate, 0, sizeof estimate);
-    msfp_heat_begin(run);
+    k[0] = run->now;
     if (run->determinant == 0) { /* the reference sign is that of the start, not of a first step that may be too long */
         msfp_point_at(run, run->now.t, &at);
-        msfp_heat_point(&run->now, &at);
-        combine(&run->now, k, a[0], 0, h, &at);
-        const int status = slope_at(run, &at, &k[0]);
+        stage_point(run, k, 0, h, &from, &at);
+        const int status = rates_at(run, &at, &k[1]);
         if (status)
             return status;
     }
-    memcpy(k[0].v, run->now.v, sizeof k[0].v);
-    memcpy(k[0].a, run->now.a, sizeof k[0].a);
-    memcpy(k[0].f, run->now.df, sizeof k[0].f);
-    memcpy(k[0].foot, run->now.foot + MSFP_FOOT_Y1, sizeof k[0].foot);
+    memset(k[0].power, 0, sizeof k[0].power);
     for (int i = 1; i < STAGES; ++i) {
-        sixth = at;
         msfp_point_at(run, run->now.t + c[i] * h, &at);
-        combine(&run->now, k, a[i], i, h, &at);
-        msfp_heat_prepare(run, a[i], i, h, 0.0, &at);
-        const int status = slope_at(run, &at, &k[i]);
+        stage_point(run, k, i, h, &from, &at);
+        const int status = rates_at(run, &at, &k[i]);
         if (status)
             return status;
-        msfp_heat_stage(run, i, 0.0);
+        msfp_heat_state(&run->work, &from, 0.0, &k[i]);
     }
-    for (int i = 0; i < STAGES; ++i)
-        for (int d = 0; d < 2; ++d)
-            estimate.foot[d] += h * e[i] * k[i].foot[d];
-    for (int i = 0; i < STAGES; ++i)
-        for (int b = 0; b < NB; ++b) {
-            for (int d = 0; d < NQ; ++d) {
-                estimate.q[b][d] += h * e[i] * k[i].v[b][d];
-                estimate.v[b][d] += h * e[i] * k[i].a[b][d];
-            }
-            for (int d = 0; d < 2; ++d)
-                estimate.f[b][d] += h * e[i] * k[i].f[b][d];
-        }
-    *error = fmax(msfp_error_norm(run, &estimate, 1), msfp_heat_error(run, e, STAGES, h, 0.0));
+    msfp_add_rates(&estimate, k, e, STAGES, h);
+    *error = fmax(msfp_error_norm(run, &estimate, 1), msfp_heat_error(run, &estimate, &k[STAGES - 1], 0.0));
     if (*error <= 1.0)
         run->stability_limit_steps =
-            at_stability_limit(&k[STAGES - 2], &k[STAGES - 1], &sixth, &at, h) ? run->stability_limit_steps + 1 : 0;
+            at_stability_limit(&k[STAGES - 2], &k[STAGES - 1], h) ? run->stability_limit_steps + 1 : 0;
     return finish(run, &at, &k[STAGES - 1], h);
 }

@@ -1,6 +1,6 @@
 /* implicit.c: one step of a stiffly accurate ESDIRK method on the condensed equations.
  *
- * Unknowns of a stage are the angular rates v. The stage formula gives q = Q + beta v and a = (v - V)/beta with
+ * Unknowns of a stage are the angular rates v. The stage formula gives q = from.q + beta v and a = (v - from.v)/beta with
  * beta = gamma h, and surface by surface Y, Z. Rates do not enter the error norm.
  */
 #include <math.h>
@@ -9,48 +9,29 @@
 
 static const int unknown[ND] = MSFP_FREE;
 
-MSFP_INLINE void add(double *restrict sum, const double *restrict rates, double weight, int count)
-{
-    for (int i = 0; i < count; ++i)
-        sum[i] += weight * rates[i];
-}
-
-/* Add the weighted rates of the first `count` stages to coordinates, their rates, and Y, Z. */
-static void add_stages(const msfp_stages *s, const double *weights, int count, double h, double q[NB][NQ],
-                       double v[NB][NQ], double f[NB][2], double foot[2])
-{
-    for (int j = 0; j < count; ++j) {
-        add(&q[0][0], &s->v[j][0][0], h * weights[j], NB * NQ);
-        add(&v[0][0], &s->a[j][0][0], h * weights[j], NB * NQ);
-        add(&f[0][0], &s->df[j][0][0], h * weights[j], 2 * NB);
-        add(foot, s->foot[j], h * weights[j], 2);
-    }
-}
-
-/* Q, V and fp, in q = Q + beta v, v = V + beta a, f = fp + beta df, and the same of the foot. */
 void msfp_stage_begin(msfp_run *run, msfp_stages *s, int i)
 {
-    const double h = s->h;
-    memcpy(s->now.Q, run->now.q, sizeof s->now.Q);
-    memcpy(s->now.V, run->now.v, sizeof s->now.V);
-    memcpy(s->now.seed.fp, run->now.f, sizeof s->now.seed.fp);
-    memcpy(s->now.at.foot, run->now.foot, sizeof s->now.at.foot);
-    add_stages(s, s->method->a[i], i, h, s->now.Q, s->now.V, s->now.seed.fp, s->now.at.foot);
-    s->now.at.foot[0] += s->now.beta * s->now.at.foot[1];
+    msfp_state *from = &s->now.from;
+    memcpy(from, &run->now, offsetof(msfp_state, a)); /* without rates */
+    msfp_add_rates(from, s->stage, s->method->a[i], i, s->h);
+    memcpy(s->now.seed.fp, from->f, sizeof from->f);
+    s->now.at.foot[0] = from->foot[0] + s->now.beta * from->foot[1];
+    s->now.at.foot[1] = from->foot[1];
     s->now.at.foot_beta = s->now.beta;
     s->now.seed.same_base = 0;
-    msfp_heat_prepare(run, s->method->a[i], i, h, s->now.beta, &s->now.at);
+    msfp_heat_point(from, s->now.beta, &s->now.at);
 }
 
 /* Rate j of body k at stage i, extrapolated from the earlier stages. */
 static double extrapolated_rate(const msfp_run *run, const msfp_stages *s, int i, int k, int j, double h)
 {
     const double *c = s->method->c;
-    const double slope = i > 1 ? (s->v[1][k][j] - s->v[0][k][j]) / c[1] : h * run->now.a[k][j];
+    const msfp_state *stage = s->stage;
+    const double slope = i > 1 ? (stage[1].v[k][j] - stage[0].v[k][j]) / c[1] : h * run->now.a[k][j];
     double v = run->now.v[k][j] + c[i] * slope;
     if (i > 2) /* curvature from the last stage */
         v += c[i] * (c[i] - c[1]) / (c[i - 1] * (c[i - 1] - c[1])) *
-             (s->v[i - 1][k][j] - s->v[0][k][j] - c[i - 1] * slope);
+             (stage[i - 1].v[k][j] - stage[0].v[k][j] - c[i - 1] * slope);
     return v;
 }
 
@@ -59,8 +40,9 @@ static double extrapolated_rate(const msfp_run *run, const msfp_stages *s, int i
 static double rate_of_extrapolated_acceleration(const msfp_run *run, const msfp_stages *s, int i, int k, int j, double h)
 {
     const double *c = s->method->c;
-    const double change = i > 1 ? (s->a[i - 1][k][j] - s->a[0][k][j]) / c[i - 1] : h * run->acceleration_slope[k][j];
-    return s->now.V[k][j] + s->now.beta * (s->a[0][k][j] + c[i] * change);
+    const double first = s->stage[0].a[k][j];
+    const double change = i > 1 ? (s->stage[i - 1].a[k][j] - first) / c[i - 1] : h * run->acceleration_slope[k][j];
+    return s->now.from.v[k][j] + s->now.beta * (first + c[i] * change);
 }
 
 /* First guess of stage i. */
@@ -95,17 +77,6 @@ int msfp_stage_solve(msfp_run *run, msfp_stages *s, int i)
     return status;
 }
 
-/* Integrals of the energy balance up to stage i, by the weights of the method. */
-static void integrals(const msfp_run *run, const msfp_stages *s, int i, double h, double *work)
-{
-    memcpy(work, run->now.work, sizeof run->now.work);
-    for (int j = 0; j <= i; ++j) {
-        const double weight = j == i ? s->method->gamma : s->method->a[i][j];
-        for (int e = 0; e < MSFP_WORKS; ++e)
-            work[e] += h * weight * s->power[j][e];
-    }
-}
-
 /* Where the solution is smooth, third-order weights integrate the work: they see the curvature of power over a long
  * step. Rates that ring are integrated correctly by the weights of the method alone; prescribed rates never ring. */
 static void refine_integrals(const msfp_stages *s, double h, int ringing, double *work)
@@ -113,10 +84,10 @@ static void refine_integrals(const msfp_stages *s, double h, int ringing, double
     const msfp_tableau *method = s->method;
     for (int j = 0; j < method->stages && method->order <= 3.0; ++j)
         if (ringing)
-            work[MSFP_WORK_INPUT] -= h * method->e[j] * s->prescribed[j];
+            work[MSFP_WORK_INPUT] -= h * method->e[j] * s->stage[j].prescribed_power;
         else
             for (int e = 0; e < MSFP_WORKS; ++e) /* the energy stored in stuck friction always rings */
-                work[e] -= e == MSFP_WORK_FRICTION_STORED ? 0.0 : h * method->e[j] * s->power[j][e];
+                work[e] -= e == MSFP_WORK_FRICTION_STORED ? 0.0 : h * method->e[j] * s->stage[j].power[e];
 }
 
 /* Error of Y, Z outside the unit disc. Only the distance by which this step moves them outwards counts, with a weight
@@ -143,24 +114,19 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
 #if MSFP_GRADIENTS
     msfp_gradients_stage(run, i, &s->now);
 #endif
-    memcpy(s->v[i], s->now.at.v, sizeof s->v[i]);
-    memcpy(s->a[i], s->now.at.a, sizeof s->a[i]);
-    memcpy(s->foot[i], run->work.foot + MSFP_FOOT_Y1, sizeof s->foot[i]);
-    msfp_friction_rates(&run->work, s->df[i]);
-    run->next.mechanical = msfp_mechanical_energy(&run->parameters, &s->now.at, &run->work);
-    s->prescribed[i] =
-        msfp_powers(&run->parameters, &s->now.at, &run->work, &run->next.mechanical, s->power[i]).prescribed;
-    msfp_heat_stage(run, i, s->now.beta);
+    msfp_state *stage = &s->stage[i];
+    stage->t = run->now.t + s->method->c[i] * s->h;
+    stage->energy = 0.0; /* known once the step is accepted */
+    msfp_state_of(run, &s->now.at, s->now.f, stage);
+    msfp_powers_of(run, &s->now.at, stage);
+    msfp_heat_state(&run->work, &s->now.from, s->now.beta, stage);
+    for (int e = 0; e < MSFP_WORKS; ++e)
+        stage->work[e] = s->now.from.work[e] + s->h * s->method->gamma * stage->power[e];
     if (run->node_count < MSFP_NODES && i == s->method->nodes[run->node_count]) {
         msfp_node *node = &run->node[run->node_count++];
         node->share = s->method->c[i];
-        msfp_heat_node(run, node);
-        memcpy(node->q, s->now.at.q, sizeof node->q);
-        memcpy(node->v, s->now.at.v, sizeof node->v);
-        memcpy(node->f, s->now.f, sizeof node->f);
-        memcpy(node->foot, run->work.foot, sizeof node->foot);
+        node->state = *stage;
         msfp_force_F_get(run->work.force[NB], node->top_force);
-        integrals(run, s, i, s->h, node->work);
     }
     s->other = fmax(s->other, unit_disc_error(run, &s->now));
 }
@@ -168,7 +134,7 @@ void msfp_stage_end(msfp_run *run, msfp_stages *s, int i)
 /* The embedded estimate of an undamped fast mode is as large as its ringing, although the method damps it. As Hosea and
  * Shampine (1996) do, it is filtered by (1 - beta J)^-1: the last stage is solved with its history moved by the
  * estimate, with the present factors. */
-static void filter(msfp_run *run, const msfp_stages *s, msfp_increment *estimate)
+static void filter(msfp_run *run, const msfp_stages *s, msfp_state *estimate)
 {
     msfp_stage moved = s->now;
     msfp_work w; /* separate, so that run->work keeps the end of the step */
@@ -181,8 +147,8 @@ static void filter(msfp_run *run, const msfp_stages *s, msfp_increment *estimate
         return;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d) {
-            moved.Q[k][d] += estimate->q[k][d];
-            moved.V[k][d] += estimate->v[k][d];
+            moved.from.q[k][d] += estimate->q[k][d];
+            moved.from.v[k][d] += estimate->v[k][d];
         }
         for (int d = 0; d < 2; ++d)
             moved.seed.fp[k][d] += estimate->f[k][d];
@@ -206,7 +172,6 @@ static void filter(msfp_run *run, const msfp_stages *s, msfp_increment *estimate
 
 void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
 {
-    const msfp_state *now = &run->now;
     s->method = msfp_tableau_of(run->options.method);
     const double beta = s->method->gamma * h;
     run->node_count = 0;
@@ -222,46 +187,30 @@ void msfp_stages_begin(msfp_run *run, msfp_stages *s, double h)
     s->now.seed.ca = 1.0 / beta;
     s->now.seed.accuracy = 1e-5 * run->options.rtol;
     memset(s->now.at.a, 0, sizeof s->now.at.a);
-    memcpy(s->v[0], now->v, sizeof s->v[0]);
-    memcpy(s->a[0], now->a, sizeof s->a[0]);
-    memcpy(s->df[0], now->df, sizeof s->df[0]);
-    memcpy(s->foot[0], now->foot + MSFP_FOOT_Y1, sizeof s->foot[0]);
-    memcpy(s->power[0], now->power, sizeof s->power[0]);
-    s->prescribed[0] = now->prescribed_power;
-    msfp_heat_begin(run);
+    s->stage[0] = run->now;
 }
 
 void msfp_stages_end(msfp_run *run, msfp_stages *s, double *error)
 {
-    msfp_increment estimate;
-    memset(&estimate, 0, sizeof estimate);
+    msfp_state estimate = { 0 };
     const msfp_state *now = &run->now;
     msfp_state *next = &run->next;
     const msfp_tableau *method = s->method;
     const int last = method->stages - 1;
     const double h = s->h;
+    *next = s->stage[last];
     next->t = now->t + h;
-    msfp_heat_finish(run);
     run->reached = s->now.at;
-    memcpy(next->q, s->now.at.q, sizeof next->q);
-    memcpy(next->v, s->now.at.v, sizeof next->v);
-    memcpy(next->a, s->now.at.a, sizeof next->a);
-    memcpy(next->f, s->now.f, sizeof next->f);
-    memcpy(next->foot, run->work.foot, sizeof next->foot);
-    memcpy(next->df, s->df[last], sizeof next->df);
-    memcpy(next->power, s->power[last], sizeof next->power);
-    next->prescribed_power = s->prescribed[last];
-    integrals(run, s, last, h, next->work);
-    add_stages(s, method->e, last + 1, h, estimate.q, estimate.v, estimate.f, estimate.foot);
+    msfp_add_rates(&estimate, s->stage, method->e, last + 1, h);
     for (int k = 0; k < NB; ++k)
         for (int d = 0; d < NQ; ++d)
-            run->acceleration_slope[k][d] = (s->a[last][k][d] - s->a[0][k][d]) / h;
+            run->acceleration_slope[k][d] = (next->a[k][d] - now->a[k][d]) / h;
     double other = fmax(s->other, msfp_friction_jump_error(now, next));
-    other = fmax(other, msfp_heat_error(run, method->e, last + 1, h, s->now.beta));
+    other = fmax(other, msfp_heat_error(run, &estimate, next, s->now.beta));
     *error = fmax(other, msfp_error_norm(run, &estimate, 0));
     refine_integrals(s, h, *error > 1.0, next->work);
 #if MSFP_GRADIENTS
-    msfp_gradients_powers(run, s, *error > 1.0);
+    msfp_gradients_states(run, s, *error > 1.0);
 #endif
     if (*error > 1.0) {
         filter(run, s, &estimate);

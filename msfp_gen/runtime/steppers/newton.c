@@ -27,15 +27,15 @@ static void update_point(msfp_stage *s)
 {
     if (closed_form(s)) { /* planar, without masses */
         for (int k = 0; k < NB; ++k)
-            s->at.q[k][unknown[0]] = s->Q[k][unknown[0]] + s->beta * s->at.v[k][unknown[0]];
+            s->at.q[k][unknown[0]] = s->from.q[k][unknown[0]] + s->beta * s->at.v[k][unknown[0]];
         return;
     }
     const double rate = s->inertia / s->beta;
     for (int k = 0; k < NB; ++k) {
         for (int d = 0; d < NQ; ++d)
-            s->at.q[k][d] = s->Q[k][d] + s->beta * s->at.v[k][d];
+            s->at.q[k][d] = s->from.q[k][d] + s->beta * s->at.v[k][d];
         for (int i = 0; i < ND; ++i)
-            s->at.a[k][unknown[i]] = rate * (s->at.v[k][unknown[i]] - s->V[k][unknown[i]]);
+            s->at.a[k][unknown[i]] = rate * (s->at.v[k][unknown[i]] - s->from.v[k][unknown[i]]);
     }
 }
 

@@ -49,9 +49,9 @@ static void parabola(const msfp_run *run, msfp_stage *s, double h)
     s->beta = h * (1.0 + r) / (1.0 + 2.0 * r);
     for (int k = 0; k < NB; ++k) {
         const double now = run->now.q[k][ANGLE];
-        s->Q[k][ANGLE] = now + r * r / (1.0 + 2.0 * r) * (now - run->step_history.q[k]);
+        s->from.q[k][ANGLE] = now + r * r / (1.0 + 2.0 * r) * (now - run->step_history.q[k]);
         s->seed.slip[k][MSFP_SLIP_Y] = run->now.f[k][0];
-        s->seed.slip[k][MSFP_SLIP_TURN] = s->Q[k][ANGLE] - now;
+        s->seed.slip[k][MSFP_SLIP_TURN] = s->from.q[k][ANGLE] - now;
         s->seed.slip[k][MSFP_SLIP_BETA] = s->beta;
     }
     s->seed.cq = s->seed.beta = s->beta;

@@ -3,6 +3,8 @@
 #include <string.h>
 #include "steppers.h"
 
+#define NUMBERS(state, field) MSFP_NUMBERS(msfp_state, state, field)
+
 static const int unknown[MSFP_ND] = MSFP_FREE;
 
 void msfp_point_at(msfp_run *run, double t, msfp_point *at)
@@ -17,11 +19,12 @@ void msfp_point_at(msfp_run *run, double t, msfp_point *at)
 #endif
 }
 
-/* Cubic through values y and rates d at the ends of a step of length h, at its share s. */
-static double hermite(double y0, double d0, double y1, double d1, double h, double s)
+void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h, double s, int count,
+                  double *out)
 {
-    const double r = 1.0 - s;
-    return r * r * (1.0 + 2.0 * s) * y0 + s * s * (3.0 - 2.0 * s) * y1 + s * r * h * (r * d0 - s * d1);
+    const double r = 1.0 - s, w0 = r * r * (1.0 + 2.0 * s), w1 = s * s * (3.0 - 2.0 * s), w = s * r * h;
+    for (int i = 0; i < count; ++i)
+        out[i] = w0 * y0[i] + w1 * y1[i] + w * (r * d0[i] - s * d1[i]);
 }
 
 msfp_weights msfp_weights_at(const msfp_run *run, double share)
@@ -39,51 +42,64 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share)
     return w;
 }
 
-/* A value inside the step: the polynomial through the interpolation nodes where the method has some, because the rates
- * at the ends of a stiff step ring while the values do not; else the cubic through values and rates. `node` points to
- * the value in the first node; the same value of the next node lies one msfp_node further. */
-static double inside(const msfp_weights *w, double y0, double d0, const double *node, double y1, double d1, double h,
-                     double share)
+/* `count` numbers inside the step: on the polynomials through the interpolation nodes where the method has some, because
+ * the rates at the ends of a stiff step ring while the values do not; else on the cubics through values and rates. value,
+ * rate: where they begin in a state [bytes]. */
+static void inside(const msfp_run *run, const msfp_weights *w, double share, size_t value, size_t rate, int count,
+                   msfp_state *out)
 {
-    if (w->count == 2)
-        return hermite(y0, d0, y1, d1, h, share);
-    double y = w->of[0] * y0 + w->of[w->count - 1] * y1;
-    for (int i = 1; i < w->count - 1; ++i)
-        y += w->of[i] * node[(size_t)(i - 1) * (sizeof(msfp_node) / sizeof(double))];
-    return y;
+    const char *ends[2] = { (const char *)&run->now, (const char *)&run->next };
+    const double *y0 = (const double *)(ends[0] + value), *y1 = (const double *)(ends[1] + value);
+    const double *numbers[MSFP_NODES + 2] = { y0, y1 };
+    double weights[MSFP_NODES + 2] = { w->of[0], w->of[w->count - 1] }, *to = (double *)((char *)out + value);
+    if (w->count == 2) {
+        msfp_hermite(y0, (const double *)(ends[0] + rate), y1, (const double *)(ends[1] + rate),
+                     run->next.t - run->now.t, share, count, to);
+        return;
+    }
+    for (int i = 2; i < w->count; ++i) {
+        numbers[i] = (const double *)((const char *)&run->node[i - 2].state + value);
+        weights[i] = w->of[i - 1];
+    }
+    msfp_weigh(weights, w->count, numbers, count, to);
 }
 
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out)
 {
-    const msfp_state *a = &run->now, *b = &run->next;
-    const msfp_node *m = run->node;
+    const size_t q = offsetof(msfp_state, q), v = offsetof(msfp_state, v), a = offsetof(msfp_state, a);
     const msfp_weights w = msfp_weights_at(run, share);
-    const double h = b->t - a->t;
-    out->t = a->t + share * h;
-    for (int k = 0; k < NB; ++k) {
-        for (int d = 0; d < MSFP_NQ; ++d) {
-            out->q[k][d] = inside(&w, a->q[k][d], a->v[k][d], &m->q[k][d], b->q[k][d], b->v[k][d], h, share);
-            out->v[k][d] = inside(&w, a->v[k][d], a->a[k][d], &m->v[k][d], b->v[k][d], b->a[k][d], h, share);
-            out->a[k][d] = (1.0 - share) * a->a[k][d] + share * b->a[k][d];
-        }
-        for (int d = 0; d < 2; ++d)
-            out->f[k][d] = inside(&w, a->f[k][d], a->df[k][d], &m->f[k][d], b->f[k][d], b->df[k][d], h, share);
+    out->t = run->now.t + share * (run->next.t - run->now.t);
+    inside(run, &w, share, q, v, MSFP_COORDINATES, out);
+    inside(run, &w, share, v, a, MSFP_INTEGRATED, out);
+    for (int k = 0; k < MSFP_INTEGRATED; ++k)
+        NUMBERS(out, a)[k] = (1.0 - share) * NUMBERS(&run->now, a)[k] + share * NUMBERS(&run->next, a)[k];
+}
+
+void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *weights, int count, double h)
+{
+    for (int j = 0; j < count; ++j) {
+        msfp_add(NUMBERS(sum, q), NUMBERS(&states[j], v), h * weights[j], MSFP_COORDINATES);
+        msfp_add(NUMBERS(sum, v), NUMBERS(&states[j], a), h * weights[j], MSFP_INTEGRATED);
     }
-#if MSFP_HEAT
-    double da[NB][MSFP_HEAT], db[NB][MSFP_HEAT];
-    msfp_heat_rates(&a->heat[0][0], a->flux, &da[0][0]);
-    msfp_heat_rates(&b->heat[0][0], b->flux, &db[0][0]);
-    for (int k = 0; k < NB; ++k) {
-        out->flux[k] = (1.0 - share) * a->flux[k] + share * b->flux[k];
-        for (int i = 0; i < MSFP_HEAT; ++i)
-            out->heat[k][i] = inside(&w, a->heat[k][i], da[k][i], &m->heat[k][i], b->heat[k][i], db[k][i], h, share);
-    }
-#endif
-    for (int i = 0; i < 2; ++i)
-        out->foot[i] = inside(&w, a->foot[i], a->foot[i + 1], &m->foot[i], b->foot[i], b->foot[i + 1], h, share);
-    out->foot[2] = (1.0 - share) * a->foot[2] + share * b->foot[2];
-    for (int i = 0; i < MSFP_WORKS; ++i)
-        out->work[i] = inside(&w, a->work[i], a->power[i], &m->work[i], b->work[i], b->power[i], h, share);
+}
+
+void msfp_state_of(const msfp_run *run, const msfp_point *at, double f[NB][2], msfp_state *s)
+{
+    memcpy(s->q, at->q, sizeof s->q);
+    memcpy(s->v, at->v, sizeof s->v);
+    memcpy(s->a, at->a, sizeof s->a);
+    memcpy(s->f, f, sizeof s->f);
+    memcpy(s->foot, run->work.foot + MSFP_FOOT_Y, sizeof s->foot);
+    memcpy(s->dfoot, run->work.foot + MSFP_FOOT_Y1, sizeof s->dfoot);
+    msfp_friction_rates(&run->work, s->df);
+}
+
+void msfp_powers_of(const msfp_run *run, const msfp_point *at, msfp_state *s)
+{
+    s->mechanical = msfp_mechanical_energy(&run->parameters, at, &run->work);
+    const msfp_input_parts parts = msfp_powers(&run->parameters, at, &run->work, &s->mechanical, s->power);
+    s->prescribed_power = parts.prescribed;
+    s->load_power = parts.load;
 }
 
 void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
@@ -95,7 +111,7 @@ void msfp_to_point(msfp_run *run, const msfp_state *s, msfp_point *at)
     memcpy(at->a, s->a, sizeof at->a);
     memcpy(at->f, s->f, sizeof at->f);
     memcpy(at->foot, s->foot, sizeof at->foot);
-    msfp_heat_point(s, at);
+    msfp_heat_point(s, 0.0, at);
 }
 
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d)
@@ -111,7 +127,7 @@ static const double smallest_settlement = 1e-4;
 
 /* Largest error of the height of the foot, and if `rates` of its velocity, over its tolerance [-]. The tolerance is
  * the share rtol of the settlement under the supported mass, and so of the force of the spring, which N is. */
-static double foot_error(const msfp_run *run, const msfp_increment *error, int rates)
+static double foot_error(const msfp_run *run, const msfp_state *error, int rates)
 {
     const double gravity = run->parameters.gravity, stiffness = run->parameters.top[MSFP_TOP_PARAMETERS_KV];
     const double mass = msfp_sprung_mass(&run->parameters);
@@ -122,7 +138,7 @@ static double foot_error(const msfp_run *run, const msfp_increment *error, int r
     return fmax(fabs(error->foot[0]) / settlement, rates ? fabs(error->foot[1]) / speed : 0.0) / run->options.rtol;
 }
 
-double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates)
+double msfp_error_norm(const msfp_run *run, const msfp_state *error, int rates)
 {
     const double rtol = run->options.rtol;
     double worst = foot_error(run, error, rates);

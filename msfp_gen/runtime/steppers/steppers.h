@@ -38,21 +38,44 @@ msfp_weights msfp_weights_at(const msfp_run *run, double share);
 void msfp_interpolate(const msfp_run *run, double share, msfp_state *out);
 /* Absolute tolerance of coordinate d of body j + 1: of an angle [rad], or of a separation (d >= 3) [m]. */
 double msfp_absolute_tolerance(const msfp_run *run, int j, int d);
-/* A change of a state, such as the estimated error of a step: of q, v, of Y, Z, of the foot and its rate. */
-typedef struct {
-    double q[MSFP_NB][MSFP_NQ], v[MSFP_NB][MSFP_NQ], f[MSFP_NB][2], foot[2];
-} msfp_increment;
+/* sum += weight rates, of `count` numbers: of a state, or of its columns. */
+MSFP_INLINE void msfp_add(double *restrict sum, const double *restrict rates, double weight, int count)
+{
+    for (int i = 0; i < count; ++i)
+        sum[i] += weight * rates[i];
+}
+/* sum += h times the weighted rates of the first `count` states, of what is integrated. */
+void msfp_add_rates(msfp_state *sum, const msfp_state *states, const double *weights, int count, double h);
+/* The state of the evaluation in run->work at the point `at`, with Y, Z in `f` and all rates, but for powers and what a
+ * stage formula gives: temperatures and works. */
+void msfp_state_of(const msfp_run *run, const msfp_point *at, double f[MSFP_NB][2], msfp_state *s);
+/* Powers and energies of the masses of that evaluation, into `s`. */
+void msfp_powers_of(const msfp_run *run, const msfp_point *at, msfp_state *s);
+/* The cubics through `count` values y and rates d at the ends of a step of length h, at its share s. */
+void msfp_hermite(const double *y0, const double *d0, const double *y1, const double *d1, double h, double s, int count,
+                  double *out);
+/* Sum of weights times `count` numbers of each of at least three items. */
+MSFP_INLINE void msfp_weigh(const double *weights, int items, const double *const *numbers, int count,
+                            double *restrict sum)
+{
+    const double *a = numbers[0], *b = numbers[1], *c = numbers[2];
+    for (int i = 0; i < count; ++i)
+        sum[i] = weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i];
+    for (int k = 3; k < items; ++k)
+        for (int i = 0; i < count; ++i)
+            sum[i] += weights[k] * numbers[k][i];
+}
 /* Largest error of a step over its tolerance [-]: of q, of Y, Z, of the foot, and if `rates` of their rates. */
-double msfp_error_norm(const msfp_run *run, const msfp_increment *error, int rates);
+double msfp_error_norm(const msfp_run *run, const msfp_state *error, int rates);
 /* Error of a step in which Y, Z change by more than 1/2, 0 otherwise. Such a step may span a reversal, its estimate is
  * not reliable and its interpolation meaningless. Cubed, because the step control takes the cube root. */
 double msfp_friction_jump_error(const msfp_state *now, const msfp_state *next);
 
 /* ---- newton.c: the equations of one stage ---- */
 
-/* Unknowns are the rates at.v; q = Q + beta v and a = inertia (v - V)/beta follow, g, Y and Z from the seed. */
+/* Unknowns are the rates at.v; q = from.q + beta v and a = inertia (v - from.v)/beta follow, g, Y, Z from the seed. */
 typedef struct {
-    double Q[MSFP_NB][MSFP_NQ], V[MSFP_NB][MSFP_NQ];
+    msfp_state from; /* what the earlier stages give: q = from.q + beta v, v = from.v + beta a, and so on */
     double beta;    /* [s] */
     double inertia; /* 1; 0 leaves out all inertia */
     msfp_seed seed;
@@ -78,13 +101,11 @@ int msfp_factorise_stage(msfp_run *run, msfp_stage *s, double *residual, double 
 
 /* ---- implicit.c: a step of an ESDIRK method, stage by stage ---- */
 
-/* A step in progress: rates of its stages, and the stage that is being solved. */
+/* A step in progress: its stages, and the one that is being solved. */
 typedef struct {
     const msfp_tableau *method;
     double h, other; /* its length [s]; its error beside that of the embedded estimate, over its tolerance [-] */
-    double v[MSFP_STAGES][MSFP_NB][MSFP_NQ], a[MSFP_STAGES][MSFP_NB][MSFP_NQ], df[MSFP_STAGES][MSFP_NB][2],
-        power[MSFP_STAGES][MSFP_WORKS], prescribed[MSFP_STAGES];
-    double foot[MSFP_STAGES][2]; /* velocity and acceleration of the foot of the supported mass */
+    msfp_state stage[MSFP_STAGES]; /* those that are solved; 0: the start of the step */
     msfp_stage now;
 } msfp_stages;
 
@@ -119,7 +140,7 @@ void msfp_quasistatic_begin(msfp_run *run, const msfp_point *at, double load_pow
 
 /* Stage i of the step in progress, solved. */
 void msfp_gradients_stage(msfp_run *run, int i, const msfp_stage *stage);
-/* Powers of its stages; ringing: whether its works are integrated as where rates ring. */
-void msfp_gradients_powers(msfp_run *run, const msfp_stages *s, int ringing);
+/* States of its stages; ringing: whether its works are integrated as where rates ring. */
+void msfp_gradients_states(msfp_run *run, const msfp_stages *s, int ringing);
 
 #endif
